@@ -1,0 +1,1 @@
+"""Core services and everything components need to talk: bus, clock, life cycle, mission file, recording."""

@@ -1,0 +1,1 @@
+"""Bus and Clock: how components talk and what time it is."""

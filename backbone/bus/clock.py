@@ -1,0 +1,143 @@
+"""Clocks: the only file that sleeps.
+
+``MissionClock`` follows the machine's monotonic clock from the mission's start, at the mission's
+rate.  ``VirtualLoop`` is an event loop in which time passes only when nothing is left to do: then it
+jumps to the next timer.  Everything that waits through asyncio (sleeps, time-outs) then runs on
+virtual time, in one process, as fast as the machine can and always in the same order.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import selectors
+import time
+from collections.abc import Coroutine, Mapping
+from typing import Any, TypeVar
+
+from backbone.errors import BackboneError
+
+T = TypeVar("T")
+
+
+class MissionClock:
+    """Mission time on one machine.
+
+    Args:
+        origin_monotonic_s: The machine's monotonic clock at mission time 0.
+        rate: Mission seconds per second of the machine, above 0.
+    """
+
+    def __init__(self, origin_monotonic_s: float, rate: float = 1.0) -> None:
+        if not rate > 0:
+            raise ValueError(f"rate must be above 0, not {rate}")
+        self._origin_s, self._rate = origin_monotonic_s, rate
+
+    @classmethod
+    def started_now(cls, rate: float = 1.0) -> MissionClock:
+        """Return a clock whose mission begins now."""
+        return cls(time.monotonic(), rate)
+
+    @property
+    def origin_monotonic_s(self) -> float:
+        """The machine's monotonic clock at mission time 0."""
+        return self._origin_s
+
+    @property
+    def rate(self) -> float:
+        """Mission seconds per second of the machine."""
+        return self._rate
+
+    def now_s(self) -> float:
+        """Return the mission time in seconds."""
+        return (time.monotonic() - self._origin_s) * self._rate
+
+    async def sleep_s(self, duration_s: float) -> None:
+        """Return after this many mission seconds; at least yields once."""
+        await asyncio.sleep(max(0.0, duration_s) / self._rate)
+
+    async def sleep_until_s(self, at_s: float) -> None:
+        """Return at this mission time, at once if it has passed."""
+        await self.sleep_s(at_s - self.now_s())
+
+
+class VirtualClock:
+    """Mission time that is the time of the running event loop, which a ``VirtualLoop`` makes virtual."""
+
+    @property
+    def rate(self) -> float:
+        """Always 1: time-outs and mission time are the same here."""
+        return 1.0
+
+    def now_s(self) -> float:
+        """Return the loop's time in seconds."""
+        return asyncio.get_running_loop().time()
+
+    async def sleep_s(self, duration_s: float) -> None:
+        """Return after this many seconds of the loop; at least yields once."""
+        await asyncio.sleep(max(0.0, duration_s))
+
+    async def sleep_until_s(self, at_s: float) -> None:
+        """Return at this time, at once if it has passed."""
+        await self.sleep_s(at_s - self.now_s())
+
+
+class NothingLeftToHappen(BackboneError):
+    """Every task waits for something that no timer will bring: a deadlock, found the moment it occurs."""
+
+
+class _JumpingSelector(selectors.BaseSelector):
+    """Selects without waiting; where it would have waited, the loop's time moves on instead."""
+
+    def __init__(self) -> None:
+        self._real = selectors.DefaultSelector()
+        self.now_s = 0.0
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready = self._real.select(0)
+        if ready or timeout == 0:
+            return ready
+        if timeout is None:
+            raise NothingLeftToHappen(f"all tasks wait for ever at t={self.now_s:.6f} s")
+        self.now_s += timeout
+        return []
+
+    def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
+        return self._real.register(fileobj, events, data)
+
+    def unregister(self, fileobj: Any) -> selectors.SelectorKey:
+        return self._real.unregister(fileobj)
+
+    def modify(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:
+        return self._real.modify(fileobj, events, data)
+
+    def get_map(self) -> Mapping[Any, selectors.SelectorKey]:
+        return self._real.get_map()
+
+    def close(self) -> None:
+        self._real.close()
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """An event loop whose time begins at 0 and jumps to the next timer when nothing else can run."""
+
+    def __init__(self) -> None:
+        self._jumping = _JumpingSelector()
+        super().__init__(self._jumping)
+
+    def time(self) -> float:
+        """Return the virtual time in seconds."""
+        return self._jumping.now_s
+
+
+def run_virtual(main: Coroutine[Any, Any, T]) -> T:
+    """Run the coroutine on a new ``VirtualLoop`` and return its result.
+
+    Example:
+        >>> async def hour() -> float:
+        ...     await VirtualClock().sleep_s(3600.0)
+        ...     return VirtualClock().now_s()
+        >>> run_virtual(hour())
+        3600.0
+    """
+    with asyncio.Runner(loop_factory=VirtualLoop) as runner:
+        return runner.run(main)

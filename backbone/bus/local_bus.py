@@ -1,0 +1,239 @@
+"""The bus inside one process: objects are handed over as they are, never serialised, never copied.
+
+Deliveries are separate steps of the event loop in the order in which they were said, so on a
+``VirtualLoop`` the same program gives the same run.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import types
+import typing
+from collections.abc import Callable
+from typing import Any
+
+from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
+from backbone.bus.speaker import Speaker
+from backbone.errors import NoResponder, ReplyTimeout
+from backbone.keys import Conversation
+from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, schema_of
+
+
+class LocalNetwork:
+    """What the buses of one process share. One network is one mission."""
+
+    def __init__(self, mission: str = "local") -> None:
+        self.mission = mission
+        self.servers: dict[str, _Server] = {}
+        self.listeners: list[_Listening] = []
+        self.tokens: dict[str, list[_Declared]] = {}
+        self.watchers: list[_Watching] = []
+
+    def join(self, source: str, clock: Clock) -> LocalBus:
+        """Return a new bus on this network that speaks as ``source``."""
+        return LocalBus(self, source, clock)
+
+
+class _Declared:
+    """Something one bus declared; closing it takes it out of the network."""
+
+    def __init__(self, owner: LocalBus, take_back: Callable[[], None]) -> None:
+        self.owner, self._take_back, self.closed = owner, take_back, False
+        owner.declared.append(self)
+
+    def close(self) -> None:
+        if not self.closed:
+            self.closed = True
+            self.owner.declared.remove(self)
+            self._take_back()
+
+
+class _Server(_Declared):
+    def __init__(self, owner: LocalBus, address: str, accepts: Accepted, answer: Answer) -> None:
+        super().__init__(owner, lambda: self._leave(owner.network, address))
+        self.kinds, self.answer = _kinds(accepts), answer
+        self.pending: set[asyncio.Future[Envelope[Any] | None]] = set()
+
+    def _leave(self, network: LocalNetwork, address: str) -> None:
+        if network.servers.get(address) is self:
+            del network.servers[address]
+
+
+class _Listening(_Declared):
+    def __init__(
+        self,
+        owner: LocalBus,
+        pattern: str,
+        conversation: Conversation,
+        accepts: Accepted,
+        listener: Listener,
+        latest: bool,
+    ) -> None:
+        super().__init__(owner, lambda: owner.network.listeners.remove(self))
+        self.pattern, self.conversation, self.kinds, self.listener = pattern, conversation, _kinds(accepts), listener
+        self.latest, self.waiting = latest, False
+        self.newest: Envelope[Any] | None = None
+
+    def deliver(self, envelope: Envelope[Any]) -> None:
+        loop = asyncio.get_running_loop()
+        if not self.latest:
+            loop.call_soon(self._hand_over, envelope)
+            return
+        self.newest = envelope
+        if not self.waiting:
+            self.waiting = True
+            loop.call_soon(self._hand_over_newest)
+
+    def _hand_over_newest(self) -> None:
+        self.waiting = False
+        if self.newest is not None:
+            envelope, self.newest = self.newest, None
+            self._hand_over(envelope)
+
+    def _hand_over(self, envelope: Envelope[Any]) -> None:
+        if self.closed or self.owner.closed:
+            return
+        if isinstance(envelope.body, self.kinds):
+            self.owner.hear(self.listener, envelope)
+        else:
+            self.owner.unreadable += 1
+
+
+class _Watching(_Declared):
+    def __init__(self, owner: LocalBus, pattern: str, listener: LifeListener) -> None:
+        super().__init__(owner, lambda: owner.network.watchers.remove(self))
+        self.pattern, self.listener = pattern, listener
+
+    def tell(self, address: str, alive: bool) -> None:
+        if _matches(self.pattern, address):
+            asyncio.get_running_loop().call_soon(self._hand_over, address, alive)
+
+    def _hand_over(self, address: str, alive: bool) -> None:
+        if not self.closed:
+            self.listener(address, alive)
+
+
+class LocalBus(Speaker):
+    """One component's voice and ears on a ``LocalNetwork``."""
+
+    def __init__(self, network: LocalNetwork, source: str, clock: Clock) -> None:
+        super().__init__(network.mission, source, clock)
+        self.network = network
+        self.declared: list[_Declared] = []
+        self.closed = False
+
+    async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
+        """Ask one component and return its answer; see ``Bus.ask``."""
+        self.asked += 1
+        asked = self.envelope(question)
+        await asyncio.sleep(0)
+        server = self.network.servers.get(address)
+        if server is None:
+            raise NoResponder(f"nobody answers at {address}")
+        answered: asyncio.Future[Envelope[Any] | None] = asyncio.get_running_loop().create_future()
+        server.pending.add(answered)
+        server.owner.start(_answer(server, asked, answered))
+        try:
+            async with asyncio.timeout(within_s):
+                envelope = await answered
+        except TimeoutError:
+            raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
+        finally:
+            server.pending.discard(answered)
+        if envelope is None:
+            raise NoResponder(f"{address} died before it answered {type(question).__name__}")
+        if isinstance(envelope.body, Refused):
+            raise envelope.body.revive()
+        if not isinstance(envelope.body, reply):
+            raise MalformedMessage(f"{address} answered {type(envelope.body).__name__}, not {reply.__name__}")
+        return envelope.body
+
+    def serve(self, address: str, accepts: Accepted, answer: Answer) -> _Server:
+        """Answer questions asked of this address; see ``Bus.serve``."""
+        server = _Server(self, address, accepts, answer)
+        self.network.servers[address] = server
+        return server
+
+    def publish(self, address: str, conversation: Conversation, message: Message) -> None:
+        """Hand the message to whoever subscribed; see ``Bus.publish``."""
+        self.published += 1
+        envelope = self.envelope(message)
+        for listening in self.network.listeners:
+            if listening.conversation == conversation and _matches(listening.pattern, address):
+                listening.deliver(envelope)
+
+    def subscribe(
+        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+    ) -> _Listening:
+        """Hear publications; see ``Bus.subscribe``."""
+        listening = _Listening(self, address, conversation, accepts, listener, latest)
+        self.network.listeners.append(listening)
+        return listening
+
+    def declare_alive(self, address: str) -> _Declared:
+        """Raise a liveliness token; see ``Bus.declare_alive``."""
+        tokens = self.network.tokens.setdefault(address, [])
+
+        def fall() -> None:
+            tokens.remove(token)
+            if not tokens:
+                self._tell_watchers(address, alive=False)
+
+        token = _Declared(self, fall)
+        tokens.append(token)
+        if len(tokens) == 1:
+            self._tell_watchers(address, alive=True)
+        return token
+
+    def watch_alive(self, address: str, listener: LifeListener) -> _Watching:
+        """Watch liveliness tokens; see ``Bus.watch_alive``."""
+        watching = _Watching(self, address, listener)
+        self.network.watchers.append(watching)
+        for standing, tokens in self.network.tokens.items():
+            if tokens:
+                watching.tell(standing, alive=True)
+        return watching
+
+    def watch_link(self, listener: LinkListener) -> _Declared:
+        """Report the link, which inside one process is up for good."""
+        asyncio.get_running_loop().call_soon(listener, True)
+        return _Declared(self, lambda: None)
+
+    async def close(self) -> None:
+        """Take back everything declared; questions still open here end with ``NoResponder``."""
+        self.closed = True
+        for declared in list(self.declared):
+            declared.close()
+            if isinstance(declared, _Server):
+                for answered in declared.pending:
+                    if not answered.done():
+                        answered.set_result(None)
+        await self.end_tasks()
+
+    def _tell_watchers(self, address: str, *, alive: bool) -> None:
+        for watching in list(self.network.watchers):
+            watching.tell(address, alive)
+
+
+async def _answer(server: _Server, asked: Envelope[Any], answered: asyncio.Future[Envelope[Any] | None]) -> None:
+    if isinstance(asked.body, server.kinds):
+        envelope = await server.owner.reply_to(asked, server.answer)
+    else:
+        server.owner.unreadable += 1
+        schema = schema_of(type(asked.body))
+        accepted = ", ".join(sorted(schema_of(kind) for kind in server.kinds))
+        refusal = UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=accepted)
+        envelope = server.owner.envelope(Refused.of(refusal))
+    if not answered.done():
+        answered.set_result(envelope)
+
+
+def _kinds(accepts: Accepted) -> tuple[type[Any], ...]:
+    return typing.get_args(accepts) if isinstance(accepts, types.UnionType) else (accepts,)
+
+
+def _matches(pattern: str, address: str) -> bool:
+    if pattern == address:
+        return True
+    wanted, given = pattern.split("/"), address.split("/")
+    return len(wanted) == len(given) and all(w in ("*", g) for w, g in zip(wanted, given, strict=True))

@@ -1,0 +1,277 @@
+"""The life of every component: connect, ready, serve, drain, stop.
+
+A component is a class with a few hooks. The shell in this file owns the order in which they run,
+answers the questions everybody can be asked, and makes readiness visible: the liveliness token is
+declared last, so whoever sees it can ask at once.
+
+Rule: a bug ends the component. Its process exits with an error, its creator reports and restarts it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import types
+from collections.abc import Coroutine
+from typing import Any, ClassVar, Generic, TypeVar, cast
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.launch import Launch
+from backbone.component.messages import (
+    AskParameters,
+    AskState,
+    AskStatistics,
+    AskStory,
+    CommonQuestion,
+    ComponentState,
+    LifeState,
+    Parameters,
+    SetParameter,
+    Statistics,
+    Stop,
+    Stopping,
+    Story,
+)
+from backbone.component.story import StoryBook
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.wire import Envelope, Message, UnknownMessage
+
+log = logging.getLogger(__name__)
+
+
+class NoParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """For components without parameters."""
+
+
+class WrongParameter(Refusal):
+    """A parameter of that name does not exist, or the value does not fit it."""
+
+    code = "component.parameter"
+    remedy = "Ask the component for its parameters; use one of those names with a value of its type."
+
+
+P = TypeVar("P", bound=msgspec.Struct)
+
+
+class Component(Generic[P]):
+    """Base of every component; derive, set the class variables, override the hooks you need.
+
+    Args:
+        launch: Who this component is, and with which parameters it begins.
+        bus: Already open.
+        clock: The mission's time.
+
+    Raises:
+        WrongParameter: The launch's parameters do not fit ``parameters_type``.
+    """
+
+    parameters_type: ClassVar[type[msgspec.Struct]] = NoParameters
+    accepts: ClassVar[types.UnionType | type[Any] | None] = None
+    """Questions it answers besides the common ones: a message class or a union of them."""
+
+    @classmethod
+    def before_bus(cls, launch: Launch) -> None:
+        """Prepare the process.
+
+        When: first thing in a new process, before the event loop and before any bus is open.
+        What: the only moment at which this process may still fork (a zygote).
+        Not: anything that needs other components.
+        """
+
+    @classmethod
+    def open_bus(cls, launch: Launch, clock: Clock) -> Bus:
+        """Return the bus the component will speak on: a client of the hub, unless the class is the hub."""
+        return ZenohBus.open(launch.mission, launch.address, clock, client_config(launch.endpoint))
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        self.launch, self.bus, self.clock = launch, bus, clock
+        self.parameters: P = cast(P, _convert(launch.parameters, self.parameters_type))
+        self.story = StoryBook(launch.address, clock)
+        self.feedback = ""
+        self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
+        self._end = asyncio.Event()
+        self._bug: BaseException | None = None
+        self._tasks: asyncio.TaskGroup | None = None
+
+    # ------------------------------------------------------------------ hooks
+    async def connect(self) -> None:
+        """Get hold of what the component needs.
+
+        When: once, before anybody can ask it. What: subscribe, ask others, open devices.
+        Not: wait for something that waits for this component's readiness.
+        """
+
+    async def serve(self) -> None:
+        """Do the component's own work.
+
+        When: from readiness on. What: loop until cancelled, or return when the work is done; the
+        component lives on and answers questions until it is told to stop or calls ``end``.
+        """
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Return the reply to one of the questions in ``accepts``; raise a ``Refusal`` to say no.
+
+        When: any time between readiness and stop, several at once. Not: wait for the asker.
+        """
+        raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
+
+    async def drain(self) -> None:
+        """Go to the safe state.
+
+        When: once, after ``serve`` was cancelled, while the bus is still open. What: finish or undo what
+        was begun, leave hardware safe. Not: begin anything new.
+        """
+
+    def parameters_changed(self) -> None:
+        """Take over ``self.parameters``, which were just replaced by checked new ones."""
+
+    def statistics(self) -> dict[str, float]:
+        """Return named counters and measures, units in the names."""
+        return {}
+
+    # ------------------------------------------------------------------ for derived classes
+    @property
+    def name(self) -> str:
+        """Name of the component, unique in the mission."""
+        return self.launch.name
+
+    @property
+    def address(self) -> str:
+        """``<subsystem>/<name>``."""
+        return self.launch.address
+
+    @property
+    def state(self) -> LifeState:
+        """Where the component is in its life."""
+        return self._state
+
+    def start_task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+        """Run the coroutine beside ``serve``; its bug is the component's bug, its life ends with it."""
+        if self._tasks is None:
+            work.close()
+            raise RuntimeError(f"{self.address} starts {name} before it serves")
+        return self._tasks.create_task(work, name=f"{self.name}:{name}")
+
+    def report(self, feedback: str) -> None:
+        """Say in one line what the component is doing; published if it is news."""
+        if feedback != self.feedback:
+            self.feedback = feedback
+            if self._state is LifeState.READY:
+                self._publish_state()
+
+    def end(self, reason: str) -> None:
+        """Leave in good order; ``run`` returns when that is done."""
+        if not self._end.is_set():
+            self.story.note(self.name, f"ends: {reason}")
+            self._end.set()
+
+    def fail(self, bug: BaseException) -> None:
+        """End because of a bug; ``run`` raises it."""
+        if self._bug is None:
+            self._bug = bug
+            log.error("%s failed", self.address, exc_info=bug)
+        self._end.set()
+
+    def component_state(self) -> ComponentState:
+        """Return who and how this component is."""
+        launch = self.launch
+        return ComponentState(
+            launch.address,
+            launch.type,
+            launch.host,
+            os.getpid(),
+            self._state,
+            self._since_s,
+            self.feedback,
+            launch.requester,
+        )
+
+    # ------------------------------------------------------------------ the shell
+    async def run(self) -> None:
+        """Live the whole life; return after a good end.
+
+        Raises:
+            BaseException: The bug that ended it.
+        """
+        self.bus.on_bug = self.fail
+        try:
+            await self.connect()
+            accepts = CommonQuestion if self.accepts is None else CommonQuestion | self.accepts
+            self.bus.serve(self.address, accepts, self._answer)
+            await self._serve_until_end()
+        finally:
+            self._enter(LifeState.FAILED if self._bug else LifeState.STOPPED)
+            await self.bus.close()
+        if self._bug is not None:
+            raise self._bug
+
+    async def _serve_until_end(self) -> None:
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                self._tasks = tasks
+                serving = tasks.create_task(self.serve(), name=f"{self.name}:serve")
+                self._enter(LifeState.READY)
+                token = self.bus.declare_alive(self.address)
+                await self._end.wait()
+                self._enter(LifeState.DRAINING)
+                serving.cancel()
+                for task in tasks._tasks:  # noqa: SLF001  the group offers no public way to end its tasks
+                    task.cancel()
+        except* Exception as bugs:
+            if self._bug is None:
+                self._bug = bugs
+                log.error("%s failed", self.address, exc_info=bugs)
+        finally:
+            self._tasks = None
+        await self.drain()
+        token.close()
+
+    def _enter(self, state: LifeState) -> None:
+        self._state, self._since_s = state, self.clock.now_s()
+        self.story.note(self.name, f"is {state}")
+        self._publish_state()
+
+    def _publish_state(self) -> None:
+        self.bus.publish(self.address, Conversation.STATUS, self.component_state())
+
+    async def _answer(self, asked: Envelope[Any]) -> Message:
+        match asked.body:
+            case AskState():
+                return self.component_state()
+            case AskStatistics():
+                bus = {
+                    f"bus_{name}": float(value) for name, value in msgspec.structs.asdict(self.bus.statistics()).items()
+                }
+                return Statistics({**bus, **self.statistics()})
+            case AskParameters():
+                return Parameters(msgspec.to_builtins(self.parameters))
+            case SetParameter(name=name, value=value, user=user):
+                return self._set_parameter(name, value, user or asked.source)
+            case AskStory(subject=subject):
+                return Story(self.story.of(subject))
+            case Stop(reason=reason):
+                self.end(reason or f"stopped by {asked.source}")
+                return Stopping()
+            case _:
+                return await self.answer(asked)
+
+    def _set_parameter(self, name: str, value: Any, user: str) -> Parameters:
+        old = msgspec.to_builtins(self.parameters)
+        if name not in old:
+            raise WrongParameter(f"{self.name} has no parameter {name!r}; it has: {', '.join(sorted(old)) or 'none'}")
+        self.parameters = cast(P, _convert({**old, name: value}, self.parameters_type))
+        self.story.note(name, f"{user} set {name} from {old[name]!r} to {value!r}")
+        self.parameters_changed()
+        return Parameters(msgspec.to_builtins(self.parameters))
+
+
+def _convert(values: dict[str, Any], kind: type[msgspec.Struct]) -> msgspec.Struct:
+    try:
+        return msgspec.convert(values, kind)
+    except msgspec.ValidationError as error:
+        raise WrongParameter(str(error)) from None

@@ -1,0 +1,45 @@
+"""Everything a new process must know to become a component. Written by a creator, read by the process."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from backbone.naming import Subsystem, address
+from backbone.wire import Message
+
+
+class Launch(Message, frozen=True):
+    """Order to become one component.
+
+    Attributes:
+        mission: Name of the mission.
+        subsystem: One of the four.
+        name: Name of the component, unique in the mission.
+        type: Component type as named in the mission file.
+        class_path: ``package.module:Class``, a ``Component``.
+        host: Name of the host it runs on.
+        endpoint: Where the hub listens.
+        clock_origin_monotonic_s: This machine's monotonic clock at mission time 0.
+        clock_rate: Mission seconds per second of the machine.
+        parameters: Values for the class's ``Parameters``.
+        requester: Address of whoever asked for it.
+        run_directory: Folder of the mission's files on this host; gone when the mission has ended.
+    """
+
+    mission: str
+    subsystem: Subsystem
+    name: str
+    type: str
+    class_path: str
+    host: str
+    endpoint: str
+    clock_origin_monotonic_s: float
+    clock_rate: float
+    parameters: dict[str, Any] = {}
+    requester: str = ""
+    run_directory: str = ""
+
+    @property
+    def address(self) -> str:
+        """``<subsystem>/<name>``."""
+        return address(self.subsystem, self.name)

@@ -1,0 +1,131 @@
+"""What every component can be asked, and what it says of itself unasked."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any
+
+from backbone.wire import Message
+
+
+class LifeState(StrEnum):
+    """Where a component is in its life; it only moves downwards in this list."""
+
+    CONNECTING = "connecting"  # exists, cannot be asked yet
+    READY = "ready"  # its liveliness token stands
+    DRAINING = "draining"  # ends what it began, takes nothing new
+    STOPPED = "stopped"  # left the bus in good order
+    FAILED = "failed"  # ended by a bug; the process is about to die
+
+
+class AskState(Message, frozen=True):
+    """Who are you and how are you?"""
+
+
+class ComponentState(Message, frozen=True):
+    """Answer to ``AskState``; also published as the component's status on every change.
+
+    Attributes:
+        address: ``<subsystem>/<name>``.
+        type: Component type as named in the mission file.
+        host: Host it runs on.
+        pid: Its process.
+        state: Where it is in its life.
+        since_s: Mission time at which it entered that state.
+        feedback: One line for people: what it is doing.
+        requester: Address of whoever had it started.
+    """
+
+    address: str
+    type: str
+    host: str
+    pid: int
+    state: LifeState
+    since_s: float
+    feedback: str = ""
+    requester: str = ""
+
+
+class AskStatistics(Message, frozen=True):
+    """What did you count?"""
+
+
+class Statistics(Message, frozen=True):
+    """Answer to ``AskStatistics``: named counters and measures with their unit in the name."""
+
+    values: dict[str, float]
+
+
+class AskParameters(Message, frozen=True):
+    """With which parameters do you run?"""
+
+
+class Parameters(Message, frozen=True):
+    """Answer to ``AskParameters`` and ``SetParameter``: all parameters as they are now."""
+
+    values: dict[str, Any]
+
+
+class SetParameter(Message, frozen=True):
+    """Run with this value from now on. Refused, and nothing changed, if the value does not fit.
+
+    Attributes:
+        name: Name of the parameter.
+        value: The new value.
+        user: Who wants it, for the record.
+    """
+
+    name: str
+    value: Any
+    user: str = ""
+
+
+class AskStory(Message, frozen=True):
+    """What happened to you lately?
+
+    Attributes:
+        subject: Only events about this name; empty for all.
+    """
+
+    subject: str = ""
+
+
+class StoryEvent(Message, frozen=True):
+    """One thing that happened.
+
+    Attributes:
+        at_s: Mission time.
+        where: Address of the component that tells it.
+        what: Past tense, one line.
+        subject: The name it is about.
+        cause: Id of the message that led to it, empty for a first cause.
+    """
+
+    at_s: float
+    where: str
+    what: str
+    subject: str
+    cause: str
+
+
+class Story(Message, frozen=True):
+    """Answer to ``AskStory``: the newest events, oldest first."""
+
+    events: list[StoryEvent]
+
+
+class Stop(Message, frozen=True):
+    """End in good order: finish what you began, go to the safe state, leave.
+
+    Attributes:
+        reason: For the record.
+    """
+
+    reason: str = ""
+
+
+class Stopping(Message, frozen=True):
+    """Answer to ``Stop``: it is on its way out."""
+
+
+CommonQuestion = AskState | AskStatistics | AskParameters | SetParameter | AskStory | Stop

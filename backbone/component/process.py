@@ -1,0 +1,84 @@
+"""From a launch order to a running component: the last thing a forked or fresh process calls."""
+
+from __future__ import annotations
+
+import asyncio
+import faulthandler
+import importlib
+import logging
+import os
+import signal
+import sys
+from typing import Any
+
+import uvloop
+
+from backbone.bus.clock import MissionClock
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.errors import BackboneError, Refusal
+
+EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
+
+
+class WrongClassPath(Refusal):
+    """A class path does not lead to a component class."""
+
+    code = "component.class"
+    remedy = "Write the class as package.module:Class, importable on the component's host."
+
+
+def load_class(class_path: str) -> type[Component[Any]]:
+    """Return the component class at ``package.module:Class``.
+
+    Raises:
+        WrongClassPath: There is none.
+    """
+    module_name, _, class_name = class_path.partition(":")
+    try:
+        found = getattr(importlib.import_module(module_name), class_name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise WrongClassPath(f"{class_path}: {error}", class_path=class_path) from error
+    if not (isinstance(found, type) and issubclass(found, Component)):
+        raise WrongClassPath(f"{class_path} is no Component", class_path=class_path)
+    return found
+
+
+def run_process(launch: Launch) -> int:
+    """Become the component and return the process's exit code."""
+    faulthandler.enable()
+    logging.basicConfig(
+        level=os.environ.get("SCOUT_LOG", "INFO"),
+        stream=sys.stderr,
+        format=f"%(asctime)s %(levelname)s {launch.name} %(name)s: %(message)s",
+        force=True,
+    )
+    try:
+        component_class = load_class(launch.class_path)
+        component_class.before_bus(launch)
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            runner.run(_live(component_class, launch))
+    except Refusal as refusal:
+        logging.getLogger(__name__).error("%s: %s", refusal.code, refusal)
+        return EXIT_REFUSED
+    except BackboneError as error:
+        logging.getLogger(__name__).error("%s: %s", type(error).__name__, error)
+        return EXIT_NO_HUB
+    except BaseException:
+        logging.getLogger(__name__).exception("%s ended by a bug", launch.address)
+        return EXIT_BUG
+    return 0
+
+
+async def _live(component_class: type[Component[Any]], launch: Launch) -> None:
+    clock = MissionClock(launch.clock_origin_monotonic_s, launch.clock_rate)
+    bus = component_class.open_bus(launch, clock)
+    try:
+        component = component_class(launch, bus, clock)
+    except BaseException:
+        await bus.close()
+        raise
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, component.end, signal.Signals(number).name)
+    await component.run()

@@ -1,0 +1,33 @@
+"""The recent events of one component, each with its cause."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from backbone.bus.interface import Clock, current_cause
+from backbone.component.messages import StoryEvent
+
+LENGTH = 512  # chosen: some minutes of a busy component, under 100 kB
+
+
+class StoryBook:
+    """Keeps the newest events.
+
+    Args:
+        where: Address that tells the events.
+        clock: Stamps them.
+    """
+
+    def __init__(self, where: str, clock: Clock) -> None:
+        self._where, self._clock = where, clock
+        self._events: deque[StoryEvent] = deque(maxlen=LENGTH)
+
+    def note(self, subject: str, what: str) -> StoryEvent:
+        """Keep that this happened to the subject now, because of the message being handled."""
+        event = StoryEvent(self._clock.now_s(), self._where, what, subject, current_cause.get())
+        self._events.append(event)
+        return event
+
+    def of(self, subject: str = "") -> list[StoryEvent]:
+        """Return the events about a subject, or all, oldest first."""
+        return [event for event in self._events if not subject or event.subject == subject or subject in event.what]

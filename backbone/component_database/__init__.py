@@ -1,0 +1,1 @@
+"""Which component types exist and how many of each may run."""

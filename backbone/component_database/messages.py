@@ -1,0 +1,94 @@
+"""What can be said to the component database."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from backbone.errors import Refusal
+from backbone.naming import Subsystem
+from backbone.wire import Message
+
+ADDRESS = "backbone/component_database"
+
+
+class Multiplicity(StrEnum):
+    """How many components of a type may run at the same time (RAM 2002, "Backbone")."""
+
+    ONE = "one"
+    MANY = "many"
+
+
+class ComponentType(Message, frozen=True):
+    """One kind of component.
+
+    Attributes:
+        name: Type name as used in the mission file.
+        class_path: ``package.module:Class``.
+        subsystem: Where its components belong.
+        multiplicity: How many may run.
+        core: True for core services, which only the bring-up starts.
+        tags: Host tags its components need.
+        restart: True if its creator restarts it after an unexpected end.
+    """
+
+    name: str
+    class_path: str
+    subsystem: Subsystem
+    multiplicity: Multiplicity = Multiplicity.MANY
+    core: bool = False
+    tags: list[str] = []
+    restart: bool = True
+
+
+class Admit(Message, frozen=True):
+    """May one more component of this type start under this name?"""
+
+    type: str
+    name: str
+
+
+class Admitted(Message, frozen=True):
+    """Answer to ``Admit``: yes, and this is its type."""
+
+    component_type: ComponentType
+
+
+class ListTypes(Message, frozen=True):
+    """Which types are there?"""
+
+
+class TypeCount(Message, frozen=True):
+    """A type and how many of it run now."""
+
+    component_type: ComponentType
+    running: int
+
+
+class Types(Message, frozen=True):
+    """Answer to ``ListTypes``, sorted by name."""
+
+    types: list[TypeCount]
+
+
+class UnknownType(Refusal):
+    """No component type of this name exists in this mission."""
+
+    code = "component_database.unknown"
+    remedy = "Declare the type in the mission file, or use one that 'scout-backbone status' lists."
+
+
+class MultiplicityExceeded(Refusal):
+    """As many of this type run as may; facts: ``name``, ``host``, ``pid`` of the one that runs."""
+
+    code = "component_database.multiplicity"
+    remedy = "Use the one that runs, or stop it first."
+
+
+class CoreService(Refusal):
+    """Core services are started by the bring-up alone."""
+
+    code = "component_database.core"
+    remedy = "Core services start with 'scout-backbone up' and are restarted by it."
+
+
+ComponentDatabaseQuestion = Admit | ListTypes

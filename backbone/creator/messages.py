@@ -1,0 +1,182 @@
+"""What can be said to a creator, and what it reports."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any
+
+from backbone.errors import Refusal
+from backbone.naming import Subsystem
+from backbone.wire import Message
+
+TYPE = "creator"
+
+
+class RestartPolicy(Message, frozen=True):
+    """When a process that ended unexpectedly is started again.
+
+    Attributes:
+        restart: False: never.
+        back_off_s: Pause before the first restart, seconds of the machine; doubles with each one in the window.
+        back_off_most_s: Longest pause.
+        limit: Restarts within the window after which the creator gives up.
+        window_s: Length of the window, seconds of the machine.
+    """
+
+    restart: bool = True
+    back_off_s: float = 0.05
+    back_off_most_s: float = 2.0
+    limit: int = 5
+    window_s: float = 30.0
+
+
+class Spawn(Message, frozen=True):
+    """Start one component here and answer when it is ready. Only the placer asks this.
+
+    Attributes:
+        subsystem: Where it belongs.
+        name: Unique in the mission.
+        type: Component type.
+        class_path: ``package.module:Class``.
+        parameters: Values for its ``Parameters``.
+        requester: Address of whoever wanted it.
+        policy: What to do when it ends unexpectedly.
+        ready_within_s: Seconds of the machine until its liveliness token must stand.
+    """
+
+    subsystem: Subsystem
+    name: str
+    type: str
+    class_path: str
+    parameters: dict[str, Any] = {}
+    requester: str = ""
+    policy: RestartPolicy = RestartPolicy()
+    ready_within_s: float = 20.0
+
+
+class Spawned(Message, frozen=True):
+    """Answer to ``Spawn``: it is ready."""
+
+    address: str
+    pid: int
+
+
+class EndProcess(Message, frozen=True):
+    """End a component's whole process tree: ask, then SIGTERM, then SIGKILL.
+
+    Attributes:
+        name: The component.
+        reason: For the record.
+        ask_s: Seconds of the machine it has after being asked.
+        term_s: Seconds it has after SIGTERM.
+    """
+
+    name: str
+    reason: str = ""
+    ask_s: float = 1.5
+    term_s: float = 0.5
+
+
+class EndedBy(StrEnum):
+    """What it took to end a process."""
+
+    ITSELF = "itself"
+    ASKING = "asking"
+    SIGTERM = "sigterm"
+    SIGKILL = "sigkill"
+
+
+class ProcessEnded(Message, frozen=True):
+    """Answer to ``EndProcess``: nothing of it is left."""
+
+    name: str
+    by: EndedBy
+    exit_code: int
+
+
+class ListProcesses(Message, frozen=True):
+    """What runs here?"""
+
+
+class ProcessState(Message, frozen=True):
+    """One component of this creator.
+
+    Attributes:
+        spawn: The order it was started by.
+        pid: Its process now, 0 while it waits for a restart.
+        restarts: How often it was restarted.
+        given_up: True if it ended too often and is left down.
+        last_end: How it ended last, for people; empty if it never did.
+    """
+
+    spawn: Spawn
+    pid: int
+    restarts: int
+    given_up: bool
+    last_end: str
+
+
+class Processes(Message, frozen=True):
+    """Answer to ``ListProcesses``: the truth about this host, from which others rebuild their picture."""
+
+    host: str
+    tags: list[str]
+    processes: list[ProcessState]
+
+
+class HostLoad(Message, frozen=True):
+    """Published by each creator as telemetry, once a second and on every change of its processes.
+
+    Attributes:
+        host: Name of the host.
+        tags: Its tags.
+        cpu: Busy share of all cores, 0 to 1.
+        memory: Used share of memory, 0 to 1.
+        cores: Number of cores.
+        components: Number of components this creator runs.
+    """
+
+    host: str
+    tags: list[str]
+    cpu: float
+    memory: float
+    cores: int
+    components: int
+
+
+class ProcessFell(Message, frozen=True):
+    """Published as an event when a component ended unexpectedly.
+
+    Attributes:
+        name: The component.
+        how: Exit code or signal, for people.
+        restart_in_s: Pause before it is started again; negative if it is given up.
+        last_lines: The end of its log.
+    """
+
+    name: str
+    how: str
+    restart_in_s: float
+    last_lines: list[str]
+
+
+class StartFailed(Refusal):
+    """The component did not become ready; the end of its log is in the detail."""
+
+    code = "creator.start_failed"
+    remedy = "Read the log lines; mend the component or its parameters and start it again."
+
+
+class NotHere(Refusal):
+    """No component of this name runs under this creator."""
+
+    code = "creator.not_here"
+    remedy = "Ask the placer where it runs."
+
+
+CreatorQuestion = Spawn | EndProcess | ListProcesses
+
+
+def creator_name(host: str) -> str:
+    """Return the name of the creator on a host."""
+    return f"creator-{host}"

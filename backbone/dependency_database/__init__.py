@@ -1,0 +1,1 @@
+"""Which hardware exists and what each kind of ARC needs."""

@@ -1,0 +1,81 @@
+"""What can be said to the static dependency database: which hardware exists, and what an ARC needs of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from backbone.errors import Refusal
+from backbone.wire import Message
+
+ADDRESS = "backbone/dependency_database"
+
+
+class Resource(Message, frozen=True):
+    """One physical resource, and how to run its RC.
+
+    Attributes:
+        name: Name of the resource and of its RC.
+        type: Component type of its RC (``scout``, ``command_radio``, ``video_frequency``, ``framegrabber`` …).
+        host: Host its hardware is wired to; empty: any.
+        sharable: True if several ARCs may hold it within its capacity.
+        capacity: Share of its time it can give, 0 to 1; 1 for unit resources.
+        connect_s: Settling time after a connection, seconds.
+        disconnect_s: Release time, seconds.
+        driver: Name of the driver its RC uses.
+        parameters: Further values for the RC's parameters.
+        features: What it has, for wishes (``camera``).
+        links: Names of other resources it can only be used with, by kind
+            (a framegrabber's ``video_frequency``, a scout's ``command_radio``).
+    """
+
+    name: str
+    type: str
+    host: str = ""
+    sharable: bool = False
+    capacity: float = 1.0
+    connect_s: float = 0.0
+    disconnect_s: float = 0.0
+    driver: str = "simulated"
+    parameters: dict[str, Any] = {}
+    features: list[str] = []
+    links: dict[str, list[str]] = {}
+
+
+class AskResources(Message, frozen=True):
+    """Which hardware exists?"""
+
+
+class Resources(Message, frozen=True):
+    """Answer to ``AskResources``, sorted by name."""
+
+    resources: list[Resource]
+
+
+class FindRcs(Message, frozen=True):
+    """Which sets of RCs would do?
+
+    Attributes:
+        roles: Kinds of RC the ARC needs, one of each: ``["scout", "command_radio", "video_frequency"]``.
+        wish: Kind → name wanted of that kind. Kinds left out: any.
+        features: Kind → features wanted of that kind.
+    """
+
+    roles: list[str]
+    wish: dict[str, str] = {}
+    features: dict[str, list[str]] = {}
+
+
+class RcSets(Message, frozen=True):
+    """Answer to ``FindRcs``: kind → name, one entry a possible set, in the mission file's order; never empty."""
+
+    sets: list[dict[str, str]]
+
+
+class NoSuchHardware(Refusal):
+    """No set of existing RCs fits the wish; the detail says which part of it nothing fits."""
+
+    code = "dependency_database.none"
+    remedy = "Wish for less, or add the hardware to the mission file."
+
+
+DependencyDatabaseQuestion = AskResources | FindRcs

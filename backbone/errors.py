@@ -1,0 +1,93 @@
+"""What can go wrong between components, and whose fault it is.
+
+Three kinds, never mixed:
+
+* ``Refusal``: the other side understood and said no.  Nothing changed there.  It travels over the
+  bus as (code, detail, remedy, facts) and is raised again on the asking side as the same class.
+* ``LinkError``: no answer came.  The outcome is *unknown*, which is never the same as failed.
+* anything else is a bug: it is not caught, the process dies, its creator reports and restarts it.
+
+A code is for machines, the detail carries the numbers for people, the remedy is for operators.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+Fact = str | int | float | bool
+
+
+class BackboneError(Exception):
+    """Root of everything this project raises on purpose."""
+
+
+class Refusal(BackboneError):
+    """A typed no: nothing was changed by what was asked.
+
+    Attributes:
+        code: Stable word for machines, ``subject.reason``.
+        remedy: What the operator or developer can do about it.
+        detail: The sentence with the names and numbers of this case.
+        facts: The same names and numbers for programs.
+    """
+
+    code: ClassVar[str] = "refused"
+    remedy: str = "Read the detail; nothing was changed."
+
+    def __init__(self, detail: str, *, remedy: str | None = None, **facts: Fact) -> None:
+        super().__init__(detail)
+        self.detail = detail
+        self.facts: Mapping[str, Fact] = facts
+        if remedy is not None:
+            self.remedy = remedy
+
+    def __init_subclass__(cls, **kwargs: object) -> None:
+        super().__init_subclass__(**kwargs)
+        _classes_by_code[cls.code] = cls
+
+    def __str__(self) -> str:
+        return f"{self.detail} ({self.remedy})"
+
+
+_classes_by_code: dict[str, type[Refusal]] = {}
+
+
+class UnknownRefusal(Refusal):
+    """A refusal of a class this process never imported; its own code is in ``facts["code"]``."""
+
+    code = "refused.unknown"
+
+
+def revive(code: str, detail: str, remedy: str, facts: Mapping[str, Fact]) -> Refusal:
+    """Return the refusal that was sent, as the class it had there if this process knows it.
+
+    Example:
+        >>> revive("refused", "no", "ask later", {}).remedy
+        'ask later'
+    """
+    kind = Refusal if code == Refusal.code else _classes_by_code.get(code)
+    if kind is None:
+        return UnknownRefusal(detail, remedy=remedy, **{**facts, "code": code})
+    return kind(detail, remedy=remedy, **facts)
+
+
+def code_of(refusal: Refusal) -> str:
+    """Return the code under which the refusal was first raised, also when its class is unknown here."""
+    return str(refusal.facts.get("code", refusal.code)) if isinstance(refusal, UnknownRefusal) else refusal.code
+
+
+class LinkError(BackboneError):
+    """No answer: what was asked may or may not have happened."""
+
+
+class NoResponder(LinkError):
+    """Nobody answers at this address, or the one who did died before answering."""
+
+
+class ReplyTimeout(LinkError):
+    """Somebody is there but did not answer in time."""
+
+
+class HubUnreachable(LinkError):
+    """The mission's hub could not be reached."""

@@ -1,0 +1,50 @@
+"""Key expressions: ``scout/<mission>/<subsystem>/<component>/<conversation>``.
+
+The only place that knows how a key is spelt.  Components speak of addresses
+(``<subsystem>/<component>``, see ``naming.address``) and conversations.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from functools import lru_cache
+
+ROOT = "scout"
+
+
+class Conversation(StrEnum):
+    """What is talked about under a component's address."""
+
+    ASK = "ask"  # questions: request/response
+    ALIVE = "alive"  # liveliness token, declared last: it means ready
+    STATUS = "status"  # life-cycle state and feedback, on change
+    COMMAND = "command"  # repeated commands of the ARC that holds an RC, fenced by epoch
+    TELEMETRY = "telemetry"  # what was applied, measured or overrun
+    FRAMES = "frames"  # pictures
+    EVENTS = "events"  # what a behavior or world found out
+    SCHEDULE = "schedule"  # the RC manager's decisions and leases
+    LEASES = "leases"
+    CLOCK = "clock"
+    LOG = "log"
+
+
+@lru_cache(maxsize=4096)
+def key(mission: str, address: str, conversation: Conversation) -> str:
+    """Return the key of one conversation of one component (or of many, with ``*`` in the address).
+
+    Example:
+        >>> key("iros2001", "resource_pool/scout1", Conversation.ASK)
+        'scout/iros2001/resource_pool/scout1/ask'
+    """
+    return f"{ROOT}/{mission}/{address}/{conversation}"
+
+
+def address_of(key_expression: str) -> str:
+    """Return the address in a concrete key.
+
+    Example:
+        >>> address_of("scout/iros2001/resource_pool/scout1/ask")
+        'resource_pool/scout1'
+    """
+    _root, _mission, subsystem, component, _conversation = key_expression.split("/")
+    return f"{subsystem}/{component}"

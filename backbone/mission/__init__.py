@@ -1,0 +1,1 @@
+"""From mission.xml to a checked mission description."""

@@ -1,0 +1,1 @@
+"""Who is registered, where, since when; runs the hub."""

@@ -1,0 +1,86 @@
+"""What can be said to the nameserver, and what it tells."""
+
+from __future__ import annotations
+
+from backbone.component.messages import ComponentState
+from backbone.errors import Refusal
+from backbone.wire import Message
+
+ADDRESS = "backbone/nameserver"
+
+
+class Register(Message, frozen=True):
+    """I begin to live under this name. Asked by the component shell before its readiness.
+
+    Attributes:
+        component: Who it is; its state is CONNECTING.
+    """
+
+    component: ComponentState
+
+
+class Registered(Message, frozen=True):
+    """Answer to ``Register``: the name is yours until your liveliness token falls."""
+
+
+class Resolve(Message, frozen=True):
+    """Where is the component of this name?"""
+
+    name: str
+
+
+class Resolved(Message, frozen=True):
+    """Answer to ``Resolve``."""
+
+    component: ComponentState
+
+
+class ListComponents(Message, frozen=True):
+    """Who is there? Empty fields match all."""
+
+    subsystem: str = ""
+    type: str = ""
+
+
+class Components(Message, frozen=True):
+    """Answer to ``ListComponents``, sorted by address.
+
+    Attributes:
+        components: Who is registered now.
+        complete: False for the moment after the hub's own restart in which components still reconnect:
+            absence proves nothing then.
+        hub_since_s: Mission time at which the hub began to listen.
+    """
+
+    components: list[ComponentState]
+    complete: bool
+    hub_since_s: float
+
+
+class Appeared(Message, frozen=True):
+    """Published when a component is ready."""
+
+    component: ComponentState
+
+
+class Disappeared(Message, frozen=True):
+    """Published when a component's liveliness token has fallen."""
+
+    address: str
+
+
+class NameTaken(Refusal):
+    """A living component has this name."""
+
+    code = "nameserver.taken"
+    remedy = "Choose another name, or stop the component that has it."
+
+
+class UnknownName(Refusal):
+    """Nobody of this name is registered."""
+
+    code = "nameserver.unknown"
+    remedy = "See 'scout-backbone status' for the names that are there."
+
+
+NameserverQuestion = Register | Resolve | ListComponents

@@ -1,0 +1,68 @@
+"""Legal names: one rule for components, resources, behaviors, hosts and missions.
+
+A name is a lower-case letter followed by lower-case letters, digits, ``_`` or ``-``, at most
+63 characters.  Such a name is at the same time a key segment, a file name and a host label, so
+nothing has to be quoted anywhere.
+"""
+
+from __future__ import annotations
+
+import re
+from enum import StrEnum
+
+from backbone.errors import Refusal
+
+MAX_NAME_LENGTH = 63  # chosen: the longest label of a host name (RFC 1035), names may become host labels
+_LEGAL = re.compile(rf"[a-z][a-z0-9_-]{{0,{MAX_NAME_LENGTH - 1}}}")
+
+
+class Subsystem(StrEnum):
+    """The four subsystems every component belongs to (RAM 2002, "Distributed Control Architecture")."""
+
+    BACKBONE = "backbone"
+    RESOURCE_POOL = "resource_pool"
+    MISSION_CONTROL = "mission_control"
+    UI_CONSOLE = "ui_console"
+
+
+class IllegalName(Refusal):
+    """A name does not follow the one rule."""
+
+    code = "naming.illegal"
+    remedy = "Use a lower-case letter, then lower-case letters, digits, '_' or '-'; at most 63 characters."
+
+
+def is_legal(name: str) -> bool:
+    """Say whether the name follows the rule.
+
+    Example:
+        >>> is_legal("scout1"), is_legal("Scout 1")
+        (True, False)
+    """
+    return _LEGAL.fullmatch(name) is not None
+
+
+def legal(name: str) -> str:
+    """Return the name unchanged.
+
+    Raises:
+        IllegalName: It does not follow the rule.
+    """
+    if not is_legal(name):
+        raise IllegalName(f"{name!r} is not a legal name")
+    return name
+
+
+def address(subsystem: Subsystem, component: str) -> str:
+    """Return the address of a component: ``<subsystem>/<component>``.
+
+    Example:
+        >>> address(Subsystem.RESOURCE_POOL, "scout1")
+        'resource_pool/scout1'
+    """
+    return f"{subsystem}/{legal(component)}"
+
+
+def component_of(component_address: str) -> str:
+    """Return the component's name, the last segment of its address."""
+    return component_address.rpartition("/")[2]

@@ -1,0 +1,1 @@
+"""Which host gets the next component, and why not the others."""

@@ -1,0 +1,112 @@
+"""What can be said to the placer: the one who starts and stops everything that is no core service."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from backbone.creator.messages import EndedBy
+from backbone.errors import Refusal
+from backbone.wire import Message
+
+ADDRESS = "backbone/placer"
+
+
+class Start(Message, frozen=True):
+    """Start a component and answer when it is ready.
+
+    Attributes:
+        type: Component type.
+        name: Unique in the mission; empty: the placer numbers it, ``<type>-<n>``.
+        parameters: Values for its ``Parameters``.
+        host: Must run there; empty: wherever tags and load say.
+        tags: Tags the host must have, besides the type's own.
+    """
+
+    type: str
+    name: str = ""
+    parameters: dict[str, Any] = {}
+    host: str = ""
+    tags: list[str] = []
+
+
+class Started(Message, frozen=True):
+    """Answer to ``Start``: it is ready, here.
+
+    Attributes:
+        address: Where to ask it.
+        host: Where it runs.
+        pid: Its process.
+        reasons: One line a host: why it was chosen or not.
+    """
+
+    address: str
+    host: str
+    pid: int
+    reasons: list[str]
+
+
+class StopComponent(Message, frozen=True):
+    """End a component and forget that it was wanted."""
+
+    name: str
+    reason: str = ""
+
+
+class Ended(Message, frozen=True):
+    """Answer to ``StopComponent``: it is gone."""
+
+    name: str
+    by: EndedBy
+
+
+class AskPlacement(Message, frozen=True):
+    """Why is this component where it is?"""
+
+    name: str
+
+
+class Placement(Message, frozen=True):
+    """Answer to ``AskPlacement``, and one entry of ``Placements``.
+
+    Attributes:
+        name: The component.
+        type: Its type.
+        host: Where it was placed.
+        requester: Who wanted it.
+        since_s: Mission time of the decision.
+        reasons: One line a host: why it was chosen or not.
+    """
+
+    name: str
+    type: str
+    host: str
+    requester: str
+    since_s: float
+    reasons: list[str]
+
+
+class ListPlacements(Message, frozen=True):
+    """What was placed where?"""
+
+
+class Placements(Message, frozen=True):
+    """Answer to ``ListPlacements``, sorted by name."""
+
+    placements: list[Placement]
+
+
+class NoHost(Refusal):
+    """No host can take the component; the detail names every host and why not."""
+
+    code = "placer.no_host"
+    remedy = "Add a host with these tags, or change the component's tags or host."
+
+
+class NotPlaced(Refusal):
+    """The placer never placed a component of this name."""
+
+    code = "placer.unknown"
+    remedy = "See 'scout-backbone status' for the names that are there."
+
+
+PlacerQuestion = Start | StopComponent | AskPlacement | ListPlacements

@@ -1,0 +1,1 @@
+"""Who holds which resource now and next, and why."""

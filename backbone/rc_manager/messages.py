@@ -1,0 +1,461 @@
+"""What is said between the RC manager, the RCs and the ARCs, and what others may ask the RC manager.
+
+Who speaks to whom:
+
+* ARC → RC manager: ``SchedulingRequest``, ``Withdraw``, ``SetIdle``, ``ChangeRuntime``, ``Extend``.
+* RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``.
+* RC manager → RC: ``Connect``, ``Disconnect``, ``AskRc``; ``Leases`` as a publication.
+* anybody → RC manager: ``AskSchedule``, ``AskWhy``, ``SetPriority``.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any
+
+from backbone.errors import Refusal
+from backbone.wire import Message
+
+ADDRESS = "backbone/rc_manager"
+
+LEASE_S = 2.0  # chosen: outlives a restart of the hub or RC manager (under 1 s), ends an orphan's hold soon
+RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
+BEAT_EVERY_S = 0.3  # chosen: ARC to RC manager; a hung ARC is noticed within BEAT_MISSED_S
+BEAT_MISSED_S = 1.0  # chosen: three beats
+
+
+# ---------------------------------------------------------------------- what an ARC asks for
+class Usage(Message, frozen=True):
+    """One periodic stream on a sharable RC (RAM 2002, "Sharable Resources": usage parameter).
+
+    Attributes:
+        period_s: Constant interval between requests.
+        packet_time_s: Time one request takes.
+        deadline_s: It must be done this long after its release; 0: the period.
+        jitter_s: Its release may be late by this much.
+        kind: What the requests are, for people (``drive``).
+    """
+
+    period_s: float
+    packet_time_s: float
+    deadline_s: float = 0.0
+    jitter_s: float = 0.0
+    kind: str = ""
+
+
+class RcUse(Message, frozen=True):
+    """How an ARC uses one RC: exclusively, or by streams on a sharable one.
+
+    Attributes:
+        streams: Its streams; none means exclusive.
+    """
+
+    streams: list[Usage] = []
+
+
+class PathNode(Message, frozen=True):
+    """One node on the way from the root to a decision process."""
+
+    name: str
+    priority: int
+
+
+class SchedulingRequest(Message, frozen=True):
+    """Give my ARC run time (RAM 2002, "The RC Scheduler").
+
+    Attributes:
+        arc: Name of the ARC.
+        owner: Address of its decision process.
+        path: From the mission's root (or the console itself) to the decision process.
+        console: True if the owner is a console: its path is a sibling of the mission's root.
+        alternatives: Sets of RCs that would do, best first: RC name → use.
+        minimum_runtime_s: Shortest useful time, above 0.
+        maximum_runtime_s: End of all extensions, at least the minimum; 0: the minimum.
+        idle: True: it exists but wants no time now.
+    """
+
+    arc: str
+    owner: str
+    path: list[PathNode]
+    console: bool
+    alternatives: list[dict[str, RcUse]]
+    minimum_runtime_s: float
+    maximum_runtime_s: float = 0.0
+    idle: bool = False
+
+
+class RequestState(StrEnum):
+    """Where a request is."""
+
+    IDLE = "idle"
+    WAITING = "waiting"
+    CONNECTING = "connecting"
+    RUNNING = "running"
+    REVOKING = "revoking"
+
+
+class Scheduled(Message, frozen=True):
+    """Answer to ``SchedulingRequest``.
+
+    Attributes:
+        rcs: The RCs chosen of the alternatives.
+        state: Running soon (connecting) or waiting.
+        position: Place among the waiting of its group, 1 is next; 0 if it need not wait.
+        blockers: ARCs it waits for.
+        expected_start_s: Mission time of the predicted grant; negative: none can be predicted.
+    """
+
+    rcs: list[str]
+    state: RequestState
+    position: int
+    blockers: list[str]
+    expected_start_s: float
+
+
+class Withdraw(Message, frozen=True):
+    """This ARC needs no time any more and is about to end."""
+
+    arc: str
+    reason: str = ""
+
+
+class SetIdle(Message, frozen=True):
+    """Keep the request, free the RCs (idle), or want them again (not idle)."""
+
+    arc: str
+    idle: bool
+
+
+class ChangeRuntime(Message, frozen=True):
+    """Ask for other run times from the next slice on."""
+
+    arc: str
+    minimum_runtime_s: float
+    maximum_runtime_s: float = 0.0
+
+
+class Extend(Message, frozen=True):
+    """Let the running slice last until this mission time, at most until grant + maximum run time."""
+
+    arc: str
+    until_s: float
+
+
+class SetPriority(Message, frozen=True):
+    """Give a node of the behavior tree, or a console, another priority among its siblings."""
+
+    node: str
+    priority: int
+
+
+class Done(Message, frozen=True):
+    """Answer to requests that need no other: it is so now."""
+
+
+class Beat(Message, frozen=True):
+    """Published by each ARC every ``BEAT_EVERY_S`` as telemetry: my loop runs and my owner's too."""
+
+    arc: str
+
+
+# ---------------------------------------------------------------------- to ARCs
+class OpenGate(Message, frozen=True):
+    """Your RCs are connected: prepare them, let them settle, then let commands through.
+
+    Attributes:
+        epochs: RC name → epoch of this connection.
+        settle_s: Settling time after the preparation, seconds.
+        until_s: Mission time until which the slice lasts at least, counted from now.
+    """
+
+    epochs: dict[str, int]
+    settle_s: float
+    until_s: float
+
+
+class GateOpen(Message, frozen=True):
+    """Answer to ``OpenGate``: commands pass, the decision process hears ``Resumed``."""
+
+
+class CloseGate(Message, frozen=True):
+    """Let nothing pass any more.
+
+    Attributes:
+        reason: Why: ``slice``, ``higher``, ``rc``, ``self`` …
+        by: ARC or RC because of which.
+        deadline_s: Seconds the decision process has to stop cleanly; 0: none, a higher one overrides.
+        expected_s: Mission time of the next expected slot; negative: unknown.
+    """
+
+    reason: str
+    by: str
+    deadline_s: float
+    expected_s: float
+
+
+class GateClosed(Message, frozen=True):
+    """Answer to ``CloseGate``: nothing passes."""
+
+
+class AskRequest(Message, frozen=True):
+    """What do you ask for and what do you hold? Asked by a restarted RC manager."""
+
+
+class CurrentRequest(Message, frozen=True):
+    """Answer to ``AskRequest``.
+
+    Attributes:
+        request: As last sent.
+        rcs: The set chosen for it; empty if none yet.
+        epochs: What it holds; empty if the gate is closed.
+        granted_s: Mission time of the grant; negative if the gate is closed.
+    """
+
+    request: SchedulingRequest
+    rcs: list[str]
+    epochs: dict[str, int]
+    granted_s: float
+
+
+# ---------------------------------------------------------------------- to RCs
+class Connect(Message, frozen=True):
+    """Serve this ARC from now on.
+
+    Attributes:
+        arc: Name of the ARC.
+        epoch: Larger than every earlier epoch of this RC.
+        lease_s: Seconds of mission time after which the hold ends unless renewed.
+        use: How the ARC uses this RC.
+        companions: All RCs of the set with their epochs, so that RCs reached through another can be.
+        rank: Place in the order of user priority among the holders, 0 first; for sharable RCs.
+    """
+
+    arc: str
+    epoch: int
+    lease_s: float
+    use: RcUse
+    companions: dict[str, int]
+    rank: int = 0
+
+
+class Connected(Message, frozen=True):
+    """Answer to ``Connect``."""
+
+    epoch: int
+
+
+class Disconnect(Message, frozen=True):
+    """Stop serving this ARC: safe state, nothing queued survives. Right even if it is not connected."""
+
+    arc: str
+    epoch: int
+    reason: str = ""
+
+
+class Disconnected(Message, frozen=True):
+    """Answer to ``Disconnect``: the safe state is reached.
+
+    Attributes:
+        last_epoch: Largest epoch this RC has seen.
+    """
+
+    last_epoch: int
+
+
+class AskRc(Message, frozen=True):
+    """Who holds you?"""
+
+
+class Holder(Message, frozen=True):
+    """One ARC an RC serves."""
+
+    arc: str
+    epoch: int
+    since_s: float
+    lease_until_s: float
+
+
+class RcState(Message, frozen=True):
+    """Answer to ``AskRc``: the truth about this resource.
+
+    Attributes:
+        name: The RC.
+        kind: Its type.
+        sharable: True if several ARCs may hold it.
+        capacity: Share of its time it can give.
+        holders: Who holds it now.
+        last_epoch: Largest epoch it has seen.
+        applied: Commands applied since its start.
+        refused_stale: Commands of an older epoch or another ARC it refused.
+        feedback: One line for people.
+    """
+
+    name: str
+    kind: str
+    sharable: bool
+    capacity: float
+    holders: list[Holder]
+    last_epoch: int
+    applied: int
+    refused_stale: int
+    feedback: str = ""
+
+
+class Lease(Message, frozen=True):
+    """One renewed hold."""
+
+    rc: str
+    arc: str
+    epoch: int
+
+
+class Leases(Message, frozen=True):
+    """Published by the RC manager every ``RENEW_EVERY_S``: these holds last another ``lease_s`` from the stamp."""
+
+    leases: list[Lease]
+    lease_s: float
+
+
+# ---------------------------------------------------------------------- for everybody
+class AskSchedule(Message, frozen=True):
+    """Who holds what, who waits?"""
+
+
+class RcView(Message, frozen=True):
+    """One RC in the master schedule."""
+
+    rc: str
+    kind: str
+    state: str
+    sharable: bool
+    capacity: float
+    holders: list[Holder]
+    last_epoch: int
+    next: list[str]
+
+
+class RequestView(Message, frozen=True):
+    """One request in the master schedule.
+
+    Attributes:
+        arc: The ARC.
+        owner: Its decision process.
+        state: Where it is.
+        rcs: Its RCs.
+        since_s: Mission time at which it entered that state.
+        until_s: End of its slice; negative if it holds nothing.
+        expected_start_s: Predicted grant; negative if it runs or none can be predicted.
+        because: One line: why it runs or waits.
+        blockers: ARCs it waits for.
+        minimum_runtime_s: As asked for.
+        priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
+        turns: Grants so far.
+    """
+
+    arc: str
+    owner: str
+    state: RequestState
+    rcs: list[str]
+    since_s: float
+    until_s: float
+    expected_start_s: float
+    because: str
+    blockers: list[str]
+    minimum_runtime_s: float
+    priority: str
+    turns: int
+
+
+class Schedule(Message, frozen=True):
+    """Answer to ``AskSchedule``; also published on every change."""
+
+    at_s: float
+    rcs: list[RcView]
+    requests: list[RequestView]
+    groups: list[list[str]]
+
+
+class AskWhy(Message, frozen=True):
+    """Why does this ARC, decision process or RC wait, run or stand idle?"""
+
+    name: str
+
+
+class Why(Message, frozen=True):
+    """Answer to ``AskWhy``.
+
+    Attributes:
+        name: What was asked about.
+        state: Where it is.
+        lines: The reasons for people, most important first.
+        rule: Rule of SCHEDULING.md that decides it.
+        blockers: ARCs because of which.
+        expected_start_s: Predicted grant; negative if none.
+        would_change: What would end the wait, for people.
+    """
+
+    name: str
+    state: str
+    lines: list[str]
+    rule: str
+    blockers: list[str]
+    expected_start_s: float
+    would_change: str
+
+
+class TraceLine(Message, frozen=True):
+    """Published as an event: one decision, in the trace format of the schedule."""
+
+    line: dict[str, Any]
+
+
+class SchedulingRefusal(Refusal):
+    """The request cannot be scheduled, ever; nothing changed."""
+
+    code = "scheduling.refused"
+    remedy = "Change the request."
+
+
+class MissingRuntime(SchedulingRefusal):
+    """The request lacks a usable minimum run time."""
+
+    code = "scheduling.minimum_runtime"
+    remedy = "Give minimum_runtime_s above 0 and maximum_runtime_s of 0 or at least the minimum."
+
+
+class UnknownRc(SchedulingRefusal):
+    """The request names an RC that is not in the mission."""
+
+    code = "scheduling.unknown_rc"
+    remedy = "Use the names of 'scout-backbone status'."
+
+
+class CapacityExceeded(SchedulingRefusal):
+    """The demand does not fit the RC even alone; facts: ``demanded``, ``used``, ``free``."""
+
+    code = "scheduling.capacity"
+    remedy = "Ask for a longer period or fewer streams."
+
+
+class UnknownRequest(SchedulingRefusal):
+    """The RC manager knows no request, node or RC of this name."""
+
+    code = "scheduling.unknown"
+    remedy = "Send a SchedulingRequest first; see 'scout-backbone status' for names."
+
+
+class StaleEpoch(Refusal):
+    """The epoch is older than the RC's, or the ARC does not hold it: nothing was applied."""
+
+    code = "rc.stale"
+    remedy = "Wait for the next grant; commands of an earlier one are never applied."
+
+
+class Held(Refusal):
+    """Another ARC holds the RC."""
+
+    code = "rc.held"
+    remedy = "Disconnect the holder first."
+
+
+RcManagerQuestion = SchedulingRequest | Withdraw | SetIdle | ChangeRuntime | Extend | SetPriority | AskSchedule | AskWhy

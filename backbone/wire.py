@@ -1,0 +1,185 @@
+"""Structs to bytes and back, and the envelope around every message.
+
+Every message is a frozen msgspec struct sent as a MessagePack array whose first element is its
+schema name and version, ``<Name>/<version>``.  The envelope adds who said it, its place in what
+that source said, when (mission time), and because of which message (``cause``).
+
+Rules of this file:
+
+* A message that cannot be read is refused with a class that says which of the four ways it is bad:
+  too big, not readable, of a schema nobody here knows, or of another version of a known one.
+* Reading never half succeeds: either the whole typed message, or a refusal.
+
+A change of a struct that old readers cannot read gets a new version: ``class Drive(Message, tag="Drive/2")``.
+"""
+
+from __future__ import annotations
+
+import types
+import typing
+from typing import Any, Generic, TypeVar, cast
+
+import msgspec
+
+from backbone.errors import Fact, Refusal, code_of, revive
+
+WIRE_VERSION = 1
+MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
+
+Body = TypeVar("Body")
+
+
+class Message(
+    msgspec.Struct,
+    frozen=True,
+    array_like=True,
+    forbid_unknown_fields=True,
+    tag_field="schema_and_version",
+    tag=lambda name: f"{name}/1",
+):
+    """Base of everything said on the bus. Derived classes repeat ``frozen=True`` for the type checker."""
+
+
+class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True):
+    """A message and where it comes from.
+
+    Attributes:
+        wire: Version of this envelope.
+        source: Address of the component that said it.
+        sequence: Grows by one with everything that source says.
+        stamp_s: Mission time at which it was said, seconds.
+        cause: Id of the message that led to it, empty for a first cause.
+        body: The message.
+    """
+
+    wire: int
+    source: str
+    sequence: int
+    stamp_s: float
+    cause: str
+    body: Body
+
+    @property
+    def id(self) -> str:
+        """Name of this message, unique in the mission while its source lives: ``<source>#<sequence>``."""
+        return f"{self.source}#{self.sequence}"
+
+
+class Refused(Message, frozen=True):
+    """How a refusal travels."""
+
+    code: str
+    detail: str
+    remedy: str
+    facts: dict[str, Fact] = {}
+
+    @classmethod
+    def of(cls, refusal: Refusal) -> Refused:
+        """Return the message that carries this refusal."""
+        return cls(code_of(refusal), refusal.detail, refusal.remedy, dict(refusal.facts))
+
+    def revive(self) -> Refusal:
+        """Return the refusal that was sent, ready to be raised."""
+        return revive(self.code, self.detail, self.remedy, self.facts)
+
+
+class MalformedMessage(Refusal):
+    """The bytes are no message of any schema expected here."""
+
+    code = "wire.malformed"
+    remedy = "Send the struct as documented, unchanged and whole."
+
+
+class OversizedMessage(Refusal):
+    """The message is longer than any honest one."""
+
+    code = "wire.oversized"
+    remedy = f"Keep messages under {MAX_MESSAGE_BYTES} bytes; send large data as frames."
+
+
+class UnknownMessage(Refusal):
+    """The schema is not one this component answers."""
+
+    code = "wire.unknown"
+    remedy = "Ask a component that answers this message; 'facts' lists what is answered here."
+
+
+class WrongVersion(Refusal):
+    """The schema is known, the version is not."""
+
+    code = "wire.version"
+    remedy = "Run the same release of scout-backbone on every host."
+
+
+_encoder = msgspec.msgpack.Encoder()
+
+
+def write(envelope: Envelope[Any]) -> bytes:
+    """Return the envelope as bytes.
+
+    Raises:
+        OversizedMessage: It would be longer than ``MAX_MESSAGE_BYTES``.
+    """
+    raw = _encoder.encode(envelope)
+    if len(raw) > MAX_MESSAGE_BYTES:
+        raise OversizedMessage(f"{type(envelope.body).__name__} of {len(raw)} bytes", bytes=len(raw))
+    return raw
+
+
+def schema_of(kind: type[Any]) -> str:
+    """Return ``<Name>/<version>`` of a message class."""
+    return cast(str, kind.__struct_config__.tag)
+
+
+class Reader(Generic[Body]):
+    """Reads the messages of one conversation.
+
+    Args:
+        accepts: One message class, or a union of them.
+    """
+
+    def __init__(self, accepts: type[Body] | types.UnionType) -> None:
+        kinds = typing.get_args(accepts) or (accepts,)
+        self._accepted = tuple(sorted(schema_of(kind) for kind in kinds))
+        self._decoder = msgspec.msgpack.Decoder(Envelope[accepts])  # type: ignore[valid-type]
+
+    def read(self, raw: bytes) -> Envelope[Body]:
+        """Return the envelope these bytes hold.
+
+        Raises:
+            OversizedMessage: Longer than ``MAX_MESSAGE_BYTES``.
+            WrongVersion: Envelope or message of another version.
+            UnknownMessage: A message, but none that is accepted here.
+            MalformedMessage: Anything else that does not fit, with the place where it does not.
+        """
+        if len(raw) > MAX_MESSAGE_BYTES:
+            raise OversizedMessage(f"message of {len(raw)} bytes", bytes=len(raw))
+        try:
+            envelope = self._decoder.decode(raw)
+        except msgspec.DecodeError as error:
+            raise self._diagnose(raw, str(error)) from None
+        if envelope.wire != WIRE_VERSION:
+            raise WrongVersion(f"envelope version {envelope.wire}, this is {WIRE_VERSION}", got=envelope.wire)
+        return cast("Envelope[Body]", envelope)
+
+    def _diagnose(self, raw: bytes, complaint: str) -> Refusal:
+        try:
+            outer = msgspec.msgpack.decode(raw)
+        except (msgspec.DecodeError, RecursionError):
+            return MalformedMessage(f"not MessagePack: {complaint}")
+        match outer:
+            case [int(version), *_] if version != WIRE_VERSION:
+                return WrongVersion(f"envelope version {version}, this is {WIRE_VERSION}", got=version)
+            case [_, str(), int(), int() | float(), str(), [str(schema), *_]]:
+                return self._diagnose_schema(schema, complaint)
+            case _:
+                return MalformedMessage(f"not an envelope: {complaint}")
+
+    def _diagnose_schema(self, schema: str, complaint: str) -> Refusal:
+        name, _, version = schema.partition("/")
+        if schema in self._accepted:
+            return MalformedMessage(f"{schema}: {complaint}", schema=schema)
+        for known in self._accepted:
+            if known.partition("/")[0] == name:
+                return WrongVersion(f"{name} version {version}, this is {known.partition('/')[2]}", got=schema)
+        return UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=", ".join(self._accepted))

@@ -1,0 +1,1 @@
+"""Behaviors, their tree, and what they see."""

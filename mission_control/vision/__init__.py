@@ -1,0 +1,1 @@
+"""One published algorithm a file: arrays in, arrays out."""

@@ -1,0 +1,1 @@
+"""Resource controllers, their aggregates, and the one door to them."""

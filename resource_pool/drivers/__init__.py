@@ -1,0 +1,1 @@
+"""How an RC reaches its hardware; a mission picks one by name."""
