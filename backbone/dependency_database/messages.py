@@ -40,6 +40,11 @@ class Resource(Message, frozen=True):
     features: list[str] = []
     links: dict[str, list[str]] = {}
 
+    def rc_parameters(self) -> dict[str, Any]:
+        """Return the parameters its RC is launched with: driver, sharing and links, then its own."""
+        common = {"driver": self.driver, "sharable": self.sharable, "capacity": self.capacity, "links": self.links}
+        return {**common, **self.parameters}
+
 
 class AskResources(Message, frozen=True):
     """Which hardware exists?"""

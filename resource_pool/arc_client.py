@@ -1,0 +1,235 @@
+"""The one door to the resource pool: all that a decision process imports of it.
+
+A decision process (behavior or console) claims an ARC, hears from it when its RCs come and go, and
+speaks to it while they are there. Everything said here is refused by the ARC if it does not hold.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from backbone.bus.interface import Bus, Subscription
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import Ended, Start, Started, StopComponent
+from backbone.rc_manager.messages import PathNode, Usage
+from backbone.wire import Envelope, Message
+from resource_pool.messages import (
+    DEFAULT_DRIVE_USAGE,
+    Accepted,
+    Applied,
+    ArcNotice,
+    ArcState,
+    AskArc,
+    AskBeat,
+    Drive,
+    Frame,
+    Halt,
+    Jump,
+    Noted,
+    Release,
+    Resumed,
+    Suspended,
+    Suspending,
+    SwappedOut,
+    WantIdle,
+    WantLonger,
+    WantRuntime,
+)
+
+__all__ = [
+    "Applied",
+    "ArcClient",
+    "ArcListener",
+    "ArcNotice",
+    "ArcState",
+    "Frame",
+    "Resumed",
+    "Suspended",
+    "Suspending",
+    "SwappedOut",
+    "Usage",
+]
+
+log = logging.getLogger(__name__)
+
+REPLY_TIME_S = 1.0  # chosen: a command that takes longer is worth a stop
+START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are only now being started
+
+
+class ArcListener(Protocol):
+    """What a decision process does when its RCs come and go."""
+
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Go on: commands pass from now on."""
+
+    async def arc_suspending(self, notice: Suspending) -> None:
+        """Stop cleanly; return when that is done, within ``notice.deadline_s``."""
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Take note that the RCs are gone; keep your state."""
+
+
+class ArcClient:
+    """A decision process's hold on one ARC. Make one with ``claim``."""
+
+    def __init__(self, bus: Bus, arc: str, listener: ArcListener) -> None:
+        self.arc = arc
+        self.address = address(Subsystem.RESOURCE_POOL, arc)
+        self.granted: Resumed | None = None
+        self.suspended: Suspended | None = None
+        self._bus, self._listener = bus, listener
+        self._granted = asyncio.Event()
+        self._frames: Subscription | None = None
+
+    @classmethod
+    async def claim(
+        cls,
+        bus: Bus,
+        kind: str,
+        listener: ArcListener,
+        *,
+        path: list[PathNode],
+        minimum_runtime_s: float,
+        maximum_runtime_s: float = 0.0,
+        wish: dict[str, str] | None = None,
+        features: dict[str, list[str]] | None = None,
+        usage: Usage = DEFAULT_DRIVE_USAGE,
+        console: bool = False,
+        idle: bool = False,
+    ) -> ArcClient:
+        """Have an ARC of this kind started for the speaker of ``bus`` and its RCs asked for.
+
+        The caller answers ``ArcNotice`` questions by handing them to ``handle``; notices may arrive
+        before this returns, so route them by ``notice.arc == arc_name(bus, kind)``.
+
+        Args:
+            bus: Of the decision process; its source is the owner.
+            kind: Component type of the ARC: ``drive``, ``video_drive``, ``capture``.
+            listener: Told when the RCs come and go.
+            path: Priority path from the mission's root, or of the console alone.
+            minimum_runtime_s: Shortest useful time, seconds, above 0.
+            maximum_runtime_s: End of extensions; 0: the minimum.
+            wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
+            features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
+            usage: How often commands are sent on the radio.
+            console: True for consoles.
+            idle: True to want no time yet.
+
+        Raises:
+            Refusal: The ARC could not be started or its request can never be served.
+            LinkError: The placer did not answer; the outcome is unknown.
+        """
+        client = cls(bus, arc_name(bus, kind), listener)
+        await client.start(
+            kind,
+            {
+                "owner": bus.source,
+                "path": [[node.name, node.priority] for node in path],
+                "console": console,
+                "minimum_runtime_s": minimum_runtime_s,
+                "maximum_runtime_s": maximum_runtime_s,
+                "wish": wish or {},
+                "features": features or {},
+                "usage": [usage.period_s, usage.packet_time_s, usage.deadline_s, usage.jitter_s, usage.kind],
+                "idle": idle,
+            },
+        )
+        return client
+
+    async def start(self, kind: str, parameters: dict[str, Any]) -> None:
+        """Have the ARC started; see ``claim``."""
+        order = Start(kind, self.arc, parameters)
+        await self._bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+
+    async def handle(self, notice: ArcNotice) -> Noted:
+        """Take note of what the ARC says and tell the listener; the reply goes back to the ARC."""
+        match notice:
+            case Resumed():
+                self.granted, self.suspended = notice, None
+                self._granted.set()
+                await self._listener.arc_resumed(notice)
+            case Suspending():
+                await self._listener.arc_suspending(notice)
+            case Suspended():
+                self.granted, self.suspended = None, notice
+                self._granted.clear()
+                await self._listener.arc_suspended(notice)
+            case AskBeat():
+                pass
+        return Noted()
+
+    async def wait_granted(self) -> Resumed:
+        """Return when the RCs are held; at once if they are."""
+        while self.granted is None:
+            await self._granted.wait()
+        return self.granted
+
+    async def drive(self, left_rad_s: float, right_rad_s: float) -> Applied:
+        """Turn the wheels; return what was applied after clipping.
+
+        Raises:
+            SwappedOut: The ARC holds nothing now; nothing was sent.
+        """
+        return await self._do(Drive(left_rad_s, right_rad_s))
+
+    async def halt(self) -> Applied:
+        """Stop the wheels; see ``drive``."""
+        return await self._do(Halt())
+
+    async def jump(self) -> Applied:
+        """Jump; see ``drive``."""
+        return await self._do(Jump())
+
+    def frames(self, listener: Callable[[Frame], None]) -> Subscription:
+        """Call the listener with the newest picture of the current grant; those of earlier grants never arrive."""
+
+        def arrived(envelope: Envelope[Any]) -> None:
+            frame: Frame = envelope.body
+            if self.granted is not None and self.granted.epochs.get(frame.rc) == frame.epoch:
+                listener(frame)
+
+        return self._bus.subscribe(self.address, Conversation.FRAMES, Frame, arrived, latest=True)
+
+    async def state(self) -> ArcState:
+        """Return what the ARC holds and why not."""
+        return await self._bus.ask(self.address, AskArc(), ArcState, within_s=REPLY_TIME_S)
+
+    async def idle(self, idle: bool = True) -> None:
+        """Say that no time is wanted now, or that it is wanted again."""
+        await self._say(WantIdle(idle))
+
+    async def want_runtime(self, minimum_runtime_s: float, maximum_runtime_s: float = 0.0) -> None:
+        """Ask for other run times from the next slice on."""
+        await self._say(WantRuntime(minimum_runtime_s, maximum_runtime_s))
+
+    async def want_longer(self, until_s: float) -> None:
+        """Let the running slice last until this mission time, at most the maximum run time."""
+        await self._say(WantLonger(until_s))
+
+    async def release(self, reason: str = "done") -> None:
+        """Give the RCs back and end the ARC. Afterwards it is gone, also if it was gone before."""
+        try:
+            await self._bus.ask(self.address, Release(reason), Accepted, within_s=REPLY_TIME_S)
+        except LinkError as error:
+            log.info("%s did not answer the release: %s", self.arc, error)
+        try:
+            await self._bus.ask(PLACER, StopComponent(self.arc, reason), Ended, within_s=START_TIME_S)
+        except Refusal as refusal:
+            log.info("%s was gone already: %s", self.arc, refusal.detail)
+
+    async def _do(self, command: Message) -> Applied:
+        return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
+
+    async def _say(self, wish: Message) -> None:
+        await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)
+
+
+def arc_name(bus: Bus, kind: str) -> str:
+    """Return the name of the owner's ARC of this kind: ``<owner>-<kind>``."""
+    return f"{bus.source.rpartition('/')[2]}-{kind}"

@@ -1,0 +1,360 @@
+"""What is said inside the resource pool and at its one door, the ARCs.
+
+* decision process → ARC: ``ArcQuestion``; ARC → decision process: ``ArcNotice``.
+* ARC → scout RC: ``ScoutCommand``; scout RC → command radio RC: ``RadioCommand``; ARC → framegrabber RC: ``Tune``.
+* framegrabber RC → whoever listens to its ARC: ``Frame``, published under the ARC's address.
+
+Commands to RCs are questions: each is answered with what was applied, or refused with ``StaleEpoch``.
+"""
+
+from __future__ import annotations
+
+from backbone.errors import Refusal
+from backbone.rc_manager.messages import Usage
+from backbone.wire import Message
+
+
+# ---------------------------------------------------------------------- decision process → ARC
+class Drive(Message, frozen=True):
+    """Turn the wheels at these speeds from now on, until another command or ``COMMAND_TIMEOUT_S``.
+
+    Attributes:
+        left_rad_s: Left wheel, forward is positive.
+        right_rad_s: Right wheel.
+    """
+
+    left_rad_s: float
+    right_rad_s: float
+
+
+class Halt(Message, frozen=True):
+    """Stop the wheels."""
+
+
+class Jump(Message, frozen=True):
+    """Wind the spring foot and kick."""
+
+
+class WantIdle(Message, frozen=True):
+    """Nothing to do now (True), or time is wanted again (False)."""
+
+    idle: bool
+
+
+class WantRuntime(Message, frozen=True):
+    """Other run times from the next slice on."""
+
+    minimum_runtime_s: float
+    maximum_runtime_s: float = 0.0
+
+
+class WantLonger(Message, frozen=True):
+    """Let the running slice last until this mission time."""
+
+    until_s: float
+
+
+class Release(Message, frozen=True):
+    """Done with this ARC: it withdraws, frees its RCs and ends."""
+
+    reason: str = ""
+
+
+class AskArc(Message, frozen=True):
+    """What do you hold?"""
+
+
+class ArcState(Message, frozen=True):
+    """Answer to ``AskArc``.
+
+    Attributes:
+        arc: Name of the ARC.
+        kind: Its type.
+        owner: Address of its decision process.
+        rcs: Kind → name of the chosen RCs; empty until they are chosen.
+        granted: True while commands pass.
+        epochs: RC name → epoch while granted.
+        reason: Why it is swapped out, empty while granted.
+        by: Because of whom.
+        expected_start_s: Next expected slot, mission time; negative: unknown.
+    """
+
+    arc: str
+    kind: str
+    owner: str
+    rcs: dict[str, str]
+    granted: bool
+    epochs: dict[str, int]
+    reason: str
+    by: str
+    expected_start_s: float
+
+
+class Accepted(Message, frozen=True):
+    """Answer to questions that need no other: done."""
+
+
+class Applied(Message, frozen=True):
+    """What an RC really did with a command.
+
+    Attributes:
+        rc: The RC.
+        epoch: Under which grant.
+        at_s: Mission time.
+        command: ``drive``, ``halt``, ``jump``, ``transmitter``.
+        values: Values after clipping to the hardware's limits, units in the names.
+    """
+
+    rc: str
+    epoch: int
+    at_s: float
+    command: str
+    values: dict[str, float] = {}
+
+
+ArcQuestion = Drive | Halt | Jump | WantIdle | WantRuntime | WantLonger | Release | AskArc
+
+
+# ---------------------------------------------------------------------- ARC → decision process
+class Resumed(Message, frozen=True):
+    """The RCs are yours: commands pass from now on.
+
+    Attributes:
+        arc: The ARC.
+        rcs: Kind → name of what you hold.
+        epochs: RC name → epoch.
+        until_s: The slice lasts at least until this mission time.
+    """
+
+    arc: str
+    rcs: dict[str, str]
+    epochs: dict[str, int]
+    until_s: float
+
+
+class Suspending(Message, frozen=True):
+    """The slice ends: stop cleanly; answering means you have."""
+
+    arc: str
+    reason: str
+    by: str
+    deadline_s: float
+
+
+class Suspended(Message, frozen=True):
+    """The RCs are gone: commands are refused until the next ``Resumed``."""
+
+    arc: str
+    reason: str
+    by: str
+    expected_start_s: float
+
+
+class AskBeat(Message, frozen=True):
+    """Does your loop run?"""
+
+
+class Noted(Message, frozen=True):
+    """Answer to every notice."""
+
+
+ArcNotice = Resumed | Suspending | Suspended | AskBeat
+
+
+# ---------------------------------------------------------------------- ARC → RCs
+class CommandScout(Message, frozen=True):
+    """A command to a robot under a grant.
+
+    Attributes:
+        arc: Who commands.
+        epoch: Of the scout RC's connection.
+        command: What to do.
+    """
+
+    arc: str
+    epoch: int
+    command: Drive | Halt | Jump | SwitchTransmitter
+
+
+class SwitchTransmitter(Message, frozen=True):
+    """Turn the robot's video transmitter on at a frequency, or off.
+
+    Attributes:
+        on: On or off.
+        frequency: Name of the video frequency's RC; empty when off.
+    """
+
+    on: bool
+    frequency: str = ""
+
+
+class LoadPacket(Message, frozen=True):
+    """Send this packet at the ARC's rate from now on, until replaced. Asked by robot RCs.
+
+    Attributes:
+        arc: The ARC that holds robot and radio.
+        epoch: Of the radio RC's connection.
+        network_id: Of the robot.
+        payload: Bytes of the robot's own protocol.
+        at_once: Also send it ahead of its turn, and answer only when it is on the air.
+    """
+
+    arc: str
+    epoch: int
+    network_id: int
+    payload: bytes
+    at_once: bool = False
+
+
+class PacketLoaded(Message, frozen=True):
+    """Answer to ``LoadPacket``: it stands, and was sent if that was asked."""
+
+
+class Tune(Message, frozen=True):
+    """Receive this video frequency and hand its pictures to the ARC that holds the framegrabber."""
+
+    arc: str
+    epoch: int
+    frequency: str
+
+
+class Frame(Message, frozen=True):
+    """One picture.
+
+    Attributes:
+        rc: Framegrabber that took it.
+        arc: ARC it was taken for.
+        epoch: Of the framegrabber's connection; receivers drop those of other epochs.
+        robot: Robot whose transmitter is expected on the frequency (chosen with the grant).
+        number: Grows by one with each frame of this connection.
+        captured_s: Mission time at which it was taken.
+        width_px: Columns.
+        height_px: Rows.
+        pixels: Grey levels, row by row from the top.
+    """
+
+    rc: str
+    arc: str
+    epoch: int
+    robot: str
+    number: int
+    captured_s: float
+    width_px: int
+    height_px: int
+    pixels: memoryview
+
+
+# ---------------------------------------------------------------------- the simulated world, played as hardware
+class RadioPacket(Message, frozen=True):
+    """A packet on the air.
+
+    Attributes:
+        radio: Radio that sent it.
+        network_id: Robot it is for.
+        payload: Bytes of the robot's protocol.
+        arc: For the audit: who held robot and radio.
+        epoch: For the audit: the robot's epoch under which the payload was made.
+    """
+
+    radio: str
+    network_id: int
+    payload: bytes
+    arc: str = ""
+    epoch: int = 0
+
+
+class PacketHeard(Message, frozen=True):
+    """Answer to ``RadioPacket``: it was on the air; the robot, if any has this id, obeyed."""
+
+    at_s: float
+
+
+class AskWorld(Message, frozen=True):
+    """What is the world made of?"""
+
+
+class WorldModel(Message, frozen=True):
+    """Answer to ``AskWorld``: enough to draw the same pictures elsewhere.
+
+    Attributes:
+        mjcf: The compiled world's XML.
+        robots: Robot name → network id.
+    """
+
+    mjcf: str
+    robots: dict[str, int]
+
+
+class AskPose(Message, frozen=True):
+    """Where is this body in the simulation? For tests and views; real robots cannot tell."""
+
+    body: str
+
+
+class Pose(Message, frozen=True):
+    """Answer to ``AskPose``: metres and radians in the room's frame, origin in a corner of the floor."""
+
+    body: str
+    at_s: float
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+class WorldState(Message, frozen=True):
+    """Published by the world once a frame as telemetry.
+
+    Attributes:
+        frame: Number of the frame.
+        at_s: Mission time it shows.
+        state: float64 vector, little endian; meaning is the model's alone.
+        transmitting: Robot → video frequency its transmitter is on at.
+    """
+
+    frame: int
+    at_s: float
+    state: bytes
+    transmitting: dict[str, str]
+
+
+class ClockTick(Message, frozen=True):
+    """Published by the world once a frame: the mission's time, for hosts that do not share a monotonic clock."""
+
+    frame: int
+    at_s: float
+    rate: float
+
+
+# ---------------------------------------------------------------------- refusals
+class SwappedOut(Refusal):
+    """The ARC holds nothing now; facts: ``reason``, ``by``, ``expected_start_s``."""
+
+    code = "arc.swapped_out"
+    remedy = "Wait for 'resumed'; the next expected slot is in the facts."
+
+
+class NoSuchAction(Refusal):
+    """This kind of ARC has no RC that could do it."""
+
+    code = "arc.no_such_action"
+    remedy = "Claim a kind of ARC that has the RC for it (see docs/reference/arcs.md)."
+
+
+class NotYours(Refusal):
+    """Only the ARC's decision process may command it."""
+
+    code = "arc.not_yours"
+    remedy = "Claim an ARC of your own."
+
+
+class HardwareFault(Refusal):
+    """The hardware did not do it; the RC reports itself down."""
+
+    code = "rc.hardware"
+    remedy = "Check cable, power and driver of the resource."
+
+
+DEFAULT_DRIVE_USAGE = Usage(period_s=0.05, packet_time_s=0.002, kind="drive")
+"""Chosen: 20 commands a second follow a hand on a stick; 2 ms is 24 bytes at 115.2 kbit/s."""
+
+COMMAND_TIMEOUT_S = 0.5  # chosen: longer than a keyboard's repeat delay is short; a robot stops within a body length
