@@ -23,7 +23,8 @@ class Conversation(StrEnum):
     FRAMES = "frames"  # pictures
     EVENTS = "events"  # what a behavior or world found out
     SCHEDULE = "schedule"  # the RC manager's decisions and leases
-    LEASES = "leases"
+    LEASES = "leases"  # the RC manager's renewals of what is held
+    BEAT = "beat"  # heartbeats of ARCs: their loop runs, and their owner's
     CLOCK = "clock"
     LOG = "log"
 
@@ -46,5 +47,5 @@ def address_of(key_expression: str) -> str:
         >>> address_of("scout/iros2001/resource_pool/scout1/ask")
         'resource_pool/scout1'
     """
-    _root, _mission, subsystem, component, _conversation = key_expression.split("/")
-    return f"{subsystem}/{component}"
+    _root, _mission, *address, _conversation = key_expression.split("/")
+    return "/".join(address)

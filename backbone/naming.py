@@ -7,7 +7,9 @@ nothing has to be quoted anywhere.
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Iterable
 from enum import StrEnum
 
 from backbone.errors import Refusal
@@ -66,3 +68,36 @@ def address(subsystem: Subsystem, component: str) -> str:
 def component_of(component_address: str) -> str:
     """Return the component's name, the last segment of its address."""
     return component_address.rpartition("/")[2]
+
+
+def claim_address(component_address: str, host: str, pid: int) -> str:
+    """Return the address of the token by which a process claims a name before it is ready.
+
+    Example:
+        >>> claim_address("resource_pool/scout1", "lab-pc", 4242)
+        'resource_pool/scout1/lab-pc.4242'
+    """
+    return f"{component_address}/{host}.{pid}"
+
+
+def read_claim(claim: str) -> tuple[str, str, int]:
+    """Return component address, host and pid of a claim's address.
+
+    Example:
+        >>> read_claim("resource_pool/scout1/lab-pc.4242")
+        ('resource_pool/scout1', 'lab-pc', 4242)
+    """
+    component_address, _, process = claim.rpartition("/")
+    host, _, pid = process.rpartition(".")
+    return component_address, host, int(pid)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a remark on the known name nearest to a wrong one, to be put behind it; empty if none is near.
+
+    Example:
+        >>> did_you_mean("scuot1", ["scout1", "pioneer"])
+        " (did you mean 'scout1'?)"
+    """
+    near = difflib.get_close_matches(name, sorted(known), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""

@@ -121,6 +121,19 @@ class ZenohBus(Speaker):
             raise HubUnreachable(str(error)) from error
         return cls(mission, source, clock, session)
 
+    @classmethod
+    async def open_when_up(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
+        """Return a bus on a new session as soon as the hub listens, without holding up the event loop.
+
+        Raises:
+            HubUnreachable: It did not listen within ``OPEN_TIMEOUT_MS``.
+        """
+        try:
+            session = await asyncio.get_running_loop().run_in_executor(None, zenoh.open, config)
+        except zenoh.ZError as error:
+            raise HubUnreachable(str(error)) from error
+        return cls(mission, source, clock, session)
+
     # ------------------------------------------------------------------ questions
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""

@@ -153,7 +153,7 @@ class Done(Message, frozen=True):
 
 
 class Beat(Message, frozen=True):
-    """Published by each ARC every ``BEAT_EVERY_S`` as telemetry: my loop runs and my owner's too."""
+    """Published by each ARC under ``Conversation.BEAT`` every ``BEAT_EVERY_S``: my loop runs and my owner's too."""
 
     arc: str
 

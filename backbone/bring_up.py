@@ -1,0 +1,437 @@
+"""Bring a mission up in the papers' order, keep its core services alive, take it down in reverse.
+
+The launcher is itself a component (``backbone/launcher``): it can be asked for its processes and
+told to stop. It starts only core services; everything else is asked of the placer, like everybody does.
+
+Source: RAM 2002, "Backbone": nameserver, component database, placer, creators, static dependency
+database, RC manager, then the mission.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ipaddress
+import logging
+import os
+import signal
+import socket
+import time
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Protocol
+
+import msgspec
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus, Clock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.component import Component, NoParameters
+from backbone.component.launch import Launch
+from backbone.component.messages import Stop, Stopping
+from backbone.creator.messages import (
+    EndedBy,
+    ListProcesses,
+    ProcessEnded,
+    Processes,
+    ProcessFell,
+    RestartPolicy,
+    creator_name,
+)
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.zygote import Zygote
+from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.mission.behavior_orders import behavior_orders
+from backbone.mission.model import Host, MissionDescription
+from backbone.mission_picture import LAUNCHER
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.naming import Subsystem, component_of
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import Ended, ListPlacements, Placements, Start, Started, StopComponent
+from backbone.wire import Envelope, Message
+
+log = logging.getLogger(__name__)
+
+START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
+STOP_TIME_S = 10.0  # chosen: asking, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
+LISTING_TIME_S = 1.0  # chosen: a thousand round trips
+CORE_POLICY = RestartPolicy(back_off_s=0.02, limit=20, window_s=60.0)  # chosen: a dead hub stops everybody
+FIRST_PORT, LAST_PORT = 20000, 32000  # chosen: below the ports the system hands out to outgoing connections
+
+
+@dataclass(frozen=True)
+class UpOptions:
+    """How a mission is run.
+
+    Attributes:
+        speed: Mission seconds per second of the machine.
+        trace: File for the schedule trace, or None.
+        for_s: Mission seconds after readiness until it ends by itself, or None: until told.
+    """
+
+    speed: float = 1.0
+    trace: Path | None = None
+    for_s: float | None = None
+
+
+@dataclass
+class Outcome:
+    """How a mission went.
+
+    Attributes:
+        ready_after_s: Seconds of the machine from the beginning to all ready; None if it never was.
+        failure: Why it ended badly, None if it did not.
+        ended: How each process ended, in the order of their ends.
+    """
+
+    ready_after_s: float | None = None
+    failure: BaseException | None = None
+    ended: list[ProcessEnded] = field(default_factory=list)
+
+    @property
+    def forced(self) -> list[ProcessEnded]:
+        """Those that did not end by being asked."""
+        return [end for end in self.ended if end.by in (EndedBy.SIGTERM, EndedBy.SIGKILL)]
+
+
+class MissionAlreadyUp(Refusal):
+    """A mission of this name runs on this machine."""
+
+    code = "run.already_up"
+    remedy = "Take it down with 'scout-backbone down', or give this one another name."
+
+
+class CoreServiceLost(BackboneError):
+    """A core service ended so often that it was given up."""
+
+
+class Observer(Protocol):
+    """Who watches a mission come up and go down."""
+
+    def began(self, step: str) -> None:
+        """Take note that this step has begun."""
+
+    def done(self, step: str, took_s: float) -> None:
+        """Take note that this step is done after these seconds of the machine."""
+
+    async def up(self, bus: Bus, clock: Clock) -> None:
+        """Do what is to be done while the mission is up; cancelled when it ends."""
+
+
+class Launcher(Component[NoParameters]):
+    """Starts core services and mission, restarts core services, stops all."""
+
+    accepts: ClassVar[Any] = ListProcesses
+
+    def __init__(
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        *,
+        keeper: ProcessKeeper,
+        description: MissionDescription,
+        options: UpOptions,
+        observer: Observer,
+        began_s: float,
+    ) -> None:
+        super().__init__(launch, bus, clock)
+        self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
+        self._began_s = began_s
+        self.outcome = Outcome()
+        keeper.on_fell = self._core_service_fell
+
+    async def connect(self) -> None:
+        """Start the core services in order, each waited for until it is ready."""
+        for launch in core_launches(self._description, self.launch, self._options):
+            async with self._step(launch.name):
+                await self._keeper.start(launch, CORE_POLICY, START_TIME_S)
+
+    async def serve(self) -> None:
+        """Start the mission through the placer, then let it run."""
+        try:
+            await self._start_mission()
+        except BackboneError as error:
+            self.outcome.failure = error
+            self.end(f"could not come up: {error}")
+            return
+        self.outcome.ready_after_s = time.monotonic() - self._began_s
+        self.report("all ready")
+        watching = asyncio.create_task(self._observer.up(self.bus, self.clock), name="observer")
+        try:
+            if self._options.for_s is None:
+                await watching
+            else:
+                await self.clock.sleep_s(self._options.for_s)
+                self.end(f"ran for {self._options.for_s:g} s")
+        finally:
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Tell of the core services' processes."""
+        if isinstance(asked.body, ListProcesses):
+            return Processes(self.launch.host, [], self._keeper.processes())
+        return await super().answer(asked)
+
+    async def drain(self) -> None:
+        """Stop the mission in reverse order of its start, then the core services but the nameserver."""
+        async with self._step("stop consoles"):
+            await self._stop_consoles()
+        async with self._step("stop mission"):
+            await self._stop_mission()
+        async with self._step("stop core services"):
+            for launch in reversed(core_launches(self._description, self.launch, self._options)):
+                self.outcome.ended.append(await self._keeper.end(launch.name, "the mission ends"))
+
+    # ------------------------------------------------------------------ start
+    async def _start_mission(self) -> None:
+        description = self._description
+        hardware = [Start(c.type, c.name, c.parameters, c.host) for c in description.components]
+        hardware += [Start(r.type, r.name, r.rc_parameters(), r.host) for r in description.resources]
+        async with self._step(
+            "simulated world and resource controllers" if description.components else "resource controllers"
+        ):
+            await self._start_all(hardware)
+        async with self._step("behaviors"):
+            await self._start_all(behavior_orders(description))
+
+    async def _start_all(self, orders: list[Start]) -> None:
+        """Ask the placer for all of them at once.
+
+        Raises:
+            Refusal: The first that could not be started.
+        """
+        outcomes = await asyncio.gather(
+            *(self.bus.ask(PLACER, order, Started, within_s=START_TIME_S) for order in orders), return_exceptions=True
+        )
+        for outcome in outcomes:
+            if isinstance(outcome, BaseException):
+                raise outcome
+
+    # ------------------------------------------------------------------ stop
+    async def _stop_consoles(self) -> None:
+        """Tell every console that the mission ends; each gives its robot back."""
+        with contextlib.suppress(LinkError):  # no nameserver: no console can be reached either
+            listing = await self.bus.ask(
+                NAMESERVER, ListComponents(subsystem=Subsystem.UI_CONSOLE), Components, within_s=LISTING_TIME_S
+            )
+            stops = (
+                self.bus.ask(console.address, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
+                for console in listing.components
+            )
+            await asyncio.gather(*stops, return_exceptions=True)
+
+    async def _stop_mission(self) -> None:
+        """Stop behaviors first, children by their parents, then what ARCs are left, then hardware."""
+        description = self._description
+        roots = [order.name for order in behavior_orders(description)]
+        hardware = [r.name for r in description.resources] + [c.name for c in description.components]
+        for name in reversed(roots):
+            await self._stop(name)
+        with contextlib.suppress(LinkError, Refusal):  # no placer: its creators end what is left
+            left = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=LISTING_TIME_S)
+            others = [p.name for p in left.placements if p.name not in hardware]
+            await asyncio.gather(*(self._stop(name) for name in others))
+        await asyncio.gather(*(self._stop(r.name) for r in description.resources))
+        await asyncio.gather(*(self._stop(c.name) for c in description.components))
+
+    async def _stop(self, name: str) -> None:
+        try:
+            ended = await self.bus.ask(PLACER, StopComponent(name, "the mission ends"), Ended, within_s=STOP_TIME_S)
+        except (Refusal, LinkError) as error:
+            log.info("%s: %s", name, error)
+            return
+        self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
+
+    # ------------------------------------------------------------------ watch
+    def _core_service_fell(self, fell: ProcessFell) -> None:
+        self.story.note(fell.name, f"fell: {fell.how}")
+        if fell.restart_in_s < 0 and self.outcome.failure is None:
+            self.outcome.failure = CoreServiceLost(
+                f"{fell.name} fell too often: {fell.how}\n" + "\n".join(fell.last_lines)
+            )
+            self.end(f"{fell.name} was given up")
+
+    @contextlib.asynccontextmanager
+    async def _step(self, step: str) -> AsyncIterator[None]:
+        self._observer.began(step)
+        began_s = time.monotonic()
+        yield
+        self._observer.done(step, time.monotonic() - began_s)
+
+
+async def run_mission(description: MissionDescription, options: UpOptions, observer: Observer) -> Outcome:
+    """Bring the mission up, let it run, take it down; nothing of it is left when this returns.
+
+    Raises:
+        MissionAlreadyUp: A mission of this name runs on this machine.
+        BackboneError: The nameserver could not be started.
+    """
+    began_s = time.monotonic()
+    refuse_if_up(description.name)
+    directory = run_files.run_directory(description.name)
+    (directory / "log").mkdir(parents=True, exist_ok=True, mode=0o700)
+    clock = MissionClock(began_s, options.speed)
+    own = _launch(description, "launcher", "launcher", "", clock, directory)
+    observer.began("nameserver")
+    zygote = await Zygote.spawn_fresh(run_directory=str(directory))
+    try:
+        return await _with_hub(zygote, own, clock, description, options, observer, began_s)
+    finally:
+        await zygote.close()
+        run_files.remove(description.name)
+
+
+async def _with_hub(
+    zygote: Zygote,
+    own: Launch,
+    clock: MissionClock,
+    description: MissionDescription,
+    options: UpOptions,
+    observer: Observer,
+    began_s: float,
+) -> Outcome:
+    keeper = ProcessKeeper(zygote)
+    hub = _service_launch(own, "nameserver", "nameserver", description, {})
+    await keeper.start_hub(hub, CORE_POLICY)
+    bus = await ZenohBus.open_when_up(own.mission, own.address, clock, client_config(own.endpoint))
+    keeper.use(bus)
+    await keeper.wait_ready(hub.name, START_TIME_S)
+    observer.done("nameserver", time.monotonic() - began_s)
+    run_files.write(
+        run_files.RunFile(
+            mission=own.mission,
+            endpoint=own.endpoint,
+            launcher_pid=os.getpid(),
+            clock_origin_monotonic_s=clock.origin_monotonic_s,
+            clock_rate=clock.rate,
+            host=own.host,
+            source=description.source,
+        )
+    )
+    launcher = Launcher(
+        own, bus, clock, keeper=keeper, description=description, options=options, observer=observer, began_s=began_s
+    )
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, launcher.end, signal.Signals(number).name)
+    try:
+        await launcher.run()
+    except BackboneError as error:
+        launcher.outcome.failure = launcher.outcome.failure or error
+    finally:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            loop.remove_signal_handler(number)
+        launcher.outcome.ended += await keeper.close()
+    return launcher.outcome
+
+
+# ---------------------------------------------------------------------- orders
+def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:
+    """Return the launches of the core services after the nameserver, in the papers' order.
+
+    Hosts that are other machines start their creator themselves (``scout-backbone creator``).
+    """
+    types = [msgspec.to_builtins(component_type) for component_type in description.types]
+    resources = [msgspec.to_builtins(resource) for resource in description.resources]
+    trace = str(options.trace.absolute()) if options.trace else ""
+    parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
+        "component_database": lambda _: {"types": types},
+        "placer": lambda _: {},
+        "creator": lambda host: {"tags": list(host.tags)},
+        "dependency_database": lambda _: {"resources": resources},
+        "rc_manager": lambda _: {
+            "mission": description.name,
+            "mission_priority": description.priority,
+            "trace": trace,
+        },
+    }
+    hosts = {host.name: host for host in description.hosts}
+    launches = []
+    for service in description.core:
+        if service.type == "nameserver" or not is_this_machine(hosts[service.host]):
+            continue
+        name = creator_name(service.host) if service.type == "creator" else service.type
+        given = parameters[service.type](hosts[service.host])
+        launch = _service_launch(own, service.type, name, description, given)
+        launches.append(msgspec.structs.replace(launch, host=service.host))
+    return launches
+
+
+def refuse_if_up(mission: str) -> None:
+    """Return if no mission of this name runs on this machine.
+
+    Raises:
+        MissionAlreadyUp: One does.
+    """
+    try:
+        running = run_files.find(mission)
+    except run_files.MissionNotUp:
+        return
+    raise MissionAlreadyUp(
+        f"mission {mission} is up since before, launcher process {running.launcher_pid}", pid=running.launcher_pid
+    )
+
+
+def is_this_machine(host: Host) -> bool:
+    """Say whether the host's address is a loopback address."""
+    try:
+        return ipaddress.ip_address(host.address).is_loopback
+    except ValueError:
+        return host.address == "localhost"
+
+
+def _launch(
+    description: MissionDescription,
+    component_type: str,
+    name: str,
+    class_path: str,
+    clock: MissionClock,
+    directory: Path,
+) -> Launch:
+    return Launch(
+        mission=description.name,
+        subsystem=Subsystem.BACKBONE,
+        name=name,
+        type=component_type,
+        class_path=class_path,
+        host=description.hosts[0].name,
+        endpoint=f"tcp/127.0.0.1:{_free_port()}",
+        clock_origin_monotonic_s=clock.origin_monotonic_s,
+        clock_rate=clock.rate,
+        requester=LAUNCHER,
+        run_directory=str(directory),
+    )
+
+
+def _service_launch(
+    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, Any]
+) -> Launch:
+    class_path = next(t.class_path for t in description.types if t.name == component_type)
+    return msgspec.structs.replace(own, name=name, type=component_type, class_path=class_path, parameters=parameters)
+
+
+def _free_port() -> int:
+    """Return a loopback port nobody listens on; the hub keeps it over its restarts."""
+    start = FIRST_PORT + os.getpid() * 7 % (LAST_PORT - FIRST_PORT)
+    for port in [*range(start, LAST_PORT), *range(FIRST_PORT, start)]:
+        with socket.socket() as probe:
+            try:
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return port
+    raise LinkError(f"no free port between {FIRST_PORT} and {LAST_PORT}")
+
+
+async def end_mission(bus: Bus) -> None:
+    """Ask the launcher to take its mission down.
+
+    Raises:
+        LinkError: It did not answer.
+    """
+    await bus.ask(LAUNCHER, Stop(f"told by {component_of(bus.source)}"), Stopping, within_s=LISTING_TIME_S)

@@ -1,0 +1,329 @@
+"""The command line ``scout-backbone``.
+
+Data goes to stdout, talk to stderr. What a command needs is imported inside it, so that ``--help``
+and ``check`` stay quick. Exit codes are those of ARCHITECTURE.md, section 5; see ``ExitCode``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from backbone.errors import BackboneError, LinkError, Refusal, code_of
+
+
+class ExitCode(IntEnum):
+    """What the command's end means."""
+
+    DONE = 0
+    UNEXPECTED = 1
+    USAGE = 2
+    MISSION_INVALID = 3
+    NO_BACKBONE = 4
+    REFUSED = 5
+    MISSION_FAILED = 6
+    INTERRUPTED = 130
+
+
+app = typer.Typer(
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    help="Operate teams of small robots that share scarce hardware.\n\n"
+    "Exit codes: 0 done, 1 unexpected, 2 usage, 3 mission file invalid, 4 cannot reach or start the backbone, "
+    "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
+)
+
+MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
+MissionName = Annotated[str | None, typer.Option("--mission", help="Name of the mission; needed if several are up.")]
+Endpoint = Annotated[
+    str | None, typer.Option("--connect", help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)
+
+
+def say(line: str) -> None:
+    """Talk to the person."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def run(work: Callable[[], Awaitable[int]]) -> None:
+    """Run a command's coroutine and end the process with its exit code; refusals become one line."""
+    import uvloop
+
+    async def guarded() -> int:
+        return await work()
+
+    try:
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            code = runner.run(guarded())
+    except Refusal as refusal:
+        say(f"refused [{code_of(refusal)}]: {refusal}")
+        code = ExitCode.NO_BACKBONE if code_of(refusal).startswith("run.") else ExitCode.REFUSED
+    except LinkError as error:
+        say(f"no answer: {error} (is the mission up? see 'scout-backbone status')")
+        code = ExitCode.NO_BACKBONE
+    except BackboneError as error:
+        say(str(error))
+        code = ExitCode.UNEXPECTED
+    raise typer.Exit(int(code))
+
+
+@contextlib.asynccontextmanager
+async def visiting(mission: str | None, endpoint: str | None) -> AsyncIterator[Any]:
+    """Open a bus to a mission that is up: found by name on this machine, or at the endpoint."""
+    from backbone import run_files
+    from backbone.bus.clock import MissionClock
+    from backbone.bus.zenoh_bus import ZenohBus, client_config
+
+    if endpoint is None:
+        found = run_files.find(mission)
+        name, endpoint = found.mission, found.endpoint
+        clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    else:
+        if mission is None:
+            raise typer.BadParameter("--connect needs --mission NAME")
+        name, clock = mission, MissionClock.started_now()
+    bus = await ZenohBus.open_when_up(name, f"ui_console/cli-{os.getpid()}", clock, client_config(endpoint))
+    try:
+        yield bus, clock
+    finally:
+        await bus.close()
+
+
+def read_or_exit(mission_file: Path) -> Any:
+    """Return the checked mission description, or print every fault and exit with 3."""
+    from backbone.mission.reader import MissionInvalid, read_mission
+
+    try:
+        return read_mission(mission_file)
+    except MissionInvalid as invalid:
+        print(invalid)
+        raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
+
+
+@app.command()
+def check(mission_file: MissionFile) -> None:
+    """Check a mission file whole: every fault at once as file:line:column. Starts nothing."""
+    description = read_or_exit(mission_file)
+    say(
+        f"{mission_file}: mission {description.name} is fine: {len(description.resources)} resources, "
+        f"{len(description.types)} component types on {len(description.hosts)} host(s)"
+    )
+
+
+@app.command()
+def schema() -> None:
+    """Print the XML schema of mission files."""
+    from backbone.mission.reader import schema_text
+
+    print(schema_text())
+
+
+@app.command()
+def up(
+    mission_file: MissionFile,
+    headless: Annotated[bool, typer.Option("--headless", help="No live picture; one line a step.")] = False,
+    detach: Annotated[bool, typer.Option("--detach", help="Return when all is ready; the mission goes on.")] = False,
+    speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
+    trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
+    for_s: Annotated[float | None, typer.Option("--for", min=0.0, help="End after these mission seconds.")] = None,
+    tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
+) -> None:
+    """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
+    description = read_or_exit(mission_file)
+    if detach:
+        from backbone.detached import up_detached
+
+        raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
+    from backbone.bring_up import UpOptions
+    from backbone.mission_console import bring_up_on_console
+
+    options = UpOptions(speed=speed, trace=trace, for_s=for_s)
+    ready_to = os.fdopen(tell_fd, "w", encoding="utf-8") if tell_fd is not None else None
+    run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), ready_to=ready_to))
+
+
+@app.command()
+def status(
+    as_json: AsJson = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Keep showing it.")] = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+) -> None:
+    """Show components by subsystem, who holds which resource, and the schedule."""
+
+    async def work() -> int:
+        from rich.console import Console
+        from rich.live import Live
+
+        from backbone.mission_picture import look
+        from backbone.mission_screen import screen
+
+        async with visiting(mission, connect) as (bus, clock):
+            if as_json:
+                print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
+                while watch:
+                    await clock.sleep_s(clock.rate)
+                    print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
+                return ExitCode.DONE
+            console = Console()
+            if not watch:
+                console.print(screen(await look(bus, clock.now_s())))
+                return ExitCode.DONE
+            with Live(console=console, auto_refresh=False) as live:
+                while True:
+                    live.update(screen(await look(bus, clock.now_s())), refresh=True)
+                    await clock.sleep_s(0.5 * clock.rate)
+
+    run(work)
+
+
+@app.command()
+def why(name: str, as_json: AsJson = False, mission: MissionName = None, connect: Endpoint = None) -> None:
+    """Say why a request waits or runs, why a component is where it is, until when."""
+
+    async def work() -> int:
+        from backbone.reasons import reasons_for
+
+        async with visiting(mission, connect) as (bus, clock):
+            reasons = await reasons_for(bus, name)
+            if as_json:
+                print(json.dumps(reasons.to_json()))
+            else:
+                print("\n".join(reasons.lines(clock.now_s())))
+        return ExitCode.DONE
+
+    run(work)
+
+
+@app.command()
+def story(name: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+    """Tell the events that touched a component, request or resource, with their causes."""
+
+    async def work() -> int:
+        from backbone.reasons import story_of
+
+        async with visiting(mission, connect) as (bus, _clock):
+            for event in await story_of(bus, name):
+                cause = f"   because of {event.cause}" if event.cause else ""
+                print(f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}")
+        return ExitCode.DONE
+
+    run(work)
+
+
+@app.command()
+def start(
+    type_: Annotated[str, typer.Argument(metavar="TYPE", help="Component type of the mission.")],
+    name: Annotated[str, typer.Option("--name", help="Name; default: numbered by the placer.")] = "",
+    host: Annotated[str, typer.Option("--host", help="Must run there.")] = "",
+    parameter: Annotated[
+        list[str] | None, typer.Option("--parameter", help="NAME=VALUE, value as JSON or text; repeatable.")
+    ] = None,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+) -> None:
+    """Start one more component through the placer."""
+    parameters = dict(_parameter(given) for given in parameter or [])
+
+    async def work() -> int:
+        from backbone.placer.messages import ADDRESS, Start, Started
+
+        async with visiting(mission, connect) as (bus, _clock):
+            started = await bus.ask(ADDRESS, Start(type_, name, parameters, host), Started, within_s=60.0)
+            print(f"{started.address} on {started.host}, process {started.pid}")
+            for reason in started.reasons:
+                say(reason)
+        return ExitCode.DONE
+
+    run(work)
+
+
+@app.command()
+def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+    """Stop one component for good."""
+
+    async def work() -> int:
+        from backbone.placer.messages import ADDRESS, Ended, StopComponent
+
+        async with visiting(mission, connect) as (bus, _clock):
+            ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
+            print(f"{name} ended by {ended.by}")
+        return ExitCode.DONE
+
+    run(work)
+
+
+@app.command(name="set")
+def set_(name: str, parameter: str, value: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+    """Set a parameter of a running component, or 'priority' of a behavior or console."""
+
+    async def work() -> int:
+        import getpass
+
+        from backbone.component.messages import Parameters, SetParameter
+        from backbone.nameserver.messages import ADDRESS as NAMESERVER
+        from backbone.nameserver.messages import Resolve, Resolved
+        from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+        from backbone.rc_manager.messages import Done, SetPriority
+
+        async with visiting(mission, connect) as (bus, _clock):
+            if parameter == "priority":
+                await bus.ask(RC_MANAGER, SetPriority(name, int(value)), Done, within_s=2.0)
+                print(f"{name}: priority is {int(value)}")
+                return ExitCode.DONE
+            found = await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=2.0)
+            wish = SetParameter(parameter, _value(value), getpass.getuser())
+            now = await bus.ask(found.component.address, wish, Parameters, within_s=2.0)
+            print(f"{name}: {parameter} is {now.values[parameter]!r}")
+        return ExitCode.DONE
+
+    run(work)
+
+
+@app.command()
+def down(mission: MissionName = None) -> None:
+    """Stop a mission of this machine in reverse order: ask, then SIGTERM, then SIGKILL; says which was needed."""
+
+    async def work() -> int:
+        from backbone.detached import take_down
+
+        return await take_down(mission)
+
+    run(work)
+
+
+def _parameter(given: str) -> tuple[str, Any]:
+    name, equals, value = given.partition("=")
+    if not equals or not name:
+        raise typer.BadParameter(f"{given!r} is not NAME=VALUE")
+    return name, _value(value)
+
+
+def _value(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""``up --detach`` and ``down``: a launcher without a terminal, and how to end one."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+
+from backbone import run_files
+from backbone.bring_up import end_mission
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.cli import ExitCode, say
+from backbone.errors import LinkError
+
+ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
+
+
+def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
+    """Start a launcher in a session of its own; return 0 when all is ready, else how it ended."""
+    told, telling = os.pipe()
+    command = [sys.executable, "-m", "backbone.cli", "up", str(mission_file.absolute()), "--headless"]
+    command += ["--tell-fd", str(telling), "--speed", str(speed)]
+    command += ["--trace", str(trace.absolute())] if trace else []
+    command += ["--for", str(for_s)] if for_s is not None else []
+    launcher = subprocess.Popen(  # noqa: S603  our own command line
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+        pass_fds=[telling],
+    )
+    os.close(telling)
+    with os.fdopen(told, encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            say(line.rstrip())
+    if launcher.poll() is None:
+        say(f"mission {mission} goes on as process {launcher.pid}; end it: scout-backbone down --mission {mission}")
+        return ExitCode.DONE
+    return launcher.wait()
+
+
+async def take_down(mission: str | None) -> int:
+    """End a mission of this machine and return when nothing of its launcher is left."""
+    found = run_files.find(mission)
+    launcher = psutil.Process(found.launcher_pid)
+    waiting = os.pidfd_open(launcher.pid)
+    try:
+        for what, seconds, act in (
+            ("asking", ASKED_S, None),
+            ("SIGTERM", TERM_S, signal.SIGTERM),
+            ("SIGKILL", KILL_S, signal.SIGKILL),
+        ):
+            if act is None:
+                if not await _ask(found):
+                    continue
+            else:
+                launcher.send_signal(act)
+            if select.select([waiting], [], [], seconds)[0]:
+                say(f"mission {found.mission} is down; {what} was enough")
+                return ExitCode.DONE if what != "SIGKILL" else ExitCode.MISSION_FAILED
+    finally:
+        os.close(waiting)
+    say(f"mission {found.mission}: process {launcher.pid} does not end")
+    return ExitCode.MISSION_FAILED
+
+
+async def _ask(found: run_files.RunFile) -> bool:
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    try:
+        bus = await ZenohBus.open_when_up(
+            found.mission, f"ui_console/down-{os.getpid()}", clock, client_config(found.endpoint)
+        )
+    except LinkError as error:
+        say(f"the hub cannot be reached: {error}")
+        return False
+    try:
+        await end_mission(bus)
+    except LinkError as error:
+        say(f"the launcher does not answer: {error}")
+        return False
+    finally:
+        await bus.close()
+    return True

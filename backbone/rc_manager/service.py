@@ -1,0 +1,581 @@
+"""The RC manager's loop: carries out what the schedule manager decides and reports back what happened.
+
+Rules of this file:
+
+* No decision about who runs: that is ``schedule_manager``'s. Here is only how.
+* An RC that does not confirm its disconnection counts as held until its lease is over: a holder may
+  be late, there are never two.
+* Nothing that matters lives only here. After a restart the RCs say who holds them, the ARCs what they ask for.
+
+Source: RAM 2002, "The RC Scheduler".
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections.abc import Coroutine, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO, assert_never
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock, Reply
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.component.messages import ComponentState
+from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
+from backbone.dependency_database.messages import AskResources, Resource, Resources
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
+from backbone.naming import Subsystem, component_of
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import Start, Started
+from backbone.rc_manager.decisions import (
+    Adopted,
+    CapacityChanged,
+    ConnectArc,
+    Departed,
+    Event,
+    Extended,
+    Freed,
+    Idled,
+    Instruction,
+    Opened,
+    OpenFailed,
+    PriorityChanged,
+    RcCameBack,
+    RcKnown,
+    RcWentDown,
+    Record,
+    Requested,
+    RevokeArc,
+    RuntimeChanged,
+    WakeAt,
+    Wanted,
+    Woken,
+)
+from backbone.rc_manager.messages import (
+    BEAT_MISSED_S,
+    LEASE_S,
+    RENEW_EVERY_S,
+    AskRc,
+    AskRequest,
+    AskSchedule,
+    AskWhy,
+    Beat,
+    ChangeRuntime,
+    CloseGate,
+    Connect,
+    Connected,
+    CurrentRequest,
+    Disconnect,
+    Disconnected,
+    Done,
+    Extend,
+    GateClosed,
+    GateOpen,
+    Leases,
+    OpenGate,
+    RcManagerQuestion,
+    RcState,
+    RcUse,
+    Scheduled,
+    SchedulingRequest,
+    SetIdle,
+    SetPriority,
+    TraceLine,
+    Withdraw,
+)
+from backbone.rc_manager.schedule_manager import ScheduleManager
+from backbone.wire import Envelope, Message
+
+log = logging.getLogger(__name__)
+
+RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
+ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it answers
+START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
+RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
+TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
+
+
+class RcManagerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """With which rules the RC manager decides.
+
+    Attributes:
+        mission: Name of the mission's own node, root of the behavior tree.
+        mission_priority: Its priority among the consoles.
+        grace_s: Time a decision process has to stop cleanly at the end of a slice.
+        policy: ``no_delay`` or ``strict``.
+        discipline: ``turns`` or ``time``.
+        trace: File the decisions are written to; empty: none.
+    """
+
+    mission: str
+    mission_priority: int = 0
+    grace_s: float = 0.2
+    policy: str = "no_delay"
+    discipline: str = "turns"
+    trace: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What a starting RC manager finds: RCs by name, ARCs by name."""
+
+    rcs: Mapping[str, RcState]
+    arcs: Mapping[str, CurrentRequest]
+
+    def holds_rightly(self, arc: str) -> bool:
+        """Say whether every RC the ARC thinks it holds says so too."""
+        current = self.arcs.get(arc)
+        if current is None or not current.epochs:
+            return False
+        return all(
+            rc in self.rcs and any(h.arc == arc and h.epoch == epoch for h in self.rcs[rc].holders)
+            for rc, epoch in current.epochs.items()
+        )
+
+
+class RcManager(Component[RcManagerParameters]):
+    """Grants whole sets of RCs by priority and in turns, and says why."""
+
+    parameters_type = RcManagerParameters
+    accepts = RcManagerQuestion
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        given = self.parameters
+        self.manager = ScheduleManager(
+            grace_s=given.grace_s,
+            tolerance_s=TOLERANCE_S,
+            policy=given.policy,
+            discipline=given.discipline,
+            mission=given.mission,
+            mission_priority=given.mission_priority,
+        )
+        self._resources: dict[str, Resource] = {}
+        self._uses: dict[str, Mapping[str, RcUse]] = {}
+        self._running_rcs: set[str] = set()
+        self._beats: dict[str, float] = {}
+        self._starts: dict[str, asyncio.Task[None]] = {}
+        self._switches: dict[str, asyncio.Task[None]] = {}
+        self._wake = asyncio.Event()
+        self._wake_at_s: float | None = None
+        self._news = asyncio.Event()
+        self._trace: TextIO | None = None
+        self._found = _Found({}, {})
+        self._switch_times_s: list[float] = []
+
+    # ------------------------------------------------------------------ life
+    async def connect(self) -> None:
+        """Learn the hardware and, after a restart, who holds it; then watch the nameserver for changes."""
+        if self.parameters.trace:
+            self._trace = Path(self.parameters.trace).open("a", encoding="utf-8", buffering=1)  # noqa: ASYNC230, SIM115
+        for record in self.manager.opening_lines():
+            self._record(record)
+        found = await self._until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
+        self._resources = {resource.name: resource for resource in found.resources}
+        self._found = await self._look_around()
+
+    async def serve(self) -> None:
+        """Take over what was found; then wake when a decision is due, renew leases, publish changes."""
+        self._take_over(self._found)
+        self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
+        self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
+        self.bus.watch_link(self._link_changed)
+        async with asyncio.TaskGroup() as loops:
+            loops.create_task(self._wake_when_due())
+            loops.create_task(self._renew())
+            loops.create_task(self._publish_changes())
+
+    async def drain(self) -> None:
+        """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
+        for task in [*self._switches.values(), *self._starts.values()]:
+            task.cancel()
+        await asyncio.gather(*self._switches.values(), *self._starts.values(), return_exceptions=True)
+        if self._trace is not None:
+            self._trace.write(json.dumps({"ev": "end", "t": round(self.clock.now_s(), 6)}) + "\n")
+            self._trace.close()
+
+    def statistics(self) -> dict[str, float]:
+        """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
+        times = sorted(self._switch_times_s)
+        return {
+            "switches": float(len(times)),
+            "switch_p50_s": times[len(times) // 2] if times else 0.0,
+            "switch_p99_s": times[min(len(times) - 1, len(times) * 99 // 100)] if times else 0.0,
+            "held": float(len(self.manager.leases())),
+        }
+
+    # ------------------------------------------------------------------ questions
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer ARCs, consoles and tools."""
+        match asked.body:
+            case SchedulingRequest() as request:
+                return await self._request(request)
+            case Withdraw(arc=arc, reason=reason):
+                self._uses.pop(arc, None)
+                self._beats.pop(arc, None)
+                self.happened(Departed(arc, reason or "self"))
+            case SetIdle(arc=arc, idle=idle):
+                self.happened(Idled(arc) if idle else Wanted(arc))
+            case ChangeRuntime(arc=arc, minimum_runtime_s=least, maximum_runtime_s=most):
+                self.happened(RuntimeChanged(arc, least, most))
+            case Extend(arc=arc, until_s=until_s):
+                self.happened(Extended(arc, until_s))
+            case SetPriority(node=node, priority=priority):
+                self.happened(PriorityChanged(node, priority))
+            case AskSchedule():
+                return self.manager.schedule(self.clock.now_s())
+            case AskWhy(name=name):
+                return self.manager.why(name, self.clock.now_s())
+            case _:
+                return await super().answer(asked)
+        return Done()
+
+    async def _request(self, request: SchedulingRequest) -> Scheduled:
+        rcs = self.manager.choose(request)
+        await self._have_running(rcs)
+        self._admit(request, rcs)
+        return self.manager.scheduled(request.arc, self.clock.now_s())
+
+    def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
+        self._remember(request, rcs)
+        self.happened(Requested(request, rcs))
+
+    def _remember(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
+        self._uses[request.arc] = next(uses for uses in request.alternatives if set(uses) == set(rcs))
+        self._beats[request.arc] = self.clock.now_s()
+
+    # ------------------------------------------------------------------ decide, then do
+    def happened(self, event: Event) -> None:
+        """Let the schedule manager decide on the event and begin to carry out its instructions."""
+        instructions = self.manager.handle(event, self.clock.now_s())
+        for instruction in instructions:
+            self._carry_out(instruction)
+        if instructions:
+            self._news.set()
+
+    def _carry_out(self, instruction: Instruction) -> None:
+        match instruction:
+            case Record():
+                self._record(instruction)
+            case WakeAt(at_s=at_s):
+                self._wake_at_s = at_s
+                self._wake.set()
+            case ConnectArc(arc=arc):
+                self._switch(arc, self._connect(instruction))
+            case RevokeArc(arc=arc):
+                self._switch(arc, self._revoke(instruction))
+            case _:
+                assert_never(instruction)
+
+    def _switch(self, arc: str, work: Coroutine[Any, Any, None]) -> None:
+        """Run the work after whatever is still under way for this ARC was ended."""
+        before = self._switches.get(arc)
+
+        async def in_turn() -> None:
+            if before is not None and not before.done():
+                before.cancel()
+                await asyncio.gather(before, return_exceptions=True)
+            await work
+
+        self._switches[arc] = self.start_task(in_turn(), f"switch {arc}")
+
+    def _record(self, record: Record) -> None:
+        line = dict(record.line)
+        if self._trace is not None:
+            self._trace.write(json.dumps(line) + "\n")
+        subject = str(line.get("arc") or line.get("id") or "")
+        self.story.note(subject, f"{line['ev']}{': ' + record.cause if record.cause else ''}")
+        self.bus.publish(self.address, Conversation.EVENTS, TraceLine(line))
+
+    # ------------------------------------------------------------------ context switches
+    async def _connect(self, order: ConnectArc) -> None:
+        began_s = self.clock.now_s()
+        uses = self._uses.get(order.arc, {})
+        failed = await self._connect_rcs(order, uses)
+        if failed is None:
+            opened = await self._open_gate(order)
+            if opened:
+                self._switch_times_s.append(max(0.0, self.clock.now_s() - began_s - order.settle_s))
+                self.happened(Opened(order.arc))
+                return
+            failed = ""
+        await self._disconnect_rcs(order.arc, order.epochs, f"connection failed at {failed or order.arc}")
+        self.happened(OpenFailed(order.arc, failed))
+
+    async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
+        """Connect all RCs at once; return the name of one that failed, or None."""
+        lease_s = LEASE_S * self.clock.rate
+        epochs = dict(order.epochs)
+
+        async def connect(rc: str, epoch: int) -> None:
+            question = Connect(order.arc, epoch, lease_s, uses.get(rc, RcUse()), epochs, order.ranks.get(rc, 0))
+            await self.bus.ask(_rc(rc), question, Connected, within_s=RC_REPLY_S)
+
+        outcomes = await asyncio.gather(*(connect(rc, epoch) for rc, epoch in epochs.items()), return_exceptions=True)
+        for rc, outcome in zip(epochs, outcomes, strict=True):
+            if isinstance(outcome, Refusal | LinkError):
+                log.warning("%s could not be connected to %s: %s", rc, order.arc, outcome)
+                self.story.note(rc, f"could not be connected to {order.arc}: {outcome}")
+                return rc
+            if outcome is not None:
+                raise outcome
+        return None
+
+    async def _open_gate(self, order: ConnectArc) -> bool:
+        question = OpenGate(dict(order.epochs), order.settle_s, order.until_s)
+        within_s = ARC_REPLY_S + order.settle_s / self.clock.rate
+        try:
+            await self.bus.ask(_arc(order.arc), question, GateOpen, within_s=within_s)
+        except (Refusal, LinkError) as error:
+            log.warning("%s did not open: %s", order.arc, error)
+            return False
+        return True
+
+    async def _revoke(self, order: RevokeArc) -> None:
+        close = CloseGate(order.why, order.by, order.deadline_s, order.expected_s)
+        within_s = ARC_REPLY_S + order.deadline_s / self.clock.rate
+        if order.deadline_s > 0:
+            await self._close_gate(order.arc, close, within_s)
+            await self._disconnect_rcs(order.arc, order.epochs, order.why)
+        else:
+            async with asyncio.TaskGroup() as both:
+                both.create_task(self._close_gate(order.arc, close, within_s))
+                both.create_task(self._disconnect_rcs(order.arc, order.epochs, order.why))
+        self.happened(Freed(order.arc))
+
+    async def _close_gate(self, arc: str, question: CloseGate, within_s: float) -> None:
+        """Close the gate; if the ARC does not answer, its epoch ends with the RCs' disconnection all the same."""
+        try:
+            await self.bus.ask(_arc(arc), question, GateClosed, within_s=within_s)
+        except (Refusal, LinkError) as error:
+            self.story.note(arc, f"did not close its gate: {error}")
+
+    async def _disconnect_rcs(self, arc: str, epochs: Mapping[str, int], reason: str) -> None:
+        """Disconnect all RCs at once; wait out the lease of those that do not confirm."""
+        asked_s = self.clock.now_s()
+        confirmed = await asyncio.gather(*(self._disconnect(rc, arc, epoch, reason) for rc, epoch in epochs.items()))
+        if not all(confirmed):
+            await self.clock.sleep_until_s(asked_s + LEASE_S * self.clock.rate)
+
+    async def _disconnect(self, rc: str, arc: str, epoch: int, reason: str) -> bool:
+        try:
+            await self.bus.ask(_rc(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=RC_REPLY_S)
+        except (Refusal, LinkError) as error:
+            self.story.note(rc, f"did not confirm its disconnection from {arc}: {error}")
+            return False
+        return True
+
+    # ------------------------------------------------------------------ RCs that do not run yet
+    async def _have_running(self, rcs: Iterable[str]) -> None:
+        """Start those RCs through the placer that do not run; return when all answer.
+
+        Raises:
+            Refusal: One of them cannot be started.
+        """
+        missing = [rc for rc in rcs if rc not in self._running_rcs]
+        for rc in missing:
+            if rc not in self._starts:
+                self._starts[rc] = asyncio.create_task(self._start_rc(self._resources[rc]), name=f"start {rc}")
+        await asyncio.gather(*(asyncio.shield(self._starts[rc]) for rc in missing))
+
+    async def _start_rc(self, resource: Resource) -> None:
+        self.story.note(resource.name, "is claimed but does not run: asks the placer to start it")
+        order = Start(resource.type, resource.name, resource.rc_parameters(), resource.host)
+        try:
+            await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+        except Refusal:
+            if not await self._meet_rc(resource.name):  # somebody else had it started at the same time
+                raise
+        finally:
+            del self._starts[resource.name]
+        await self._meet_rc(resource.name)
+
+    async def _meet_rc(self, rc: str) -> bool:
+        """Ask the RC how it is and let the schedule manager know; return whether it answered."""
+        if rc in self._running_rcs:
+            return True
+        try:
+            state = await self.bus.ask(_rc(rc), AskRc(), RcState, within_s=RC_REPLY_S)
+        except (Refusal, LinkError) as error:
+            log.warning("%s does not say how it is: %s", rc, error)
+            return False
+        if rc not in self._running_rcs:
+            self._running_rcs.add(rc)
+            self.happened(RcCameBack(rc, state.last_epoch))
+            if state.capacity != self._resources[rc].capacity:
+                self.happened(CapacityChanged(rc, state.capacity))
+        return True
+
+    # ------------------------------------------------------------------ who is there
+    async def _look_around(self) -> _Found:
+        """Ask every RC who holds it and every ARC what it asks for; free RCs nobody rightly holds."""
+        pool = [c.address for c in await self._listing() if c.address.startswith(f"{Subsystem.RESOURCE_POOL}/")]
+        rcs = await self._ask_all([at for at in pool if component_of(at) in self._resources], AskRc(), RcState)
+        arcs = await self._ask_all(
+            [at for at in pool if component_of(at) not in self._resources], AskRequest(), CurrentRequest
+        )
+        found = _Found(rcs, arcs)
+        orphans = [
+            (rc.name, holder) for rc in rcs.values() for holder in rc.holders if not found.holds_rightly(holder.arc)
+        ]
+        confirmed = await asyncio.gather(
+            *(self._disconnect(rc, holder.arc, holder.epoch, "not adopted after a restart") for rc, holder in orphans)
+        )
+        if not all(confirmed):
+            await self.clock.sleep_s(LEASE_S * self.clock.rate)
+        return found
+
+    def _take_over(self, found: _Found) -> None:
+        """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait."""
+        for resource in self._resources.values():
+            state = found.rcs.get(resource.name)
+            if state is not None:
+                self._running_rcs.add(resource.name)
+            self.happened(
+                RcKnown(
+                    rc=resource.name,
+                    kind=resource.type,
+                    sharable=resource.sharable,
+                    capacity=state.capacity if state is not None else resource.capacity,
+                    connect_s=resource.connect_s,
+                    disconnect_s=resource.disconnect_s,
+                    up=state is not None,
+                    last_epoch=state.last_epoch if state is not None else 0,
+                )
+            )
+        for arc, current in found.arcs.items():
+            if found.holds_rightly(arc):
+                self._remember(current.request, tuple(current.rcs))
+                self.happened(Adopted(current.request, current.epochs, current.granted_s))
+        for arc, current in found.arcs.items():
+            if current.rcs and not found.holds_rightly(arc):
+                self._admit(current.request, tuple(current.rcs))
+
+    async def _ask_all(self, addresses: list[str], question: Message, reply: type[Reply]) -> dict[str, Reply]:
+        async def one(of: str) -> Reply | None:
+            try:
+                return await self.bus.ask(of, question, reply, within_s=RC_REPLY_S)
+            except (Refusal, LinkError):
+                return None  # a component of another kind, or one that is just dying
+
+        answers = await asyncio.gather(*(one(of) for of in addresses))
+        return {component_of(of): got for of, got in zip(addresses, answers, strict=True) if got is not None}
+
+    async def _listing(self) -> list[ComponentState]:
+        """Return who is there, once the nameserver can tell for sure."""
+        while True:
+            found = await self._until_answered(NAMESERVER, ListComponents(), Components)
+            if found.complete:
+                return found.components
+            await self.clock.sleep_s(RETRY_S * self.clock.rate)
+
+    async def _until_answered(self, of: str, question: Message, reply: type[Reply]) -> Reply:
+        while True:
+            try:
+                return await self.bus.ask(of, question, reply, within_s=ARC_REPLY_S)
+            except LinkError as error:
+                log.info("%s does not answer yet: %s", of, error)
+                await self.clock.sleep_s(RETRY_S * self.clock.rate)
+
+    def _heard_from_nameserver(self, envelope: Envelope[Any]) -> None:
+        match envelope.body:
+            case Appeared(component=component):
+                self._appeared(component_of(component.address), component.address)
+            case Disappeared(address=gone):
+                self._disappeared(component_of(gone))
+
+    def _appeared(self, name: str, at: str) -> None:
+        if name in self._resources and at.startswith("resource_pool/"):
+            self.start_task(self._meet_again(name), f"meet {name}")
+
+    async def _meet_again(self, rc: str) -> None:
+        await self._meet_rc(rc)
+
+    def _disappeared(self, name: str) -> None:
+        if name in self._running_rcs:
+            self._running_rcs.discard(name)
+            self.happened(RcWentDown(name))
+        elif name in self._uses:
+            self._uses.pop(name)
+            self._beats.pop(name, None)
+            self.happened(Departed(name, "dead"))
+
+    def _link_changed(self, up: bool) -> None:
+        if up:
+            self.start_task(self._compare_with_nameserver(), "compare")
+
+    async def _compare_with_nameserver(self) -> None:
+        """Catch up with what happened while this process had no link."""
+        names = {component_of(component.address) for component in await self._listing()}
+        for name in [*self._running_rcs, *self._uses]:
+            if name not in names:
+                self._disappeared(name)
+        for rc in names & set(self._resources):
+            await self._meet_rc(rc)
+
+    # ------------------------------------------------------------------ loops
+    async def _wake_when_due(self) -> None:
+        while True:
+            self._wake.clear()
+            at_s = self._wake_at_s
+            if at_s is None:
+                await self._wake.wait()
+                continue
+            try:
+                async with asyncio.timeout(max(0.0, at_s - self.clock.now_s()) / self.clock.rate):
+                    await self._wake.wait()
+            except TimeoutError:
+                self._wake_at_s = None
+                self.happened(Woken())
+
+    async def _renew(self) -> None:
+        """Renew the leases of ARCs whose beat is fresh; end the hold of those that hang."""
+        rate = self.clock.rate
+        while True:
+            now_s = self.clock.now_s()
+            for arc in [arc for arc, at_s in self._beats.items() if now_s - at_s > BEAT_MISSED_S * rate]:
+                log.warning("%s has not beaten for %.1f s", arc, (now_s - self._beats[arc]) / rate)
+                del self._beats[arc]
+                self._uses.pop(arc, None)
+                self.happened(Departed(arc, "silent"))
+            self.bus.publish(self.address, Conversation.LEASES, Leases(self.manager.leases(), LEASE_S * rate))
+            self._news.set()
+            await self.clock.sleep_s(RENEW_EVERY_S * rate)
+
+    async def _publish_changes(self) -> None:
+        while True:
+            await self._news.wait()
+            self._news.clear()
+            schedule = self.manager.schedule(self.clock.now_s())
+            self.bus.publish(self.address, Conversation.SCHEDULE, schedule)
+            running = sum(1 for request in schedule.requests if request.state == "running")
+            self.report(f"{running} of {len(schedule.requests)} ARCs run")
+
+    def _heard_beat(self, envelope: Envelope[Any]) -> None:
+        arc = envelope.body.arc
+        if arc in self._uses:
+            self._beats[arc] = self.clock.now_s()
+        elif arc not in self._switches or self._switches[arc].done():
+            self._switches[arc] = self.start_task(self._meet_arc(arc), f"meet {arc}")
+
+    async def _meet_arc(self, arc: str) -> None:
+        """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
+        current = (await self._ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
+        if current is not None and current.rcs and arc not in self._uses:
+            self._admit(current.request, tuple(current.rcs))
+
+
+def _rc(rc: str) -> str:
+    return f"{Subsystem.RESOURCE_POOL}/{rc}"
+
+
+def _arc(arc: str) -> str:
+    return f"{Subsystem.RESOURCE_POOL}/{arc}"

@@ -1,0 +1,112 @@
+"""``why`` and ``story``: ask whoever knows, and put their answers in order."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import Any
+
+from backbone.bus.interface import Bus
+from backbone.component.messages import AskStory, ComponentState, Story, StoryEvent
+from backbone.errors import LinkError, Refusal
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import AskPlacement, Placement
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskWhy, UnknownRequest, Why
+
+REPLY_TIME_S = 1.0  # chosen: a person waits this long
+
+
+@dataclass(frozen=True)
+class Reasons:
+    """Why something is as it is: its schedule, its place, its own words; at least one of them.
+
+    Attributes:
+        name: What was asked about.
+        why: The RC manager's answer, if it knows the name.
+        placement: The placer's answer, if it placed it.
+        component: What the component says of itself, if there is one.
+    """
+
+    name: str
+    why: Why | None
+    placement: Placement | None
+    component: ComponentState | None
+
+    def lines(self, now_s: float) -> list[str]:
+        """Return the reasons for people."""
+        lines: list[str] = []
+        if self.why is not None:
+            lines += [f"{self.name}: {self.why.state}", *(f"  {line}" for line in self.why.lines)]
+            if self.why.expected_start_s >= 0:
+                lines.append(f"  expected to start in {max(0.0, self.why.expected_start_s - now_s):.1f} s")
+            if self.why.would_change:
+                lines.append(f"  {self.why.would_change}")
+        if self.component is not None:
+            doing = f": {self.component.feedback}" if self.component.feedback else ""
+            lines.append(f"{self.name} is {self.component.state} on {self.component.host}{doing}")
+        if self.placement is not None:
+            lines.append(f"{self.name} was placed on {self.placement.host}, wanted by {self.placement.requester}")
+            lines += [f"  {reason}" for reason in self.placement.reasons]
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the reasons as plain data."""
+        why, placement = self.why, self.placement
+        return {
+            "name": self.name,
+            "why": {name: getattr(why, name) for name in why.__struct_fields__} if why else None,
+            "placement": {name: getattr(placement, name) for name in placement.__struct_fields__}
+            if placement
+            else None,
+        }
+
+
+async def reasons_for(bus: Bus, name: str) -> Reasons:
+    """Ask RC manager, placer and nameserver about the name.
+
+    Raises:
+        UnknownName: None of them knows it.
+        LinkError: None of them answered.
+    """
+    why, placement, resolved = await asyncio.gather(
+        _or_error(bus, RC_MANAGER, AskWhy(name), Why),
+        _or_error(bus, PLACER, AskPlacement(name), Placement),
+        _or_error(bus, NAMESERVER, Resolve(name), Resolved),
+    )
+    reasons = Reasons(
+        name,
+        why if isinstance(why, Why) else None,
+        placement if isinstance(placement, Placement) else None,
+        resolved.component if isinstance(resolved, Resolved) else None,
+    )
+    if reasons.why is None and reasons.placement is None and reasons.component is None:
+        for error in (resolved, why, placement):
+            if not isinstance(error, UnknownName | UnknownRequest):
+                raise error
+        raise UnknownName(f"nobody knows {name!r}")
+    return reasons
+
+
+async def story_of(bus: Bus, name: str) -> list[StoryEvent]:
+    """Ask every component for the events about the name; return them in the order of their times."""
+    listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
+    stories = await asyncio.gather(
+        *(_or_error(bus, c.address, _question(c.address, name), Story) for c in listing.components)
+    )
+    events = [event for story in stories if isinstance(story, Story) for event in story.events]
+    return sorted(events, key=lambda event: event.at_s)
+
+
+def _question(address: str, name: str) -> AskStory:
+    """Ask the component itself for all it knows, the others for what is about it."""
+    return AskStory() if address.endswith(f"/{name}") else AskStory(name)
+
+
+async def _or_error(bus: Bus, address: str, question: Any, reply: type[Any]) -> Any:
+    try:
+        return await bus.ask(address, question, reply, within_s=REPLY_TIME_S)
+    except (Refusal, LinkError) as error:
+        return error
