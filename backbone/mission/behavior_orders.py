@@ -1,0 +1,73 @@
+"""From the behavior tree of a mission file to the orders that start its roots.
+
+A behavior is launched with its own parameters as the file gives them, and three of the tree:
+``path`` (from the mission's root to this node), ``arc`` (what it claims) and ``children`` (whole
+nodes, which the behavior starts itself, by the same rule). Nothing here imports the mission's model
+at run time, so a behavior's process can apply the rule to its children without loading pydantic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from backbone.errors import Refusal
+from backbone.placer.messages import Start
+
+if TYPE_CHECKING:
+    from backbone.mission.model import Behavior, MissionDescription
+
+PathStep = tuple[str, int]
+TREE_PARAMETERS = ("path", "arc", "children")
+
+
+class ReservedParameter(Refusal):
+    """A behavior's own parameter has a name that belongs to the tree."""
+
+    code = "mission.reserved_parameter"
+    remedy = f"Give the parameter another name; {', '.join(TREE_PARAMETERS)} are set by the behavior tree."
+
+
+def behavior_orders(description: MissionDescription) -> list[Start]:
+    """Return the orders that start the roots of the tree, in the mission file's order.
+
+    Raises:
+        ReservedParameter: A behavior, also one further down, has a parameter of a reserved name.
+    """
+    top = [(description.name, description.priority)]
+    return [behavior_order(_node(behavior), top) for behavior in description.behaviors]
+
+
+def behavior_order(node: Mapping[str, Any], parent_path: Sequence[PathStep]) -> Start:
+    """Return the order that starts one node of the tree.
+
+    Args:
+        node: ``type``, ``name``, ``priority``, ``parameters``, ``arc``, ``children``.
+        parent_path: Names and priorities from the mission's root to the parent.
+
+    Raises:
+        ReservedParameter: One of its own parameters has a reserved name.
+
+    Example:
+        >>> node = {"type": "wander", "name": "w", "priority": 3, "parameters": {"speed_m_s": 0.2}}
+        >>> behavior_order(node, [("mission", 10)]).parameters["path"]
+        [['mission', 10], ['w', 3]]
+    """
+    own = dict(node.get("parameters", {}))
+    if taken := [name for name in TREE_PARAMETERS if name in own]:
+        raise ReservedParameter(f"{node['name']}: parameter {taken[0]!r}", behavior=node["name"], parameter=taken[0])
+    path = [[name, priority] for name, priority in (*parent_path, (node["name"], node["priority"]))]
+    tree = {"path": path, "arc": node.get("arc"), "children": list(node.get("children", ()))}
+    return Start(node["type"], node["name"], {**own, **tree})
+
+
+def _node(behavior: Behavior) -> dict[str, Any]:
+    node = behavior.model_dump(mode="json")
+    _refuse_reserved(node)
+    return node
+
+
+def _refuse_reserved(node: Mapping[str, Any]) -> None:
+    for child in node["children"]:
+        behavior_order(child, ())
+        _refuse_reserved(child)

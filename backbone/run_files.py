@@ -1,0 +1,171 @@
+"""Missions that are up on this machine, found by name: one small file for each.
+
+The launcher writes it as soon as the hub listens and removes it at the end. A file whose launcher
+is gone is stale: it is passed over, and overwritten by the next mission of that name.
+"""
+
+from __future__ import annotations
+
+import getpass
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import msgspec
+import psutil
+
+from backbone.errors import Refusal
+from backbone.naming import is_legal, legal
+
+FILE_NAME = "run.json"
+START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports a process's start in hundredths, corrected by clock steps
+
+
+class RunFile(msgspec.Struct, frozen=True):
+    """How to reach a mission that is up.
+
+    Attributes:
+        mission: Name of the mission.
+        endpoint: Where its hub listens.
+        launcher_pid: Process of the launcher.
+        clock_origin_monotonic_s: This machine's monotonic clock at mission time 0.
+        clock_rate: Mission seconds per second of the machine.
+        host: Name of this machine in the mission.
+        source: Path of the mission file.
+        launcher_started_s: When the launcher's process began, seconds since 1970; filled in by ``write``.
+    """
+
+    mission: str
+    endpoint: str
+    launcher_pid: int
+    clock_origin_monotonic_s: float
+    clock_rate: float
+    host: str
+    source: str
+    launcher_started_s: float = 0.0
+
+
+class MissionNotUp(Refusal):
+    """No mission of this name, or none at all, is up on this machine."""
+
+    code = "run.not_up"
+    remedy = "Start it with 'scout-backbone up MISSION.xml', or name a hub elsewhere with --connect."
+
+
+class SeveralMissions(Refusal):
+    """Several missions are up and none was named."""
+
+    code = "run.several"
+    remedy = "Name one with --mission."
+
+
+class UnsafeDirectory(Refusal):
+    """The folder of the run files belongs to somebody else, or others may write into it."""
+
+    code = "run.unsafe_directory"
+    remedy = "Set XDG_RUNTIME_DIR to a folder of your own with mode 0700."
+
+
+def run_directory(mission: str) -> Path:
+    """Return the folder of a mission's files; the folder around it exists afterwards, for this user alone.
+
+    Raises:
+        IllegalName: The mission's name is no legal name.
+        UnsafeDirectory: Somebody else could put files there.
+    """
+    return _directory() / legal(mission)
+
+
+def write(run_file: RunFile) -> Path:
+    """Make the mission findable and return the file's path.
+
+    Raises:
+        UnsafeDirectory: Somebody else could put files there.
+    """
+    directory = run_directory(run_file.mission)
+    directory.mkdir(mode=0o700, exist_ok=True)
+    directory.chmod(0o700)
+    started_s = psutil.Process(run_file.launcher_pid).create_time()
+    content = msgspec.json.encode(msgspec.structs.replace(run_file, launcher_started_s=started_s))
+    path, part = directory / FILE_NAME, directory / f".{FILE_NAME}.{os.getpid()}"
+    part.write_bytes(content)
+    part.replace(path)
+    return path
+
+
+def remove(mission: str) -> None:
+    """Remove the mission's folder with all that is in it; right also if it is gone."""
+    shutil.rmtree(run_directory(mission), ignore_errors=True)
+
+
+def find(mission: str | None = None) -> RunFile:
+    """Return how to reach a mission that is up on this machine.
+
+    Args:
+        mission: Its name; None: the only one.
+
+    Raises:
+        MissionNotUp: There is none; the detail names those that are up.
+        SeveralMissions: None was named and several are up.
+    """
+    up = find_all()
+    names = ", ".join(run_file.mission for run_file in up)
+    if mission is None:
+        if not up:
+            raise MissionNotUp("no mission is up on this machine")
+        if len(up) > 1:
+            raise SeveralMissions(f"several missions are up: {names}", missions=names)
+        return up[0]
+    for run_file in up:
+        if run_file.mission == mission:
+            return run_file
+    raise MissionNotUp(f"mission {mission!r} is not up; up: {names or 'none'}", mission=mission, missions=names)
+
+
+def find_all() -> list[RunFile]:
+    """Return the missions that are up on this machine, sorted by name."""
+    found = (_read(folder / FILE_NAME) for folder in sorted(_directory().iterdir()) if is_legal(folder.name))
+    return [run_file for run_file in found if run_file is not None and _is_fresh(run_file)]
+
+
+def _directory() -> Path:
+    """Return the folder all run files of this user lie in, made and checked."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{_user()}"
+    if not runtime:
+        base.mkdir(mode=0o700, exist_ok=True)
+        _check_private(base)
+    directory = base / "scout-backbone"
+    directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+    _check_private(directory)
+    return directory
+
+
+def _check_private(directory: Path) -> None:
+    # The folder for temporary files is everybody's: whoever made the folder first decides what is in it.
+    found = directory.lstat()
+    if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & 0o022 or directory.is_symlink()):
+        raise UnsafeDirectory(f"{directory} is not this user's alone", directory=str(directory))
+
+
+def _user() -> str:
+    return str(os.getuid()) if hasattr(os, "getuid") else getpass.getuser()
+
+
+def _read(path: Path) -> RunFile | None:
+    """Return what the file says, or None if there is none, or none that this release wrote."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=RunFile)
+    except (FileNotFoundError, NotADirectoryError, msgspec.DecodeError):
+        return None
+
+
+def _is_fresh(run_file: RunFile) -> bool:
+    try:
+        launcher = psutil.Process(run_file.launcher_pid)
+        if launcher.status() == psutil.STATUS_ZOMBIE:
+            return False
+        return abs(launcher.create_time() - run_file.launcher_started_s) < START_TIME_TOLERANCE_S
+    except psutil.NoSuchProcess:
+        return False

@@ -1,0 +1,101 @@
+"""Missions of this machine are found by name, and only while their launcher lives."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from backbone import run_files
+from backbone.errors import Refusal
+from backbone.run_files import MissionNotUp, RunFile, SeveralMissions, UnsafeDirectory
+
+
+@pytest.fixture(autouse=True)
+def runtime_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path
+
+
+def up(mission: str, pid: int | None = None) -> RunFile:
+    return RunFile(mission, "tcp/127.0.0.1:7447", pid or os.getpid(), 12.5, 2.0, "lab", "/missions/m.xml")
+
+
+def test_what_was_written_is_found_by_name_and_alone() -> None:
+    run_files.write(up("iros2001"))
+    for found in (run_files.find("iros2001"), run_files.find()):
+        assert (found.endpoint, found.clock_origin_monotonic_s, found.clock_rate) == ("tcp/127.0.0.1:7447", 12.5, 2.0)
+
+
+def test_nothing_is_up_on_a_fresh_machine() -> None:
+    with pytest.raises(MissionNotUp):
+        run_files.find()
+
+
+def test_a_wrong_name_is_refused_and_the_refusal_names_what_is_up() -> None:
+    run_files.write(up("iros2001"))
+    with pytest.raises(MissionNotUp, match="iros2001"):
+        run_files.find("ram2002")
+
+
+def test_of_several_missions_one_must_be_named() -> None:
+    run_files.write(up("one"))
+    run_files.write(up("two"))
+    with pytest.raises(SeveralMissions, match="one, two"):
+        run_files.find()
+    assert run_files.find("two").mission == "two"
+
+
+def test_the_file_of_a_launcher_that_ended_is_stale() -> None:
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as launcher:
+        run_files.write(up("iros2001", launcher.pid))
+        assert run_files.find().launcher_pid == launcher.pid
+        launcher.kill()
+    with pytest.raises(MissionNotUp):
+        run_files.find("iros2001")
+
+
+def test_a_reused_process_number_does_not_revive_a_mission() -> None:
+    path = run_files.write(up("iros2001"))
+    path.write_bytes(path.read_bytes().replace(b'"launcher_started_s":', b'"launcher_started_s":1'))
+    with pytest.raises(MissionNotUp):
+        run_files.find()
+
+
+def test_a_broken_file_is_passed_over() -> None:
+    path = run_files.write(up("iros2001"))
+    path.write_bytes(b"{")
+    with pytest.raises(MissionNotUp):
+        run_files.find()
+
+
+def test_removing_leaves_nothing_and_may_be_done_twice(runtime_directory: Path) -> None:
+    path = run_files.write(up("iros2001"))
+    (path.parent / "log").mkdir()
+    run_files.remove("iros2001")
+    run_files.remove("iros2001")
+    assert list((runtime_directory / "scout-backbone").iterdir()) == []
+
+
+def test_the_folder_is_this_users_alone(runtime_directory: Path) -> None:
+    path = run_files.write(up("iros2001"))
+    assert path.parent.stat().st_mode & 0o777 == 0o700
+    (runtime_directory / "scout-backbone").chmod(0o777)
+    with pytest.raises(UnsafeDirectory):
+        run_files.find()
+
+
+def test_without_a_runtime_directory_a_folder_of_the_user_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    path = run_files.write(up("iros2001"))
+    assert path.is_relative_to(tmp_path / f"scout-backbone-{os.getuid()}")
+    assert run_files.find().mission == "iros2001"
+
+
+def test_a_mission_name_cannot_lead_out_of_the_folder() -> None:
+    with pytest.raises(Refusal):
+        run_files.run_directory("../elsewhere")
