@@ -71,7 +71,7 @@ def component_of(component_address: str) -> str:
 
 
 def claim_address(component_address: str, host: str, pid: int) -> str:
-    """Return the address of the token by which a process claims a name before it is ready.
+    """Return the address of the token that says which process was given a name, ready or not.
 
     Example:
         >>> claim_address("resource_pool/scout1", "lab-pc", 4242)
@@ -86,9 +86,14 @@ def read_claim(claim: str) -> tuple[str, str, int]:
     Example:
         >>> read_claim("resource_pool/scout1/lab-pc.4242")
         ('resource_pool/scout1', 'lab-pc', 4242)
+
+    Raises:
+        IllegalName: It is none.
     """
     component_address, _, process = claim.rpartition("/")
     host, _, pid = process.rpartition(".")
+    if not (component_address and host and pid.isdecimal()):
+        raise IllegalName(f"{claim!r} is not the address of a claim")
     return component_address, host, int(pid)
 
 

@@ -1,4 +1,4 @@
-"""The life of every component: connect, ready, serve, drain, stop.
+"""The life of every component: register, connect, ready, serve, drain, stop.
 
 A component is a class with a few hooks. The shell in this file owns the order in which they run,
 answers the questions everybody can be asked, and makes readiness visible: the liveliness token is
@@ -20,6 +20,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
 from backbone.component.messages import (
     AskParameters,
@@ -39,9 +40,15 @@ from backbone.component.messages import (
 from backbone.component.story import StoryBook
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Register, Registered
+from backbone.naming import claim_address
 from backbone.wire import Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
+
+REGISTER_WITHIN_S = 10.0  # chosen: a hub that is being restarted on a busy machine is back long before
+REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
 
 class NoParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -73,6 +80,8 @@ class Component(Generic[P]):
     parameters_type: ClassVar[type[msgspec.Struct]] = NoParameters
     accepts: ClassVar[types.UnionType | type[Any] | None] = None
     """Questions it answers besides the common ones: a message class or a union of them."""
+    registers: ClassVar[bool] = True
+    """False only for the nameserver, which keeps the register itself."""
 
     @classmethod
     def before_bus(cls, launch: Launch) -> None:
@@ -164,6 +173,10 @@ class Component(Generic[P]):
             if self._state is LifeState.READY:
                 self._publish_state()
 
+    def tell(self, subject: str, what: str) -> None:
+        """Keep that this happened to the subject, and let people who watch the mission see it."""
+        self.bus.publish(self.address, Conversation.LOG, self.story.note(subject, what))
+
     def end(self, reason: str) -> None:
         """Leave in good order; ``run`` returns when that is done."""
         if not self._end.is_set():
@@ -196,9 +209,16 @@ class Component(Generic[P]):
         """Live the whole life; return after a good end.
 
         Raises:
+            NameTaken: A living component has the name; nobody heard of this one.
+            LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
             BaseException: The bug that ended it.
         """
         self.bus.on_bug = self.fail
+        try:
+            await self._claim_name()
+        except BaseException:  # said nothing yet under an address that may be another's
+            await self.bus.close()
+            raise
         try:
             await self.connect()
             accepts = CommonQuestion if self.accepts is None else CommonQuestion | self.accepts
@@ -209,6 +229,22 @@ class Component(Generic[P]):
             await self.bus.close()
         if self._bug is not None:
             raise self._bug
+
+    async def _claim_name(self) -> None:
+        """Make the name this process's own; its claim stands from here on, so a death before readiness is seen too."""
+        if not self.registers:
+            return
+        state = self.component_state()
+        await ask_until_answered(
+            self.bus,
+            self.clock,
+            NAMESERVER,
+            Register(state),
+            Registered,
+            each_s=REGISTER_EACH_S,
+            within_s=REGISTER_WITHIN_S,
+        )
+        self.bus.declare_alive(claim_address(state.address, state.host, state.pid))
 
     async def _serve_until_end(self) -> None:
         try:

@@ -7,6 +7,7 @@ from backbone.errors import Refusal
 from backbone.wire import Message
 
 ADDRESS = "backbone/nameserver"
+RECONNECT_S = 1.0  # chosen: machine seconds, twice the 0.5 s in which components find a restarted hub
 
 
 class Register(Message, frozen=True):
@@ -47,8 +48,8 @@ class Components(Message, frozen=True):
 
     Attributes:
         components: Who is registered now.
-        complete: False for the moment after the hub's own restart in which components still reconnect:
-            absence proves nothing then.
+        complete: False for the moment after the hub's own restart in which components still reconnect
+            (``RECONNECT_S``): absence proves nothing then.
         hub_since_s: Mission time at which the hub began to listen.
     """
 

@@ -1,0 +1,38 @@
+"""Asking through a restart of the hub or of the one asked.
+
+Rule: only questions that may be asked twice. What an unanswered question did is unknown, and asking
+it again must not do it again.
+"""
+
+from __future__ import annotations
+
+from backbone.bus.interface import Bus, Clock, Reply
+from backbone.errors import LinkError
+from backbone.wire import Message
+
+PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.02, 0.25, 1.5  # chosen: like the bus's own search for a lost hub
+
+
+async def ask_until_answered(
+    bus: Bus, clock: Clock, address: str, question: Message, reply: type[Reply], *, each_s: float, within_s: float
+) -> Reply:
+    """Ask, and after every ``LinkError`` ask again after a growing pause.
+
+    Args:
+        question: May be asked twice.
+        each_s: Seconds of the machine one question waits for its answer.
+        within_s: Seconds of the machine after which no further question is asked.
+
+    Raises:
+        Refusal: It understood and said no.
+        LinkError: The last one, when the time is up.
+    """
+    end_s, pause_s = clock.now_s() + within_s * clock.rate, PAUSE_FIRST_S
+    while True:
+        try:
+            return await bus.ask(address, question, reply, within_s=each_s)
+        except LinkError:
+            if clock.now_s() + pause_s * clock.rate >= end_s:
+                raise
+        await clock.sleep_s(pause_s * clock.rate)
+        pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)

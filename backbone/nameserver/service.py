@@ -1,0 +1,175 @@
+"""The nameserver: runs the mission's hub and tells who is registered, where, since when.
+
+It starts first (RAM 2002, "Backbone": everything else finds each other through it) and is the one
+process the others' links end at, so it hears of every death within milliseconds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from typing import Any, assert_never
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.bus.zenoh_bus import ZenohBus, hub_config
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.component.messages import AskState, ComponentState
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import (
+    RECONNECT_S,
+    Appeared,
+    Disappeared,
+    ListComponents,
+    NameserverQuestion,
+    NameTaken,
+    Register,
+    Registered,
+    Resolve,
+    Resolved,
+)
+from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, Introduce, Registry
+from backbone.naming import IllegalName, component_of, read_claim
+from backbone.wire import Envelope, Message, UnknownMessage
+
+INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; its token is then all we know
+
+
+class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the nameserver begins.
+
+    Attributes:
+        first_start: True only if no hub of this mission ran before: then nobody can come back, and lists are
+            complete from the beginning.
+    """
+
+    first_start: bool = False
+
+
+class Nameserver(Component[NameserverParameters]):
+    """Registers components by name and announces who appears and disappears."""
+
+    parameters_type = NameserverParameters
+    accepts = NameserverQuestion
+    registers = False
+
+    @classmethod
+    def open_bus(cls, launch: Launch, clock: Clock) -> Bus:
+        """Return the bus of the hub itself, which listens at the launch's endpoint."""
+        return ZenohBus.open(launch.mission, launch.address, clock, hub_config([launch.endpoint]))
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        reconnect_s = 0.0 if self.parameters.first_start else RECONNECT_S * clock.rate
+        self._registry = Registry(clock.now_s(), reconnect_s, CLAIM_WITHIN_S * clock.rate)
+        self._to_introduce: asyncio.Queue[str] = asyncio.Queue()
+        self._registrations = self._refusals = self._appeared = self._disappeared = self._unanswered = 0
+
+    async def connect(self) -> None:
+        """Register itself and watch every token from the first one on."""
+        self._registry.registered(self.component_state(), self.clock.now_s())
+        self._registry.claim_changed(self.address, self.launch.host, os.getpid(), stands=True)
+        self.bus.watch_alive("*/*/*", self._claim_changed)
+        self.bus.watch_alive("*/*", self._token_changed)
+        self.bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._status_heard)
+
+    async def serve(self) -> None:
+        """Ask those who stand behind new tokens who they are."""
+        while True:
+            address = await self._to_introduce.get()
+            self.start_task(self._introduce(address), f"introduce {address}")
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer ``Register``, ``Resolve`` and ``ListComponents``."""
+        match asked.body:
+            case Register(component=component):
+                return self._give_name(component)
+            case Resolve(name=name):
+                return Resolved(self._registry.resolve(name, self.clock.now_s()))
+            case ListComponents(subsystem=subsystem, type=component_type):
+                return self._registry.components(subsystem, component_type, self.clock.now_s())
+            case other:
+                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+
+    def statistics(self) -> dict[str, float]:
+        """Return how many are registered and what happened since the hub's start."""
+        return {
+            "components": float(sum(1 for _ in self._registry.states())),
+            "registrations": float(self._registrations),
+            "names_refused": float(self._refusals),
+            "appeared": float(self._appeared),
+            "disappeared": float(self._disappeared),
+            "introductions_unanswered": float(self._unanswered),
+        }
+
+    def _give_name(self, component: ComponentState) -> Registered:
+        name = component_of(component.address)
+        try:
+            self._registry.registered(component, self.clock.now_s())
+        except NameTaken as taken:
+            self._refusals += 1
+            self.story.note(name, f"refused to {component.host} pid {component.pid}: {taken.detail}")
+            raise
+        self._registrations += 1
+        self.story.note(name, f"registered as {component.address} on {component.host}, pid {component.pid}")
+        return Registered()
+
+    def _claim_changed(self, claim: str, stands: bool) -> None:
+        try:
+            address, host, pid = read_claim(claim)
+        except IllegalName as illegal:  # a stranger's token must not end the hub
+            self.story.note(claim, f"ignored: {illegal.detail}")
+            return
+        self._registry.claim_changed(address, host, pid, stands=stands)
+
+    def _token_changed(self, address: str, stands: bool) -> None:
+        self._carry_out(self._registry.token_changed(address, stands=stands, now_s=self.clock.now_s()))
+
+    def _status_heard(self, heard: Envelope[ComponentState]) -> None:
+        self._registry.status_heard(heard.body)
+
+    def _carry_out(self, instructions: list[Instruction]) -> None:
+        for instruction in instructions:
+            match instruction:
+                case Announce(news=news):
+                    self._announce(news)
+                case Introduce(address=address):
+                    self._to_introduce.put_nowait(address)
+                case _:
+                    assert_never(instruction)
+
+    def _announce(self, news: Appeared | Disappeared) -> None:
+        match news:
+            case Appeared(component=component):
+                self._appeared += 1
+                name = component_of(component.address)
+                self.story.note(name, f"appeared on {component.host}, pid {component.pid}")
+            case Disappeared(address=address):
+                self._disappeared += 1
+                self.story.note(component_of(address), "disappeared")
+            case _:
+                assert_never(news)
+        self.bus.publish(self.address, Conversation.EVENTS, news)
+
+    async def _introduce(self, address: str) -> None:
+        """Learn who is behind a token; ask again as long as it stands for somebody unknown."""
+        while True:
+            try:
+                state = await self.bus.ask(address, AskState(), ComponentState, within_s=INTRODUCE_EACH_S)
+            except LinkError as error:
+                self._unanswered += 1
+                self.story.note(component_of(address), f"did not say who it is: {error}")
+            except Refusal as refusal:  # a token without a component behind it: it will never say who it is
+                self._registry.introduction_failed(address)
+                self.story.note(component_of(address), f"would not say who it is: {refusal.detail}")
+                return
+            else:
+                self._carry_out(self._registry.introduced(state))
+                return
+            self._registry.introduction_failed(address)
+            if not self._registry.is_unknown(address):
+                return
+            await self.clock.sleep_s(INTRODUCE_EACH_S * self.clock.rate)

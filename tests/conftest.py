@@ -1,0 +1,114 @@
+"""What every test gets: a check for tasks left behind, and a mission's network with its nameserver."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from types import TracebackType
+from typing import Any
+
+import pytest
+
+from backbone.bus.clock import VirtualClock
+from backbone.bus.interface import Clock
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.nameserver.service import Nameserver
+from backbone.naming import Subsystem
+
+MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]
+
+
+@pytest.fixture(autouse=True)
+def _no_task_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Fail a test whose event loop ends in good order while a task still waits: somebody forgot to end it."""
+    left: list[str] = []
+    leave = asyncio.Runner.__exit__
+
+    def look_and_leave(
+        runner: asyncio.Runner,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if kind is None:
+            left.extend(sorted(task.get_name() for task in asyncio.all_tasks(runner.get_loop())))
+        leave(runner, kind, error, at)
+
+    monkeypatch.setattr(asyncio.Runner, "__exit__", look_and_leave)
+    yield
+    if left:
+        pytest.fail(f"left pending: {', '.join(left)}")
+
+
+@asynccontextmanager
+async def run_beside(component: Component[Any]) -> AsyncIterator[Component[Any]]:
+    """Let the component live from its readiness to the end of the block."""
+    life = asyncio.create_task(component.run(), name=f"life of {component.address}")
+    ready = asyncio.create_task(_wait_ready(component), name=f"readiness of {component.address}")
+    try:
+        await asyncio.wait({life, ready}, return_when=asyncio.FIRST_COMPLETED)
+        if life.done():
+            await life
+            raise AssertionError(f"{component.address} ended before it was ready")
+        yield component
+    finally:
+        ready.cancel()
+        component.end("the test is over")
+        await asyncio.wait({ready})
+        await life
+
+
+async def _wait_ready(component: Component[Any]) -> None:
+    """Return when the component's token stands."""
+    risen = asyncio.Event()
+    watching = component.bus.watch_alive(component.address, lambda _address, alive: risen.set() if alive else None)
+    try:
+        await risen.wait()
+    finally:
+        watching.close()
+
+
+@asynccontextmanager
+async def mission_on_local_network(
+    mission: str = "local", clock: Clock | None = None, *, first_start: bool = True
+) -> AsyncIterator[LocalNetwork]:
+    """Give a network inside this process on which a nameserver is ready."""
+    network = LocalNetwork(mission)
+    time = clock or VirtualClock()
+    launch = Launch(
+        mission,
+        Subsystem.BACKBONE,
+        "nameserver",
+        "nameserver",
+        "backbone.nameserver.service:Nameserver",
+        "local",
+        "",
+        0.0,
+        time.rate,
+        {"first_start": first_start},
+    )
+    async with run_beside(Nameserver(launch, network.join(launch.address, time), time)):
+        yield network
+
+
+@pytest.fixture(scope="session")
+def local_mission() -> MissionNetwork:
+    """Return ``async with local_mission() as network``: a ``LocalNetwork`` with a nameserver that is ready.
+
+    Example:
+        >>> def test_components_register(local_mission):
+        ...     async def main() -> None:
+        ...         async with local_mission() as network:
+        ...             ...
+        ...     run_virtual(main())
+    """
+    return mission_on_local_network
+
+
+@pytest.fixture(scope="session")
+def beside() -> Callable[[Component[Any]], AbstractAsyncContextManager[Component[Any]]]:
+    """Return ``async with beside(component)``: it lives from its readiness to the end of the block."""
+    return run_beside
