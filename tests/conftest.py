@@ -35,7 +35,7 @@ def _no_task_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     ) -> None:
         if kind is None:
             left.extend(sorted(task.get_name() for task in asyncio.all_tasks(runner.get_loop())))
-        leave(runner, kind, error, at)
+        leave(runner, kind, error, trace)
 
     monkeypatch.setattr(asyncio.Runner, "__exit__", look_and_leave)
     yield
