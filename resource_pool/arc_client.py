@@ -7,13 +7,17 @@ speaks to it while they are there. Everything said here is refused by the ARC if
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from backbone.bus.interface import Bus, Subscription
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.companion import Companion
+from backbone.component.messages import Stop, Stopping
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, Start, Started, StopComponent
@@ -31,6 +35,7 @@ from resource_pool.messages import (
     Frame,
     Halt,
     Jump,
+    NoSuchAction,
     Noted,
     Release,
     Resumed,
@@ -43,23 +48,40 @@ from resource_pool.messages import (
 )
 
 __all__ = [
+    "DEFAULT_DRIVE_USAGE",
     "Applied",
     "ArcClient",
     "ArcListener",
     "ArcNotice",
     "ArcState",
+    "AskBeat",
     "Frame",
+    "NoSuchAction",
+    "NotMyArc",
+    "Noted",
+    "PathNode",
     "Resumed",
     "Suspended",
     "Suspending",
     "SwappedOut",
     "Usage",
+    "arc_name",
+    "claim_parameters",
+    "notice_arc",
 ]
 
 log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: a command that takes longer is worth a stop
 START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are only now being started
+AGAIN_FIRST_S, AGAIN_MOST_S = 0.05, 1.0  # chosen: a restarted placer is back within the first few; machine seconds
+
+
+class NotMyArc(Refusal):
+    """A notice came from an ARC this decision process does not claim."""
+
+    code = "arc.not_mine"
+    remedy = "Nothing to do: an ARC whose owner does not know it ends by itself."
 
 
 class ArcListener(Protocol):
@@ -126,20 +148,18 @@ class ArcClient:
             LinkError: The placer did not answer; the outcome is unknown.
         """
         client = cls(bus, arc_name(bus, kind), listener)
-        await client.start(
-            kind,
-            {
-                "owner": bus.source,
-                "path": [[node.name, node.priority] for node in path],
-                "console": console,
-                "minimum_runtime_s": minimum_runtime_s,
-                "maximum_runtime_s": maximum_runtime_s,
-                "wish": wish or {},
-                "features": features or {},
-                "usage": [usage.period_s, usage.packet_time_s, usage.deadline_s, usage.jitter_s, usage.kind],
-                "idle": idle,
-            },
+        parameters = claim_parameters(
+            bus.source,
+            path=path,
+            minimum_runtime_s=minimum_runtime_s,
+            maximum_runtime_s=maximum_runtime_s,
+            wish=wish,
+            features=features,
+            usage=usage,
+            console=console,
+            idle=idle,
         )
+        await client.start(kind, parameters)
         return client
 
     async def start(self, kind: str, parameters: dict[str, Any]) -> None:
@@ -147,10 +167,43 @@ class ArcClient:
         order = Start(kind, self.arc, parameters)
         await self._bus.ask(PLACER, order, Started, within_s=START_TIME_S)
 
+    async def keep(self, clock: Clock, kind: str, parameters: dict[str, Any]) -> None:
+        """Claim the ARC, and claim it again whenever it is gone, until cancelled.
+
+        The listener hears ``arc_suspended`` with the reason ``lost`` for a grant that ended with its ARC.
+
+        Args:
+            clock: The mission's time.
+            kind: As for ``claim``.
+            parameters: Made by ``claim_parameters``.
+
+        Raises:
+            Refusal: The ARC could not be started or its request can never be served.
+        """
+        while True:
+            await self._start_anew(clock, kind, parameters)
+            companion = Companion(self._bus, self.address)
+            agreeing = asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree")
+            try:
+                await companion.wait_gone()
+            finally:
+                companion.close()
+                agreeing.cancel()
+                await asyncio.gather(agreeing, return_exceptions=True)
+            await self._lost()
+
     async def handle(self, notice: ArcNotice) -> Noted:
-        """Take note of what the ARC says and tell the listener; the reply goes back to the ARC."""
+        """Take note of what the ARC says and tell the listener; the reply goes back to the ARC.
+
+        Raises:
+            NotMyArc: It comes from another ARC than the one claimed.
+        """
+        if notice_arc(notice) not in ("", self.arc):
+            raise NotMyArc(f"{notice_arc(notice)} is not claimed here, {self.arc} is", arc=notice_arc(notice))
         match notice:
             case Resumed():
+                if self.granted is not None and self.granted.epochs != notice.epochs:
+                    await self._lost()
                 self.granted, self.suspended = notice, None
                 self._granted.set()
                 await self._listener.arc_resumed(notice)
@@ -223,11 +276,85 @@ class ArcClient:
         except Refusal as refusal:
             log.info("%s was gone already: %s", self.arc, refusal.detail)
 
+    async def _start_anew(self, clock: Clock, kind: str, parameters: dict[str, Any]) -> None:
+        """Start the ARC; one that an earlier life of the owner left behind is ended first."""
+        pause_s = AGAIN_FIRST_S
+        while True:
+            try:
+                return await self.start(kind, parameters)
+            except NameTaken as refusal:
+                log.info("%s is left from before: %s", self.arc, refusal.detail)
+                await self._end_leftover()
+            except LinkError as error:
+                log.info("%s: claimed without an answer: %s", self.arc, error)
+            await clock.sleep_s(pause_s * clock.rate)
+            pause_s = min(2 * pause_s, AGAIN_MOST_S)
+
+    async def _end_leftover(self) -> None:
+        try:
+            await self._bus.ask(PLACER, StopComponent(self.arc, "left from before"), Ended, within_s=START_TIME_S)
+        except Refusal:  # a placer that never placed it cannot end it: it is told itself
+            with contextlib.suppress(LinkError):
+                await self._bus.ask(self.address, Stop("left from before"), Stopping, within_s=REPLY_TIME_S)
+        except LinkError as error:
+            log.info("%s: ended without an answer: %s", self.arc, error)
+
+    async def _agree_after_absence(self, companion: Companion) -> None:
+        """Ask what the ARC holds whenever it is back in sight: notices may have been missed meanwhile."""
+        await companion.wait_there()
+        while True:
+            await companion.wait_missing()
+            await companion.wait_there()
+            try:
+                state = await self.state()
+            except LinkError as error:
+                log.info("%s is back and does not answer: %s", self.arc, error)
+                continue
+            if state.granted and (self.granted is None or self.granted.epochs != state.epochs):
+                await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0))
+            elif self.granted is not None and not state.granted:
+                await self.handle(Suspended(self.arc, state.reason, state.by, state.expected_start_s))
+
+    async def _lost(self) -> None:
+        if self.granted is not None:
+            await self.handle(Suspended(self.arc, "lost", self.arc, -1.0))
+
     async def _do(self, command: Message) -> Applied:
         return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
 
     async def _say(self, wish: Message) -> None:
         await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)
+
+
+def claim_parameters(
+    owner: str,
+    *,
+    path: list[PathNode],
+    minimum_runtime_s: float,
+    maximum_runtime_s: float = 0.0,
+    wish: dict[str, str] | None = None,
+    features: dict[str, list[str]] | None = None,
+    usage: Usage = DEFAULT_DRIVE_USAGE,
+    console: bool = False,
+    idle: bool = False,
+) -> dict[str, Any]:
+    """Return the parameters an ARC is started with for this owner; see ``ArcClient.claim``."""
+    return {
+        "owner": owner,
+        "path": [[node.name, node.priority] for node in path],
+        "console": console,
+        "minimum_runtime_s": minimum_runtime_s,
+        "maximum_runtime_s": maximum_runtime_s,
+        "wish": wish or {},
+        "features": features or {},
+        "usage": [usage.period_s, usage.packet_time_s, usage.deadline_s, usage.jitter_s, usage.kind],
+        "idle": idle,
+    }
+
+
+def notice_arc(notice: ArcNotice) -> str:
+    """Return the ARC a notice comes from, empty if it does not say."""
+    return "" if isinstance(notice, AskBeat) else notice.arc
 
 
 def arc_name(bus: Bus, kind: str) -> str:
