@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from types import TracebackType
@@ -72,26 +73,25 @@ async def _wait_ready(component: Component[Any]) -> None:
 
 
 @asynccontextmanager
-async def mission_on_local_network(
-    mission: str = "local", clock: Clock | None = None, *, first_start: bool = True
-) -> AsyncIterator[LocalNetwork]:
-    """Give a network inside this process on which a nameserver is ready."""
+async def mission_on_local_network(mission: str = "local", clock: Clock | None = None) -> AsyncIterator[LocalNetwork]:
+    """Give a network inside this process on which the mission's first nameserver is ready."""
     network = LocalNetwork(mission)
     time = clock or VirtualClock()
-    launch = Launch(
-        mission,
-        Subsystem.BACKBONE,
-        "nameserver",
-        "nameserver",
-        "backbone.nameserver.service:Nameserver",
-        "local",
-        "",
-        0.0,
-        time.rate,
-        {"first_start": first_start},
-    )
-    async with run_beside(Nameserver(launch, network.join(launch.address, time), time)):
-        yield network
+    with tempfile.TemporaryDirectory() as run_directory:
+        launch = Launch(
+            mission,
+            Subsystem.BACKBONE,
+            "nameserver",
+            "nameserver",
+            "backbone.nameserver.service:Nameserver",
+            "local",
+            "",
+            0.0,
+            time.rate,
+            run_directory=run_directory,
+        )
+        async with run_beside(Nameserver(launch, network.join(launch.address, time), time)):
+            yield network
 
 
 @pytest.fixture(scope="session")

@@ -2,19 +2,21 @@
 
 It starts first (RAM 2002, "Backbone": everything else finds each other through it) and is the one
 process the others' links end at, so it hears of every death within milliseconds.
+
+A hub that is the mission's first knows that nobody can come back, so its lists are complete from the
+beginning and bring-up need not wait. It leaves a file in the run directory by which the next one knows better.
 """
 
 from __future__ import annotations
 
 import asyncio
 import os
+from pathlib import Path
 from typing import Any, assert_never
-
-import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
-from backbone.component.component import Component
+from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import AskState, ComponentState
 from backbone.errors import LinkError, Refusal
@@ -35,24 +37,13 @@ from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, 
 from backbone.naming import IllegalName, component_of, read_claim
 from backbone.wire import Envelope, Message, UnknownMessage
 
+HUB_BEGAN = "hub-began"
 INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; its token is then all we know
 
 
-class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How the nameserver begins.
-
-    Attributes:
-        first_start: True only if no hub of this mission ran before: then nobody can come back, and lists are
-            complete from the beginning.
-    """
-
-    first_start: bool = False
-
-
-class Nameserver(Component[NameserverParameters]):
+class Nameserver(Component[NoParameters]):
     """Registers components by name and announces who appears and disappears."""
 
-    parameters_type = NameserverParameters
     accepts = NameserverQuestion
     registers = False
 
@@ -63,7 +54,7 @@ class Nameserver(Component[NameserverParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        reconnect_s = 0.0 if self.parameters.first_start else RECONNECT_S * clock.rate
+        reconnect_s = 0.0 if _is_first(launch) else RECONNECT_S * clock.rate
         self._registry = Registry(clock.now_s(), reconnect_s, CLAIM_WITHIN_S * clock.rate)
         self._to_introduce: asyncio.Queue[str] = asyncio.Queue()
         self._registrations = self._refusals = self._appeared = self._disappeared = self._unanswered = 0
@@ -173,3 +164,16 @@ class Nameserver(Component[NameserverParameters]):
             if not self._registry.is_unknown(address):
                 return
             await self.clock.sleep_s(INTRODUCE_EACH_S * self.clock.rate)
+
+
+def _is_first(launch: Launch) -> bool:
+    """Say whether no hub of this mission ran before; without a run directory nobody knows, so one may have."""
+    if not launch.run_directory:
+        return False
+    directory = Path(launch.run_directory)
+    directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+    try:
+        (directory / HUB_BEGAN).touch(exist_ok=False)
+    except FileExistsError:
+        return False
+    return True

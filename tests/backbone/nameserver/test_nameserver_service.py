@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -53,8 +54,9 @@ def probe(network: LocalNetwork, name: str = "scout1", kind: type[Probe] = Probe
     return kind(launch, network.join(launch.address, clock), clock)
 
 
-def nameserver(network: LocalNetwork, **parameters: Any) -> Nameserver:
-    launch = Launch("local", Subsystem.BACKBONE, "nameserver", "nameserver", "x:Y", "a", "", 0.0, 1.0, parameters)
+def nameserver(network: LocalNetwork, run_directory: str = "") -> Nameserver:
+    address = (Subsystem.BACKBONE, "nameserver", "nameserver")
+    launch = Launch("local", *address, "x:Y", "a", "", 0.0, 1.0, run_directory=run_directory)
     clock = VirtualClock()
     return Nameserver(launch, network.join(launch.address, clock), clock)
 
@@ -171,18 +173,19 @@ def test_a_component_that_begins_while_the_nameserver_restarts_is_registered(bes
     run_virtual(main())
 
 
-def test_a_restarted_nameserver_asks_the_living_who_they_are(local_mission: Any) -> None:
+def test_a_restarted_nameserver_asks_the_living_who_they_are(tmp_path: Path) -> None:
     async def main() -> None:
         network = LocalNetwork()
-        first = nameserver(network, first_start=True)
+        first = nameserver(network, str(tmp_path / "run"))
         lives = [asyncio.create_task(first.run())]
         scouts = [probe(network, name) for name in ("scout1", "scout2")]
         lives += [asyncio.create_task(one.run()) for one in scouts]
-        await VirtualClock().sleep_s(5.0)
+        await VirtualClock().sleep_s(0.1)
         assert (await listed(network)).complete
+        await VirtualClock().sleep_s(4.9)
         first.end("killed")
         await lives[0]
-        second = nameserver(network)
+        second = nameserver(network, str(tmp_path / "run"))
         lives.append(asyncio.create_task(second.run()))
         await VirtualClock().sleep_s(0.1)
         found = await listed(network)
