@@ -15,6 +15,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+from collections import deque
 from collections.abc import Coroutine, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,6 +100,7 @@ log = logging.getLogger(__name__)
 RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
 ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it answers
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
+SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
 RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
@@ -169,7 +171,8 @@ class RcManager(Component[RcManagerParameters]):
         self._news = asyncio.Event()
         self._trace: TextIO | None = None
         self._found = _Found({}, {})
-        self._switch_times_s: list[float] = []
+        self._revoked_s: dict[str, float] = {}
+        self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
@@ -270,7 +273,8 @@ class RcManager(Component[RcManagerParameters]):
                 self._wake.set()
             case ConnectArc(arc=arc):
                 self._switch(arc, self._connect(instruction))
-            case RevokeArc(arc=arc):
+            case RevokeArc(arc=arc, epochs=epochs):
+                self._revoked_s |= dict.fromkeys(epochs, self.clock.now_s())
                 self._switch(arc, self._revoke(instruction))
             case _:
                 assert_never(instruction)
@@ -297,18 +301,23 @@ class RcManager(Component[RcManagerParameters]):
 
     # ------------------------------------------------------------------ context switches
     async def _connect(self, order: ConnectArc) -> None:
-        began_s = self.clock.now_s()
         uses = self._uses.get(order.arc, {})
         failed = await self._connect_rcs(order, uses)
         if failed is None:
             opened = await self._open_gate(order)
             if opened:
-                self._switch_times_s.append(max(0.0, self.clock.now_s() - began_s - order.settle_s))
+                self._measure_switch(order)
                 self.happened(Opened(order.arc))
                 return
             failed = ""
         await self._disconnect_rcs(order.arc, order.epochs, f"connection failed at {failed or order.arc}")
         self.happened(OpenFailed(order.arc, failed))
+
+    def _measure_switch(self, order: ConnectArc) -> None:
+        """Keep the time since the first of these RCs was revoked from another ARC, settling not counted."""
+        revoked = [self._revoked_s.pop(rc) for rc in order.epochs if rc in self._revoked_s]
+        if revoked:
+            self._switch_times_s.append(self.clock.now_s() - min(revoked) - order.settle_s)
 
     async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""

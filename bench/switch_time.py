@@ -1,0 +1,98 @@
+"""A context switch on real processes: from the revocation of one ARC to the grant of the next.
+
+Runs the mission of IROS 2001, figure 2, with short slices and no settling time, and reads what the RC
+manager measured: it revokes, four RCs disconnect, four connect, the ARC prepares and opens.
+Prints one JSON line; the floor is a bare zenoh question through the same kind of hub, asked in the same run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from statistics import quantiles
+from time import perf_counter
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.messages import AskState, AskStatistics, ComponentState, Statistics
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+
+MISSION = Path(__file__).parents[1] / "mission.xml"
+SLICE_S = 0.3
+
+
+def fast_mission(folder: Path) -> Path:
+    """Write the mission with short slices and no settling time; return its path."""
+    text = MISSION.read_text()
+    text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', text)
+    text = re.sub(r'\bconnect-s="[^"]*"', 'connect-s="0"', text)
+    text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', r"\g<1>switching", text, count=1)
+    file = folder / "mission.xml"
+    file.write_text(text)
+    return file
+
+
+async def measure(seconds: float) -> tuple[dict[str, float], list[float]]:
+    """Return the RC manager's statistics after some seconds, and the times of bare questions meanwhile."""
+    found = run_files.find("switching")
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    bus = await ZenohBus.open_when_up(found.mission, "ui_console/bench", clock, client_config(found.endpoint))
+    questions = []
+    try:
+        ends_s = clock.now_s() + seconds
+        while clock.now_s() < ends_s:
+            began = perf_counter()
+            await bus.ask(RC_MANAGER, AskState(), ComponentState, within_s=2)
+            questions.append(perf_counter() - began)
+            await clock.sleep_s(0.05)
+        values = (await bus.ask(RC_MANAGER, AskStatistics(), Statistics, within_s=2)).values
+    finally:
+        await bus.close()
+    return values, questions
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=30.0)
+    seconds = parser.parse_args().seconds
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        command = [
+            str(Path(sys.executable).parent / "scout-backbone"),
+            "up",
+            str(fast_mission(Path(folder))),
+            "--headless",
+        ]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
+            assert launcher.stderr is not None
+            next(line for line in launcher.stderr if line.startswith("all ready"))
+            values, questions = asyncio.run(measure(seconds))
+            launcher.terminate()
+            launcher.stderr.read()
+    floor_s = quantiles(questions, n=100)[49]
+    print(
+        json.dumps(
+            {
+                "bench": "switch_time",
+                "switches": int(values["switches"]),
+                "p50_ms": round(values["switch_p50_s"] * 1000, 2),
+                "p99_ms": round(values["switch_p99_s"] * 1000, 2),
+                "floor": "one question to the RC manager through the hub, in the same mission",
+                "floor_p50_ms": round(floor_s * 1000, 3),
+                "ratio": round(values["switch_p50_s"] / floor_s, 2),
+            }
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+"""What tests over real processes share."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Judged = Callable[..., None]
+
+
+def judge_path() -> Path | None:
+    """Return where the independent judge of schedule traces lies, if it is on this machine."""
+    given = os.environ.get("SCOUT_TRACE_CHECK", "")
+    beside = Path(__file__).parents[3] / "shared" / "trace" / "trace_check.py"
+    for path in (Path(given) if given else beside, beside):
+        if path.is_file():
+            return path
+    return None
+
+
+@pytest.fixture
+def judged() -> Judged:
+    """Return a check that the judge finds no violation in a trace, but for the codes allowed."""
+
+    def check(trace: Path, allowed: frozenset[str] = frozenset()) -> None:
+        judge = judge_path()
+        if judge is None:
+            return
+        done = subprocess.run([sys.executable, str(judge), str(trace)], capture_output=True, text=True, timeout=60, check=False)
+        violations = [line for line in done.stdout.splitlines() if line.split(": ", 1)[-1].split(" ")[0] not in allowed]
+        assert len(violations) == 1, done.stdout + done.stderr
+
+    return check

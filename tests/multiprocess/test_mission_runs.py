@@ -1,0 +1,137 @@
+"""The mission of IROS 2001, figure 2, as real processes."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from running_mission import RunningMission, mission_up
+
+from resource_pool.messages import AskPose, Pose
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
+
+CORE_ORDER = ["nameserver", "component_database", "placer", "creator-base", "dependency_database", "rc_manager"]
+
+
+def trace_of(file: Path) -> list[dict[str, object]]:
+    return [json.loads(line) for line in file.read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def mission() -> RunningMission:
+    with mission_up() as running:
+        yield running
+
+
+def test_core_services_become_ready_in_the_papers_order(mission: RunningMission) -> None:
+    """RAM 2002: nameserver, component database, placer, creators, static dependency database, RC manager."""
+    said = [re.sub(r"\s+\d+ ms$", "", line).strip("✓ ") for line in mission.lines if "✓" in line]
+    assert said[: len(CORE_ORDER)] == CORE_ORDER
+
+
+def test_status_lists_every_component_under_one_of_four_subsystems(mission: RunningMission) -> None:
+    status = mission.status()
+    by_name = {component["name"]: component for component in status["components"]}
+    assert set(CORE_ORDER) <= set(by_name)
+    assert {by_name[rc]["subsystem"] for rc in ("scout1", "scout2", "scout3", "radio", "video1", "grabber")} == {"resource_pool"}
+    assert by_name["watch-scout1"]["subsystem"] == "mission_control"
+    assert {rc["rc"] for rc in status["rcs"]} == {"scout1", "scout2", "scout3", "radio", "video1", "grabber"}
+    assert not status["problems"]
+
+
+def test_why_names_the_blocker_of_the_waiting_watcher(mission: RunningMission) -> None:
+    done = mission.command("scout-backbone", "why", "watch-scout1", "--json", "--mission", mission.name)
+    assert done.returncode == 0, done.stderr
+    why = json.loads(done.stdout)["why"]
+    assert why["state"] in ("running", "connecting", "waiting", "revoking")
+    if why["state"] == "waiting":
+        assert why["blockers"] == ["watch-scout2-capture"]
+
+
+def test_story_of_a_robot_tells_of_its_connections(mission: RunningMission) -> None:
+    done = mission.command("scout-backbone", "story", "scout1", "--mission", mission.name)
+    assert done.returncode == 0, done.stderr
+    assert "watch-scout1-capture" in done.stdout
+
+
+def test_a_second_core_service_is_refused_and_told_who_runs(mission: RunningMission) -> None:
+    done = mission.command("scout-backbone", "start", "rc_manager", "--mission", mission.name)
+    assert done.returncode == 5, done.stdout + done.stderr
+    assert "rc_manager" in done.stderr
+    assert "base" in done.stderr
+
+
+def test_a_second_mission_of_the_same_name_is_refused(mission: RunningMission) -> None:
+    file = Path(mission.environment["XDG_RUNTIME_DIR"]) / "mission.xml"
+    done = mission.command("scout-backbone", "up", str(file), "--headless")
+    assert done.returncode == 4
+    assert "is up" in done.stderr
+
+
+def test_components_are_started_and_stopped_while_the_others_keep_their_processes(mission: RunningMission) -> None:
+    before = {c["name"]: c["pid"] for c in mission.status()["components"] if "-capture" not in c["name"]}
+    started = mission.command("scout-backbone", "start", "video_frequency", "--name", "video9", "--mission", mission.name)
+    assert started.returncode == 0, started.stderr
+    assert mission.component("video9")["state"] == "ready"
+    stopped = mission.command("scout-backbone", "stop", "video9", "--mission", mission.name)
+    assert stopped.returncode == 0, stopped.stderr
+    after = {c["name"]: c["pid"] for c in mission.status()["components"]}
+    assert "video9" not in after
+    assert {name: after.get(name) for name in before if not name.startswith("cli-")} == {
+        name: pid for name, pid in before.items() if not name.startswith("cli-")
+    }
+
+
+async def test_a_console_drives_a_robot_and_its_behavior_goes_on_afterwards(mission: RunningMission) -> None:
+    watcher = mission.component("watch-scout1")["pid"]
+    async with mission.bus() as bus:
+        before = await bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=2)
+        script = '{"at_s":0.2,"left_rad_s":6,"right_rad_s":-6}\n{"at_s":1.2,"release":true}\n'
+        done = mission.command(
+            "scout-console", "attach", "scout1", "--priority", "100", "--mission", mission.name, "--script", "-", stdin=script
+        )
+        after = await bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=2)
+    events = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{mission.story()}"
+    kinds = [event["event"] for event in events]
+    assert kinds[0] == "granted"
+    assert "applied" in kinds
+    assert kinds[-1] == "released"
+    turned = math.remainder(after.heading_rad - before.heading_rad, math.tau)
+    assert abs(turned) > 0.5, f"turned {turned:.2f} rad\n{mission.story()}"
+    assert mission.component("watch-scout1")["pid"] == watcher
+
+
+def test_an_unknown_robot_is_refused_with_a_remedy(mission: RunningMission) -> None:
+    done = mission.command("scout-console", "attach", "scout7", "--mission", mission.name, "--script", "-", stdin="")
+    assert done.returncode == 5, done.stdout + done.stderr
+    refused = json.loads(done.stdout.splitlines()[-1])
+    assert refused["event"] == "refused"
+    assert refused["remedy"]
+
+
+def test_equal_watchers_take_turns_and_the_judge_agrees(tmp_path: Path, judged) -> None:
+    """IROS 2001, section 5.1: five seconds each, round robin."""
+    trace = tmp_path / "run.jsonl"
+    with mission_up("--trace", str(trace), "--for", "22") as running:
+        assert running.launcher.wait(90) == 0, running.story()
+    lines = trace_of(trace)
+    grants = [(line["arc"], line["t"]) for line in lines if line["ev"] == "grant"]
+    arcs = [arc for arc, _ in grants]
+    assert len(arcs) >= 4, running.story()
+    assert all(first != second for first, second in pairwise(arcs))
+    starts = [at for _, at in grants]
+    assert all(5.0 <= later - earlier <= 5.8 for earlier, later in pairwise(starts)), starts
+    judged(trace)
+
+
+def test_two_missions_run_side_by_side() -> None:
+    with mission_up() as one, mission_up() as other:
+        ones, others = one.status(), other.status()
+        assert ones["mission"] != others["mission"]
+        assert not {c["pid"] for c in ones["components"]} & {c["pid"] for c in others["components"]}

@@ -1,0 +1,103 @@
+"""SIGKILL of each process of a running mission, one at a time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from running_mission import RunningMission, mission_up, wait_gone
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
+
+RECOVERED_WITHIN_S = 20.0
+VICTIMS = [
+    "watch-scout1",
+    "watch-scout1-capture",
+    "surveillance",
+    "scout1",
+    "radio",
+    "video1",
+    "grabber",
+    "world",
+    "dependency_database",
+    "component_database",
+    "placer",
+    "rc_manager",
+    "nameserver",
+    "creator-base",
+]
+
+
+def wait_until(mission: RunningMission, what: str, holds: Callable[[dict], bool]) -> dict:
+    """Return the status as soon as it fulfills the condition."""
+    deadline = time.monotonic() + RECOVERED_WITHIN_S
+    status: dict = {}
+    while time.monotonic() < deadline:
+        done = mission.command("scout-backbone", "status", "--json", "--mission", mission.name)
+        if done.returncode == 0:
+            import json
+
+            status = json.loads(done.stdout)
+            if holds(status):
+                return status
+    raise AssertionError(f"not within {RECOVERED_WITHIN_S} s: {what}\n{status}\n{mission.story()}")
+
+
+def names(status: dict) -> set[str]:
+    return {c["name"] for c in status["components"] if c["state"] == "ready" and not c["name"].startswith("cli-")}
+
+
+def turns(status: dict) -> dict[str, int]:
+    return {request["arc"]: request["turns"] for request in status["requests"]}
+
+
+def both_watchers_ask(status: dict) -> bool:
+    return {"watch-scout1-capture", "watch-scout2-capture"} <= set(turns(status))
+
+
+def somebody_runs(status: dict) -> bool:
+    return any(request["state"] == "running" for request in status["requests"])
+
+
+def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_path: Path) -> None:
+    trace = tmp_path / "run.jsonl"
+    with mission_up("--trace", str(trace)) as mission:
+        expected = names(wait_until(mission, "both watchers ask", lambda s: both_watchers_ask(s) and somebody_runs(s)))
+        for victim in VICTIMS:
+            before = mission.component(victim)["pid"]
+            os.kill(before, signal.SIGKILL)
+
+            def recovered(status: dict, victim: str = victim, before: int = before) -> bool:
+                pids = {c["name"]: c["pid"] for c in status["components"]}
+                return (
+                    pids.get(victim, before) != before
+                    and expected <= names(status)
+                    and both_watchers_ask(status)
+                    and somebody_runs(status)
+                    and not status["problems"]
+                )
+
+            status = wait_until(mission, f"recovery from the death of {victim}", recovered)
+            for rc in status["rcs"]:
+                assert rc["sharable"] or len(rc["holders"]) <= 1, rc
+        assert mission.down() in (0, 6), mission.story()
+
+
+def test_nothing_is_left_after_the_death_of_the_launcher() -> None:
+    with mission_up() as mission:
+        mission.launcher.send_signal(signal.SIGKILL)
+        mission.launcher.wait(5)
+        left = wait_gone(mission.environment["SCOUT_TEST_MARK"], 3.0)
+        assert not left, f"{left}\n{mission.story()}"
+        assert not mission.directory.exists()
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_mission_cleanly(how: signal.Signals) -> None:
+    with mission_up() as mission:
+        mission.launcher.send_signal(how)
+        assert mission.launcher.wait(20) == 0, mission.story()
