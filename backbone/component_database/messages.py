@@ -91,4 +91,11 @@ class CoreService(Refusal):
     remedy = "Core services start with 'scout-backbone up' and are restarted by it."
 
 
+class RunningUnknown(Refusal):
+    """Who runs is not known now, so nothing can be admitted by it."""
+
+    code = "component_database.running_unknown"
+    remedy = "Ask again when the nameserver is back."
+
+
 ComponentDatabaseQuestion = Admit | ListTypes

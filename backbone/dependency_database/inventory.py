@@ -1,0 +1,148 @@
+"""Inventory: which hardware exists, and which sets of RCs an ARC could have.
+
+Rules:
+
+* A set has one RC of each kind asked for, fits the wish and the features, and respects every link: an
+  RC that can only be used with some others of a kind is never put beside another one of that kind.
+* Sets come in the mission file's order: the first kind's resources vary slowest.
+* Either at least one set, or a refusal that names the part of the wish nothing fits.
+
+Source: S000, "static dependency database": all hardware available now, described right before the mission.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from backbone.dependency_database.messages import FindRcs, NoSuchHardware, Resource
+from backbone.naming import did_you_mean
+
+MOST_SETS = 4096  # chosen: 16 robots × 16 frequencies × 16 radios; nobody chooses among more
+
+
+class Inventory:
+    """All hardware of one mission, which does not change while it runs.
+
+    Args:
+        resources: In the mission file's order, names unique.
+    """
+
+    def __init__(self, resources: Sequence[Resource]) -> None:
+        self._resources = tuple(resources)
+
+    @property
+    def resources(self) -> list[Resource]:
+        """All resources, sorted by name."""
+        return sorted(self._resources, key=lambda resource: resource.name)
+
+    def find(self, wanted: FindRcs) -> list[dict[str, str]]:
+        """Return the sets of RCs that would do, kind → name, at most ``MOST_SETS``.
+
+        Raises:
+            NoSuchHardware: None would; facts: ``role``, the kind nothing fits.
+        """
+        self._refuse_contradictions(wanted)
+        candidates = {role: self._candidates(role, wanted) for role in wanted.roles}
+        found: list[dict[str, str]] = []
+        for chosen in _sets(wanted.roles, candidates, {}):
+            found.append({role: resource.name for role, resource in chosen.items()})
+            if len(found) == MOST_SETS:
+                break
+        if not found:
+            raise _nothing_fits_together(wanted, candidates)
+        return found
+
+    def _refuse_contradictions(self, wanted: FindRcs) -> None:
+        if not wanted.roles:
+            raise NoSuchHardware("no kind of hardware is asked for", role="")
+        for role in wanted.roles:
+            if wanted.roles.count(role) > 1:
+                raise NoSuchHardware(f"{role} is asked for twice; a set has one of each kind", role=role)
+        for what, kinds in (("wish", wanted.wish), ("features", wanted.features)):
+            for kind in kinds:
+                if kind not in wanted.roles:
+                    hint = did_you_mean(kind, wanted.roles)
+                    raise NoSuchHardware(
+                        f"the {what} names {kind!r}{hint}, but only {_listed(wanted.roles)} is asked for", role=kind
+                    )
+
+    def _candidates(self, role: str, wanted: FindRcs) -> list[Resource]:
+        """Return the resources of this kind that fit by themselves.
+
+        Raises:
+            NoSuchHardware: None does.
+        """
+        kind = [resource for resource in self._resources if resource.type == role]
+        if not kind:
+            hint = did_you_mean(role, {resource.type for resource in self._resources})
+            raise NoSuchHardware(f"no {role!r} exists{hint}", role=role)
+        name = wanted.wish.get(role)
+        named = [resource for resource in kind if name in (None, resource.name)]
+        if not named:
+            names = [resource.name for resource in kind]
+            raise NoSuchHardware(
+                f"no {role} is named {name!r}{did_you_mean(str(name), names)}; there is {_listed(names)}",
+                role=role,
+                name=str(name),
+            )
+        features = wanted.features.get(role, [])
+        fitting = [resource for resource in named if set(features) <= set(resource.features)]
+        if not fitting:
+            raise _lacks_features(role, named, features)
+        return fitting
+
+
+def _sets(
+    roles: Sequence[str], candidates: Mapping[str, Sequence[Resource]], chosen: dict[str, Resource]
+) -> Iterator[dict[str, Resource]]:
+    """Yield every way to add the remaining roles to those already chosen."""
+    if len(chosen) == len(roles):
+        yield chosen
+        return
+    role = roles[len(chosen)]
+    for resource in candidates[role]:
+        if all(_go_together(resource, other) for other in chosen.values()):
+            yield from _sets(roles, candidates, {**chosen, role: resource})
+
+
+def _go_together(one: Resource, other: Resource) -> bool:
+    return _allows(one, other) and _allows(other, one)
+
+
+def _allows(one: Resource, other: Resource) -> bool:
+    return other.type not in one.links or other.name in one.links[other.type]
+
+
+def _lacks_features(role: str, named: Sequence[Resource], features: Sequence[str]) -> NoSuchHardware:
+    known = {feature for resource in named for feature in resource.features}
+    who = named[0].name if len(named) == 1 else f"no {role}"
+    for feature in features:
+        if feature not in known:
+            verb = "has no" if len(named) == 1 else "has"
+            return NoSuchHardware(f"{who} {verb} {feature!r}{did_you_mean(feature, known)}", role=role, feature=feature)
+    return NoSuchHardware(f"no {role} has all of {_listed(features)}", role=role)
+
+
+def _nothing_fits_together(wanted: FindRcs, candidates: Mapping[str, Sequence[Resource]]) -> NoSuchHardware:
+    """Name the first kind that finds no partner among the kinds before it, and what its resources want instead."""
+    for count in range(2, len(wanted.roles) + 1):
+        roles = wanted.roles[:count]
+        if next(_sets(roles, candidates, {}), None) is None:
+            break
+    role, before = roles[-1], roles[:-1]
+    why = [
+        f"{one.name} goes only with {kind} {_listed(names)}"
+        for other in roles
+        for one in candidates[other]
+        for kind, names in one.links.items()
+        if kind in roles
+    ]
+    wish = ", ".join(f"{kind} {name}" for kind, name in wanted.wish.items() if kind in roles)
+    return NoSuchHardware(
+        f"no {role} goes together with {_listed(before)}{f' as wished ({wish})' if wish else ''}: {'; '.join(why)}",
+        role=role,
+    )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) or "none"

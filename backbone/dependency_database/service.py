@@ -1,0 +1,77 @@
+"""The static dependency database: tells which hardware exists and which sets of it would do."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.dependency_database.inventory import Inventory
+from backbone.dependency_database.messages import (
+    AskResources,
+    DependencyDatabaseQuestion,
+    FindRcs,
+    NoSuchHardware,
+    RcSets,
+    Resource,
+    Resources,
+)
+from backbone.wire import Envelope, Message, UnknownMessage
+
+
+class DependencyDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the mission file says of its hardware.
+
+    Attributes:
+        resources: As ``msgspec.to_builtins`` writes them, in the mission file's order.
+    """
+
+    resources: list[Resource] = []
+
+
+class DependencyDatabase(Component[DependencyDatabaseParameters]):
+    """Answers from its parameters alone, so a restarted one knows as much as the first."""
+
+    parameters_type = DependencyDatabaseParameters
+    accepts = DependencyDatabaseQuestion
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._inventory = Inventory(self.parameters.resources)
+        self._found = self._refused = 0
+
+    def parameters_changed(self) -> None:
+        """Answer from the new list of hardware from now on."""
+        self._inventory = Inventory(self.parameters.resources)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer ``AskResources`` and ``FindRcs``."""
+        match asked.body:
+            case AskResources():
+                return Resources(self._inventory.resources)
+            case FindRcs() as wanted:
+                return RcSets(self._find(wanted, asked.source))
+            case other:
+                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+
+    def statistics(self) -> dict[str, float]:
+        """Return how much hardware there is and how searches for it ended."""
+        return {
+            "resources": float(len(self.parameters.resources)),
+            "searches_found": float(self._found),
+            "searches_refused": float(self._refused),
+        }
+
+    def _find(self, wanted: FindRcs, asker: str) -> list[dict[str, str]]:
+        try:
+            sets = self._inventory.find(wanted)
+        except NoSuchHardware as refusal:
+            self._refused += 1
+            self.story.note(asker, f"found no hardware: {refusal.detail}")
+            raise
+        self._found += 1
+        self.story.note(asker, f"found {len(sets)} sets of {', '.join(wanted.roles)}")
+        return sets
