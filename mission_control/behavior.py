@@ -1,0 +1,515 @@
+"""Behavior: base of every decision process that is no console.
+
+A behavior claims at most one ARC, hears when its RCs come and go, starts its children through the
+placer and tells its parent how far it is. Derive, override the hooks you need; each hook says when
+it is called, what it is for and what not to do in it. ``behaviors/skeleton.py`` is one to copy.
+
+State kept on ``self`` survives every suspension: the process goes on, only its RCs are lent out.
+
+Source: SMC 2000 and RAM 2002, "Mission Control".
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import types
+from collections.abc import Coroutine, Mapping, Sequence
+from typing import Any, ClassVar, Generic, TypeVar, assert_never
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.companion import Companion
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.component.messages import LifeState
+from backbone.creator.messages import ProcessFell, creator_name
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.keys import Conversation
+from backbone.mission.behavior_orders import PathStep
+from backbone.nameserver.messages import NameTaken
+from backbone.naming import Subsystem, address, component_of
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import (
+    AskPlacement,
+    Ended,
+    NotPlaced,
+    Placement,
+    Start,
+    Started,
+    StopComponent,
+)
+from backbone.wire import Envelope, Message, UnknownMessage
+from mission_control.behavior_tree import (
+    ArcNeed,
+    BehaviorNode,
+    Children,
+    Decision,
+    FinishParent,
+    Instruction,
+    StartChild,
+    StopChild,
+    draw,
+)
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
+from resource_pool.arc_client import (
+    ArcClient,
+    ArcNotice,
+    Frame,
+    NotMyArc,
+    PathNode,
+    Resumed,
+    Suspended,
+    Suspending,
+    SwappedOut,
+    Usage,
+    arc_name,
+    claim_parameters,
+)
+
+log = logging.getLogger(__name__)
+
+REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
+START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
+DRAIN_TIME_S = 3.0  # chosen: shorter than the time its creator gives it before SIGTERM
+AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
+
+
+class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What the tree gives every behavior; derive and add the behavior's own parameters, with defaults.
+
+    Attributes:
+        path: Names and priorities from the mission's root to this node; empty: it was started by hand.
+        arc: The ARC it claims, if any.
+        children: Nodes it starts.
+    """
+
+    path: list[PathStep] = []
+    arc: ArcNeed | None = None
+    children: list[BehaviorNode] = []
+
+
+class NotAChild(Refusal):
+    """A report came from a component that is no child of this behavior."""
+
+    code = "behavior.not_a_child"
+    remedy = "Report to the behavior named before you in your path."
+
+
+B = TypeVar("B", bound=BehaviorParameters)
+
+
+class Behavior(Component[B], Generic[B]):
+    """A node of the behavior tree, running.
+
+    Class variables to set: ``parameters_type``, and ``children_together`` (False: one after the other).
+    """
+
+    parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | Report | AskBehavior
+    children_together: ClassVar[bool] = True
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, Any]()
+        self.rcs: Mapping[str, str] = {}
+        """Kind → name of the RCs held now; empty while suspended."""
+        self.arc: ArcClient | None = None
+        """The hold on its ARC; None if it claims none."""
+        self.times_resumed = self.times_suspended = self.frames_seen = 0
+        self._nodes = {node.name: node for node in self.parameters.children}
+        self._children = Children(list(self._nodes), together=self.children_together)
+        self._watched: dict[str, asyncio.Task[None]] = {}
+        self._heard_creators: dict[str, Subscription] = {}
+        self._suspended_because = ""
+        self._parent: Companion | None = None
+        self._keeping: asyncio.Task[None] | None = None
+        self._acting: asyncio.Task[None] | None = None
+
+    # ------------------------------------------------------------------ hooks
+    async def start(self) -> None:
+        """Prepare.
+
+        When: once, after the component is ready, before the ARC is claimed and children are started.
+        What: subscribe to others' events, set up state. Not: wait for the ARC or for children.
+        """
+
+    async def resumed(self, rcs: Mapping[str, str]) -> None:
+        """Go on.
+
+        When: each time the RCs are held, commands pass and pictures arrive from now on; the first time too.
+        What: tell algorithms that time has passed. Not: drive in a loop; that is ``act``.
+
+        Args:
+            rcs: Kind → name of what is held.
+        """
+
+    async def act(self) -> None:
+        """Command the robot.
+
+        When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
+        What: await ``self.arc`` commands and the clock, keep progress on ``self``. A command that comes too
+        late for the grant ends it quietly; after a ``LinkError`` it is begun again.
+        Not: catch the cancellation and go on.
+        """
+
+    async def suspending(self, deadline_s: float) -> None:
+        """Stop cleanly.
+
+        When: the slice is about to end; not before an override by a human. Commands still pass.
+        What: bring the robot to rest; return as soon as that is done. Not: take longer than the deadline.
+
+        Args:
+            deadline_s: Seconds left.
+        """
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Take note that the RCs are gone.
+
+        When: after every loss of the RCs, also an unannounced one. What: keep the state, tell people.
+        Not: command anything; no picture arrives until ``resumed``.
+
+        Args:
+            reason: ``slice``, ``higher``, ``rc``, ``lost`` …
+            by: ARC or RC because of which.
+        """
+
+    def see(self, frame: Frame) -> None:
+        """Look at a picture.
+
+        When: for the newest picture of the current grant; older ones that were not yet seen are skipped.
+        What: detect, publish, ``report``. Not: take longer than a picture's period; nothing else runs meanwhile.
+        """
+
+    async def child_finished(
+        self,
+        child: str,  # noqa: ARG002  for those who override
+        status: BehaviorStatus,
+        payload: Mapping[str, Any],  # noqa: ARG002
+    ) -> Decision:
+        """Decide what comes after a child.
+
+        When: a child reported success or failure, could not be started, or fell too often.
+        What: return the decision; by default a failure aborts, a success goes on. Not: start or stop children here.
+        """
+        return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
+
+    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+        """Draw the conclusion from the children's end.
+
+        When: the last child finished, or one aborted the others. What: by default, finish with the same status.
+        """
+        self.finish(status, payload)
+
+    # ------------------------------------------------------------------ for derived classes
+    @property
+    def path(self) -> Sequence[PathStep]:
+        """Names and priorities from the mission's root to this node."""
+        return self.parameters.path or [(self.name, 0)]
+
+    @property
+    def children(self) -> Mapping[str, BehaviorStatus]:
+        """Status of each child that was started."""
+        return self._children.status
+
+    def finish(self, status: BehaviorStatus, payload: Mapping[str, Any] | None = None) -> None:
+        """Be done: the ARC is given back, children end, the parent hears it. Later calls change nothing."""
+        if self.status.is_final or not status.is_final:
+            return
+        self.status, self.payload = status, dict(payload or {})
+        self.announce(f"finished: {status}")
+        self._begin(self._wind_up(), "wind-up")
+
+    def tell_parent(self, payload: Mapping[str, Any]) -> None:
+        """Have the parent told how the work goes; lost if it cannot be reached just now."""
+        self.payload = dict(payload)
+        if self._parent is not None and not self.status.is_final:
+            self._begin(self._report_once(self._parent.address, self._report()), "report")
+
+    def announce(self, what: str) -> None:
+        """Let people know what just happened: it stands in the story and is published to logs and screens."""
+        self.bus.publish(self.address, Conversation.LOG, self.story.note(self.name, what))
+
+    # ------------------------------------------------------------------ the component's hooks
+    async def connect(self) -> None:
+        """Watch the parent, if it is a behavior: the first step of a path is the mission itself."""
+        if len(self.path) > 2:
+            parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
+            self._parent = Companion(self.bus, parent)
+
+    async def serve(self) -> None:
+        """Start, claim, bring up the children; then everything goes by events."""
+        if self._parent is not None:
+            self._begin(self._end_with(self._parent), "parent")
+        await self.start()
+        need = self.parameters.arc
+        if need is not None and not self.status.is_final:
+            self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self)
+            self.arc.frames(self._saw)
+            self._keeping = self._begin(self._keep(self.arc, need), "arc")
+        self._carry_out(self._children.begin())
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer the ARC, the children, and whoever asks how far it is."""
+        match asked.body:
+            case Report(child=child, status=status, payload=payload):
+                if child not in self._nodes or child != component_of(asked.source):
+                    raise NotAChild(f"{asked.source} is no child of {self.name}", child=child)
+                self._child_reported(child, status, payload)
+                return ReportNoted()
+            case AskBehavior():
+                return self.behavior_state()
+            case body if isinstance(body, ArcNotice):
+                if self.arc is None:
+                    raise NotMyArc(f"{self.name} claims no ARC")
+                return await self.arc.handle(body)
+            case _:
+                raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
+
+    async def drain(self) -> None:
+        """End the children and give the ARC back."""
+        stops = [i.name for i in self._children.end() if isinstance(i, StopChild)]
+        try:
+            async with asyncio.timeout(DRAIN_TIME_S):
+                await asyncio.gather(self._release(), *(self._stop_child(name) for name in stops))
+        except TimeoutError:  # they watch this behavior's token and end when it falls
+            log.warning("%s leaves before its ARC or children have ended", self.name)
+
+    def statistics(self) -> dict[str, float]:
+        """Return how often the RCs came and went, and how many pictures were seen."""
+        return {
+            "times_resumed": self.times_resumed,
+            "times_suspended": self.times_suspended,
+            "frames_seen": self.frames_seen,
+        }
+
+    def behavior_state(self) -> BehaviorState:
+        """Return how far it is."""
+        node = BehaviorNode(
+            self.launch.type, self.name, self.path[-1][1], arc=self.parameters.arc, children=self.parameters.children
+        )
+        remarks = {name: str(status) for name, status in self.children.items()} | {self.name: str(self.status)}
+        tree = draw([node], remarks)
+        return BehaviorState(self.name, self.status, self.payload, dict(self.rcs), self._suspended_because, tree)
+
+    # ------------------------------------------------------------------ the ARC
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Pass it on; see ``ArcListener``."""
+        self.rcs, self._suspended_because = notice.rcs, ""
+        self.times_resumed += 1
+        held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
+        self.story.note(self.name, f"resumed with {held}")
+        self.report(f"holds {held}")
+        await self.resumed(notice.rcs)
+        if self.rcs and not self.status.is_final:
+            await self._stop_acting()
+            self._acting = self._begin(self._act(), "act")
+
+    async def arc_suspending(self, notice: Suspending) -> None:
+        """Pass it on; see ``ArcListener``."""
+        await self._stop_acting()
+        await self.suspending(notice.deadline_s)
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Pass it on; see ``ArcListener``."""
+        self.rcs, self._suspended_because = {}, f"{notice.reason} by {notice.by}"
+        self.times_suspended += 1
+        self.story.note(self.name, f"suspended: {self._suspended_because}")
+        self.report(f"suspended: {self._suspended_because}")
+        await self._stop_acting()
+        await self.suspended(notice.reason, notice.by)
+
+    async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
+        parameters = claim_parameters(
+            self.address,
+            path=[PathNode(name, priority) for name, priority in self.path],
+            minimum_runtime_s=need.minimum_runtime_s,
+            maximum_runtime_s=need.maximum_runtime_s,
+            wish=need.wish,
+            features=need.features,
+            usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
+        )
+        try:
+            await arc.keep(self.clock, need.kind, parameters)
+        except Refusal as refusal:
+            self.report(f"no ARC: {refusal}")
+            self.finish(BehaviorStatus.FAILURE, _why(refusal))
+
+    def _saw(self, frame: Frame) -> None:
+        if self.rcs and not self.status.is_final:
+            self.frames_seen += 1
+            self.see(frame)
+
+    async def _act(self) -> None:
+        while True:
+            try:
+                return await self.act()
+            except SwappedOut as refusal:  # the grant ended first; ``resumed`` begins the next turn
+                log.info("%s stopped acting: %s", self.name, refusal.detail)
+                return None
+            except LinkError as error:
+                log.info("%s acts again: %s", self.name, error)
+            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+
+    async def _stop_acting(self) -> None:
+        acting, self._acting = self._acting, None
+        await _end_task(acting)
+
+    async def _release(self) -> None:
+        keeping, self._keeping = self._keeping, None
+        if keeping is None or self.arc is None:
+            return
+        await _end_task(keeping)
+        try:
+            await self.arc.release(f"{self.name} is done")
+        except LinkError as error:  # the ARC watches its owner's token and ends with it
+            log.info("%s: released without an answer: %s", self.arc.arc, error)
+
+    # ------------------------------------------------------------------ the children
+    def _carry_out(self, instructions: Sequence[Instruction]) -> None:
+        if instructions:
+            self._begin(self._carry_out_in_order(instructions), "children")
+
+    async def _carry_out_in_order(self, instructions: Sequence[Instruction]) -> None:
+        starting: list[Coroutine[Any, Any, None]] = []
+        for instruction in instructions:
+            match instruction:
+                case StartChild(name):
+                    starting.append(self._start_child(name))
+                case StopChild(name):
+                    await self._stop_child(name)
+                case FinishParent(status, payload):
+                    await self.children_finished(status, payload)
+                case _:
+                    assert_never(instruction)
+        await asyncio.gather(*starting)
+
+    async def _start_child(self, name: str) -> None:
+        order = self._nodes[name].order(self.path)
+        while True:
+            try:
+                host = await self._start_or_adopt(order)
+            except LinkError as error:
+                log.info("%s: started without an answer: %s", name, error)
+                await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+                continue
+            except Refusal as refusal:
+                self.announce(f"child {name} was refused: {refusal}")
+                self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
+                return
+            break
+        self._hear_creator(host)
+        watching = self._begin(self._watch_child(name), f"child {name}")
+        if watching is not None:
+            self._watched[name] = watching
+
+    async def _start_or_adopt(self, order: Start) -> str:
+        """Return the child's host. One that outlived an earlier life of this behavior is taken over as it is."""
+        try:
+            started = await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+        except NameTaken:
+            child = address(Subsystem.MISSION_CONTROL, order.name)
+            state = await self.bus.ask(child, AskBehavior(), BehaviorState, within_s=REPLY_TIME_S)
+            placement = await self.bus.ask(PLACER, AskPlacement(order.name), Placement, within_s=REPLY_TIME_S)
+            self.story.note(order.name, "was running and is taken over")
+            self._child_reported(order.name, state.status, state.payload)
+            return placement.host
+        return started.host
+
+    async def _stop_child(self, name: str) -> None:
+        await _end_task(self._watched.pop(name, None))
+        try:
+            await self.bus.ask(PLACER, StopComponent(name, f"{self.name} ends it"), Ended, within_s=START_TIME_S)
+        except (Refusal, LinkError) as error:
+            log.info("child %s: %s", name, error)
+
+    async def _watch_child(self, name: str) -> None:
+        """Notice that a child was ended by somebody else; one that fell is its creator's until given up."""
+        child = Companion(self.bus, address(Subsystem.MISSION_CONTROL, name))
+        try:
+            while True:
+                await child.wait_there()
+                await child.wait_gone()
+                try:
+                    await self.bus.ask(PLACER, AskPlacement(name), Placement, within_s=REPLY_TIME_S)
+                except NotPlaced:
+                    break
+                except LinkError as error:
+                    log.info("child %s is away, the placer does not answer: %s", name, error)
+        finally:
+            child.close()
+        self.announce(f"child {name} was ended by somebody else")
+        self._watched.pop(name, None)
+        self._carry_out(self._children.left(name))
+
+    def _hear_creator(self, host: str) -> None:
+        if host not in self._heard_creators:
+            creator = address(Subsystem.BACKBONE, creator_name(host))
+            self._heard_creators[host] = self.bus.subscribe(creator, Conversation.EVENTS, ProcessFell, self._heard_fall)
+
+    def _heard_fall(self, envelope: Envelope[Any]) -> None:
+        fell: ProcessFell = envelope.body
+        if fell.name in self._nodes and fell.restart_in_s < 0:
+            why = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
+            self._child_reported(fell.name, BehaviorStatus.FAILURE, why)
+
+    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+        if self._children.reported(name, status, payload):
+            self.story.note(name, f"finished: {status}")
+            self._begin(self._decide(name, status, payload), f"decide on {name}")
+
+    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+        decision = await self.child_finished(name, status, payload)
+        self.story.note(name, f"{decision} after {status}")
+        self._carry_out(self._children.decided(name, decision))
+
+    # ------------------------------------------------------------------ the parent
+    async def _end_with(self, parent: Companion) -> None:
+        await parent.wait_gone()
+        self.end(f"its parent {component_of(parent.address)} is gone")
+
+    async def _wind_up(self) -> None:
+        """Give back what is held, end the children, and tell the parent until it has noted it."""
+        await self._stop_acting()
+        stops = [i.name for i in self._children.end() if isinstance(i, StopChild)]
+        await asyncio.gather(self._release(), *(self._stop_child(name) for name in stops))
+        if self._parent is None:
+            return
+        while True:
+            await self._parent.wait_there()
+            if await self._report_once(self._parent.address, self._report()):
+                return
+            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+
+    async def _report_once(self, parent: str, report: Report) -> bool:
+        """Return True if there is nothing more to tell: it was noted, or the parent wants none of it."""
+        try:
+            await self.bus.ask(parent, report, ReportNoted, within_s=REPLY_TIME_S)
+        except LinkError as error:
+            log.info("%s did not hear the report: %s", parent, error)
+            return False
+        except Refusal as refusal:
+            log.warning("%s refused the report: %s", parent, refusal)
+        return True
+
+    def _report(self) -> Report:
+        return Report(self.name, self.status, self.payload)
+
+    def _begin(self, work: Coroutine[Any, Any, Any], name: str) -> asyncio.Task[None] | None:
+        """Run the coroutine as a task, unless the component is already on its way out."""
+        if self.state is not LifeState.READY:
+            work.close()
+            return None
+        return self.start_task(work, name)
+
+
+async def _end_task(task: asyncio.Task[None] | None) -> None:
+    """Cancel a task and return when it has ended; a bug in it is its group's matter."""
+    if task is not None and task is not asyncio.current_task():
+        task.cancel()
+        await asyncio.wait({task})
+
+
+def _why(refusal: Refusal) -> dict[str, Any]:
+    return {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}

@@ -1,0 +1,213 @@
+"""The behavior tree: nodes with priorities, and what a parent does about its children.
+
+Rules of this file: no bus, no clock. A priority counts among siblings only; who is higher of two
+nodes is decided by their paths from the root, in the RC manager.
+
+Source: SMC 2000, "Mission Control": behaviors spawn children; a finished child returns its status
+to its parent, which decides what comes next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import msgspec
+
+from backbone.mission.behavior_orders import PathStep, behavior_order
+from backbone.placer.messages import Start
+from mission_control.messages import BehaviorStatus
+
+
+class ArcNeed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The ARC a behavior claims.
+
+    Attributes:
+        kind: Component type of the ARC.
+        minimum_runtime_s: Shortest useful time, seconds, above 0.
+        wish: Kind of RC → name wanted.
+        features: Kind of RC → features wanted.
+        maximum_runtime_s: End of extensions, seconds; 0: the minimum.
+        period_s: Interval between radio packets, seconds.
+        packet_time_s: Air time of one packet, seconds.
+    """
+
+    kind: str
+    minimum_runtime_s: float
+    wish: dict[str, str] = {}
+    features: dict[str, list[str]] = {}
+    maximum_runtime_s: float = 0.0
+    period_s: float = 0.05
+    packet_time_s: float = 0.002
+
+
+class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A node of the tree, with its branch.
+
+    Attributes:
+        type: Component type.
+        name: Name of the node and of its component.
+        priority: Among its siblings; larger is higher.
+        parameters: Its own parameters.
+        arc: What it claims, if anything.
+        children: Nodes it starts.
+    """
+
+    type: str
+    name: str
+    priority: int
+    parameters: dict[str, Any] = {}
+    arc: ArcNeed | None = None
+    children: list[BehaviorNode] = []
+
+    def order(self, parent_path: Sequence[PathStep]) -> Start:
+        """Return the order that starts this node under a parent with that path."""
+        plain: dict[str, Any] = msgspec.to_builtins(self)
+        return behavior_order(plain, parent_path)
+
+
+def walk(nodes: Sequence[BehaviorNode], path: Sequence[PathStep] = ()) -> Iterator[tuple[list[PathStep], BehaviorNode]]:
+    """Yield every node with its path, parents before their children, in the given order."""
+    for node in nodes:
+        own = [*path, (node.name, node.priority)]
+        yield own, node
+        yield from walk(node.children, own)
+
+
+def draw(nodes: Sequence[BehaviorNode], remarks: Mapping[str, str] | None = None) -> str:
+    """Return the tree as text, one line a node, siblings of higher priority first.
+
+    Args:
+        nodes: The roots.
+        remarks: Name of a node → what to say behind it.
+
+    Example:
+        >>> leaf = BehaviorNode("watch_for_motion", "watch1", 3)
+        >>> print(draw([BehaviorNode("surveillance", "watch", 5, children=[leaf])], {"watch1": "running"}))
+        watch (surveillance, priority 5)
+        └─ watch1 (watch_for_motion, priority 3): running
+    """
+    return "\n".join(_lines(nodes, remarks or {}, ""))
+
+
+def _lines(nodes: Sequence[BehaviorNode], remarks: Mapping[str, str], margin: str, root: bool = True) -> Iterator[str]:
+    ordered = sorted(nodes, key=lambda node: -node.priority)
+    for node in ordered:
+        last = node is ordered[-1]
+        branch, below = ("", "") if root else ("└─ ", "   ") if last else ("├─ ", "│  ")
+        remark = f": {remarks[node.name]}" if remarks.get(node.name) else ""
+        yield f"{margin}{branch}{node.name} ({node.type}, priority {node.priority}){remark}"
+        yield from _lines(node.children, remarks, margin + below, root=False)
+
+
+# ---------------------------------------------------------------------- what a parent does about its children
+class Decision(StrEnum):
+    """What a parent does about a child that has finished."""
+
+    RETRY = "retry"  # start the same child again, from its beginning
+    NEXT = "next"  # leave it; go on with the children that are left
+    ABORT = "abort"  # stop all children; the parent has failed
+
+
+@dataclass(frozen=True, slots=True)
+class StartChild:
+    """Have this child started."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class StopChild:
+    """Have this child ended; right also if it is gone."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class FinishParent:
+    """The children's work is done: the parent has this final status."""
+
+    status: BehaviorStatus
+    payload: Mapping[str, Any] = field(default_factory=dict)
+
+
+Instruction = StartChild | StopChild | FinishParent
+
+
+class Children:
+    """Turns what happened to children into what their parent does.
+
+    Laws: a child is stopped before it is started again; no child is started after the parent has
+    finished; the parent finishes at most once.
+
+    Args:
+        names: In the order of the mission file.
+        together: True: all run at the same time; False: one after the other.
+    """
+
+    def __init__(self, names: Sequence[str], *, together: bool = True) -> None:
+        self._waiting, self._together = list(names), together
+        self._running: list[str] = []
+        self._finished = False
+        self.status: dict[str, BehaviorStatus] = {}
+        self.payload: dict[str, Mapping[str, Any]] = {}
+
+    def begin(self) -> list[Instruction]:
+        """Return the orders for the children that run first."""
+        return self._start_next()
+
+    def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> bool:
+        """Take note; return True if the parent has a decision to make: a child finished that had not before."""
+        if name not in self._running or self._finished or self.status[name].is_final:
+            return False
+        self.status[name], self.payload[name] = status, payload
+        return status.is_final
+
+    def decided(self, name: str, decision: Decision) -> list[Instruction]:
+        """Return what follows from the parent's decision about a finished child."""
+        if self._finished or name not in self._running or not self.status[name].is_final:
+            return []
+        match decision:
+            case Decision.RETRY:
+                self.status[name] = BehaviorStatus.RUNNING
+                return [StopChild(name), StartChild(name)]
+            case Decision.ABORT:
+                stops = self.end()
+                return [*stops, FinishParent(BehaviorStatus.FAILURE, {"child": name, **self.payload[name]})]
+            case Decision.NEXT:
+                self._running.remove(name)
+                return [StopChild(name), *self._start_next(), *self._finish_if_done()]
+
+    def left(self, name: str) -> list[Instruction]:
+        """Return what follows when a child was ended by somebody else: whoever did it meant it."""
+        if self._finished or name not in self._running:
+            return []
+        self._running.remove(name)
+        del self.status[name]
+        return [*self._start_next(), *self._finish_if_done()]
+
+    def end(self) -> list[Instruction]:
+        """Return the orders that end all children that were started."""
+        self._finished = True
+        stops: list[Instruction] = [StopChild(name) for name in reversed(self._running)]
+        self._running, self._waiting = [], []
+        return stops
+
+    def _start_next(self) -> list[Instruction]:
+        if self._finished or (self._running and not self._together):
+            return []
+        count = len(self._waiting) if self._together else 1
+        starting, self._waiting = self._waiting[:count], self._waiting[count:]
+        self._running += starting
+        self.status |= dict.fromkeys(starting, BehaviorStatus.RUNNING)
+        return [StartChild(name) for name in starting]
+
+    def _finish_if_done(self) -> list[Instruction]:
+        if self._running or self._waiting:
+            return []
+        self._finished = True
+        failed = [name for name, status in self.status.items() if status is BehaviorStatus.FAILURE]
+        status = BehaviorStatus.FAILURE if failed else BehaviorStatus.SUCCESS
+        return [FinishParent(status, {"failed": failed} if failed else {})]

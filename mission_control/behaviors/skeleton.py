@@ -1,0 +1,41 @@
+"""Skeleton: the smallest behavior that does something. Copy it, rename it, name it in mission.xml.
+
+In mission.xml: a component type ``skeleton`` of class ``mission_control.behaviors.skeleton:Skeleton``,
+and a behavior of that type with a priority, its parameters and the ARC it needs.
+"""
+
+from __future__ import annotations
+
+from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.messages import BehaviorStatus
+
+
+class SkeletonParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Own parameters, each with a unit in its name, a default and a line here.
+
+    Attributes:
+        turns: How many turns it makes before it has succeeded.
+        speed_rad_s: Speed of the wheels.
+    """
+
+    turns: int = 3
+    speed_rad_s: float = 4.0
+
+
+class Skeleton(Behavior[SkeletonParameters]):
+    """Turns on the spot a few times, one second each, then has succeeded."""
+
+    parameters_type = SkeletonParameters
+    turned = 0  # kept through suspensions, as everything on self is
+
+    async def act(self) -> None:
+        """Command the robot: runs while its RCs are held, is cut off when they go, begins again when they are back."""
+        assert self.arc is not None, "a skeleton needs an ARC that can drive: <arc kind='drive' …/>"  # noqa: S101
+        while self.turned < self.parameters.turns:
+            self.report(f"turn {self.turned + 1} of {self.parameters.turns}")  # one line for people
+            for _tenth in range(10):  # commands end by themselves after half a second: repeat them
+                await self.arc.drive(self.parameters.speed_rad_s, -self.parameters.speed_rad_s)
+                await self.clock.sleep_s(0.1)  # mission time; nothing else sleeps
+            self.turned += 1
+        await self.arc.halt()
+        self.finish(BehaviorStatus.SUCCESS, {"turned": self.turned})  # the ARC goes back, the parent hears it

@@ -1,0 +1,73 @@
+"""Surveillance: several watchers, one picture of what they saw.
+
+Source: IROS 2001, "Surveillance": behaviors of equal priority watch the same room.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.keys import Conversation
+from backbone.wire import Envelope
+from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.behavior_tree import Decision, walk
+from mission_control.messages import BehaviorStatus, MotionSeen
+
+
+class SurveillanceParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Surveillance``.
+
+    Attributes:
+        retries: How often one failed child is started again before the others go on without it.
+    """
+
+    retries: int = 3
+
+
+class Surveillance(Behavior[SurveillanceParameters]):
+    """Starts its children, gathers what they see, and goes on as long as one of them can watch."""
+
+    parameters_type = SurveillanceParameters
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._events, self._failures = Counter[str](), Counter[str]()
+        self._last: MotionSeen | None = None
+
+    async def start(self) -> None:
+        """Listen to all watchers of this branch."""
+        for path, _node in walk(self.parameters.children):
+            watcher = f"mission_control/{path[-1][0]}"
+            self.bus.subscribe(watcher, Conversation.EVENTS, MotionSeen, self._heard)
+        self._say()
+
+    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> Decision:
+        """Start a failed watcher again some times, then go on without it."""
+        if status is BehaviorStatus.FAILURE:
+            self._failures[child] += 1
+            self.announce(f"{child} failed: {payload.get('detail', 'no reason given')}")
+        retry = status is BehaviorStatus.FAILURE and self._failures[child] <= self.parameters.retries
+        return Decision.RETRY if retry else Decision.NEXT
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters and the events by robot."""
+        return {**super().statistics(), **{f"events_{robot}": count for robot, count in self._events.items()}}
+
+    def _heard(self, envelope: Envelope[Any]) -> None:
+        self._last = envelope.body
+        self._events[envelope.body.robot] += 1
+        self.tell_parent({"events": dict(self._events), "last_event_s": envelope.body.at_s})
+        self._say()
+
+    def _say(self) -> None:
+        by_robot = ", ".join(f"{robot} {count}" for robot, count in sorted(self._events.items()))
+        last = f", last at {self._last.at_s:.1f} s through {self._last.robot}" if self._last else ""
+        self.report(
+            f"{len(self.parameters.children)} watchers, {self._events.total()} events{last} ({by_robot})"
+            if by_robot
+            else f"{len(self.parameters.children)} watchers, no event yet"
+        )
