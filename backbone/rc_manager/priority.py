@@ -1,0 +1,101 @@
+"""Who goes before whom: numbers count among siblings of the behavior tree only.
+
+``higher`` is a partial order. Two ARCs neither of which is higher are *equals*, but being equal is
+not transitive, so there is no list of levels; everything that needs an order uses ``by_precedence``.
+
+Source: IROS 2001 and RAM 2002, "behavior manager": priorities are compared among siblings; for
+distant nodes walk up to the nearest ancestors with a common parent. Consoles are siblings of the
+mission's root.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
+
+from backbone.rc_manager.messages import PathNode
+
+Path = tuple[tuple[str, int], ...]
+"""Nodes from the root to the owner, each with its number among its siblings."""
+
+T = TypeVar("T")
+
+CONSOLE = "console "  # a legal node name holds no space: a console is never mistaken for a node of the tree
+
+
+def higher(a: Path, b: Path) -> bool:
+    """Say whether ``a`` goes strictly before ``b``.
+
+    Example:
+        >>> scout1, scout2 = (("m", 0), ("watch", 5), ("left", 9)), (("m", 0), ("home", 6))
+        >>> higher(scout2, scout1), higher(scout1, scout2)
+        (True, False)
+        >>> higher((("m", 0), ("watch", 5)), scout1)  # a parent's own request goes before its children's
+        True
+    """
+    for (name_a, number_a), (name_b, number_b) in zip(a, b, strict=False):
+        if name_a != name_b:
+            return number_a > number_b
+    return len(a) < len(b)
+
+
+def by_precedence(items: Sequence[T], path: Callable[[T], Path], key: Callable[[T], Any]) -> list[T]:
+    """Return the items in order: again and again the one of the smallest key that no remaining one is higher than.
+
+    Sorting by (level, key) would be shorter and wrong: equality is not transitive, there are no levels.
+    """
+    paths = [path(item) for item in items]
+    below = [[j for j, other in enumerate(paths) if higher(one, other)] for one in paths]
+    superiors = [0] * len(items)
+    for inferiors in below:
+        for j in inferiors:
+            superiors[j] += 1
+    free = [(key(item), i) for i, item in enumerate(items) if superiors[i] == 0]
+    heapq.heapify(free)
+    taken: list[T] = []
+    while free:
+        _, i = heapq.heappop(free)
+        taken.append(items[i])
+        for j in below[i]:
+            superiors[j] -= 1
+            if superiors[j] == 0:
+                heapq.heappush(free, (key(items[j]), j))
+    return taken
+
+
+class PriorityTree:
+    """The numbers of all nodes and consoles that ever asked.
+
+    A number set by an operator holds until the operator sets another; a request's own numbers hold
+    for nodes nobody set.
+    """
+
+    def __init__(self, mission: str, priority: int) -> None:
+        self._mission = mission
+        self._numbers: dict[tuple[str, ...], int] = {(mission,): priority}
+        self._set: dict[str, int] = {}
+
+    def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[str, ...]:
+        """Take note of the nodes on this way and return their names, root first."""
+        way = list(nodes)
+        if console:
+            way = [PathNode(CONSOLE + node.name, node.priority) for node in way]
+        elif not way or way[0].name != self._mission:
+            way.insert(0, PathNode(self._mission, self._numbers[self._mission,]))
+        names: tuple[str, ...] = ()
+        for node in way:
+            names = (*names, node.name)
+            self._numbers[names] = self._set.get(node.name.removeprefix(CONSOLE), node.priority)
+        return names
+
+    def path(self, names: tuple[str, ...]) -> Path:
+        """Return the way with its present numbers."""
+        return tuple((name, self._numbers[names[: depth + 1]]) for depth, name in enumerate(names))
+
+    def change(self, node: str, priority: int) -> None:
+        """Give the node, or the console, of this name another number from now on."""
+        self._set[node] = priority
+        for names in self._numbers:
+            if names[-1].removeprefix(CONSOLE) == node:
+                self._numbers[names] = priority

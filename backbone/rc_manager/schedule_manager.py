@@ -1,0 +1,702 @@
+"""Schedule manager: carries the master schedule out, one context switch after the other.
+
+Events go in, instructions come out. The caller owns the clock and the bus: it reports what happened
+and when, does what it is told, and reports the outcome.
+
+The life of an ARC (state → what ends it):
+
+* IDLE → wanted: WAITING, with a new stamp
+* WAITING → its planned start is now and all its RCs are free: CONNECTING
+* CONNECTING → ``Opened``: RUNNING, the slice counts from here; or ``OpenFailed``
+* CONNECTING, RUNNING → somebody entitled needs its RCs, an RC failed, it is idle or gone: REVOKING
+* REVOKING → ``Freed``: WAITING, IDLE, or forgotten
+
+Rules of this file (numbers as in ``master_schedule``):
+
+* 4  What was freed by force goes to the one it was freed for: it is pledged, and comes before its equals.
+* 5  A slice ends only if someone entitled can use the RCs.
+* 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
+* 11 Who lost an RC, or the owner, is revoked; the rest of the schedule goes on.
+
+Source: RAM 2002, "The RC Scheduler", last paragraph.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import assert_never
+
+import msgspec
+
+from backbone.rc_manager import trace
+from backbone.rc_manager.alternatives import choose
+from backbone.rc_manager.decisions import (
+    Adopted,
+    CapacityChanged,
+    ConnectArc,
+    Departed,
+    Event,
+    Extended,
+    Freed,
+    Idled,
+    Instruction,
+    Opened,
+    OpenFailed,
+    PriorityChanged,
+    RcCameBack,
+    RcKnown,
+    RcWentDown,
+    Record,
+    Requested,
+    RevokeArc,
+    RuntimeChanged,
+    WakeAt,
+    Wanted,
+    Woken,
+)
+from backbone.rc_manager.explanation import Explanation
+from backbone.rc_manager.master_schedule import CONNECTED, Afterwards, ArcEntry, MasterSchedule, RcEntry, Turn
+from backbone.rc_manager.messages import (
+    Lease,
+    RcUse,
+    RequestState,
+    Schedule,
+    Scheduled,
+    SchedulingRequest,
+    UnknownRequest,
+    Why,
+)
+from backbone.rc_manager.priority import CONSOLE, PriorityTree, higher
+
+RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
+STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken invariant
+
+
+class ScheduleManager:
+    """Who holds which RC now and next."""
+
+    def __init__(
+        self,
+        *,
+        grace_s: float,
+        tolerance_s: float,
+        policy: str = "no_delay",
+        discipline: str = "turns",
+        mission: str,
+        mission_priority: int,
+    ) -> None:
+        """Begin with no RCs and no ARCs.
+
+        Args:
+            grace_s: Time a decision process has to stop cleanly at the end of a slice.
+            tolerance_s: Reaction and timer tolerance of this run.
+            policy: ``no_delay``: lower ARCs fill gaps that cost nobody anything. ``strict``: no ARC
+                starts while a higher usable one of its group waits.
+            discipline: ``turns``: equals take turns.
+            mission: Name of the mission's own node, root of the behavior tree.
+            mission_priority: Its number among the consoles.
+
+        Raises:
+            ValueError: The policy or discipline is not known.
+        """
+        if policy not in {"no_delay", "strict"}:
+            raise ValueError(f"unknown policy {policy!r}; there are no_delay and strict")
+        if discipline != "turns":
+            raise ValueError(f"unknown discipline {discipline!r}; there is turns")
+        self._grace_s = grace_s
+        self._tolerance_s = tolerance_s
+        self._policy = policy
+        self._discipline = discipline
+        self._tree = PriorityTree(mission, mission_priority)
+        self._table = MasterSchedule(tolerance_s=tolerance_s, strict=policy == "strict")
+        self._explanation = Explanation(self._table)
+        self._now_s = 0.0
+        self._count = 0
+        self._told: list[Instruction] = []
+        self._wake_s: float | None = None
+        self._traced_rcs: set[str] = set()
+        self._traced_nodes: dict[tuple[str, ...], int] = {}
+        self._replaced_by: dict[str, Requested] = {}
+        self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
+
+    # ------------------------------------------------------------------ events in, instructions out
+
+    def handle(self, event: Event, now_s: float) -> list[Instruction]:
+        """Take note of what happened and decide what follows from it.
+
+        An event about an ARC or RC nobody knows, or one that came too late to matter, changes nothing.
+
+        Args:
+            event: What happened.
+            now_s: Mission time of the decision.
+
+        Returns:
+            Instructions in the order in which they must be carried out.
+        """
+        self._now_s = max(now_s, self._now_s)
+        self._told = []
+        self._take_note(event)
+        self._retry()
+        while turn := self._table.due(self._now_s):
+            self._give(turn)
+        self._set_alarm(rang=isinstance(event, Woken))
+        return self._told
+
+    def _take_note(self, event: Event) -> None:
+        match event:
+            case RcKnown():
+                self._rc_known(event)
+            case RcWentDown(rc=rc):
+                self._rc_down(rc)
+            case RcCameBack(rc=rc, last_epoch=last_epoch):
+                self._rc_up(rc, last_epoch)
+            case CapacityChanged(rc=rc, capacity=capacity):
+                self._capacity_changed(rc, capacity)
+            case Requested():
+                self._requested(event)
+            case Adopted():
+                self._adopted(event)
+            case Wanted(arc=arc):
+                self._wanted(arc)
+            case Idled(arc=arc):
+                self._idled(arc)
+            case Departed(arc=arc, why=why):
+                self._departed(arc, why)
+            case RuntimeChanged():
+                self._runtime_changed(event.arc, event.minimum_runtime_s, event.maximum_runtime_s)
+            case Extended(arc=arc, until_s=until_s):
+                self._extended(arc, until_s)
+            case PriorityChanged(node=node, priority=priority):
+                self._priority_changed(node, priority)
+            case Opened(arc=arc):
+                self._opened(arc)
+            case OpenFailed(arc=arc, rc=rc):
+                self._open_failed(arc, rc)
+            case Freed(arc=arc):
+                self._freed(arc)
+            case Woken():
+                pass
+            case _:
+                assert_never(event)
+
+    # ------------------------------------------------------------------ context switches
+
+    def _give(self, turn: Turn) -> None:
+        """Connect the ARC whose turn it is, or first revoke who is in its way."""
+        if not turn.in_the_way:
+            self._connect(turn.arc)
+            return
+        for holder in turn.in_the_way:
+            overridden = higher(turn.arc.path, holder.path)
+            if overridden and not holder.served(self._now_s) and turn.arc.pledge is None:
+                turn.arc.pledge = self._next()
+            self._revoke(holder, "higher" if overridden else "slice", turn.arc.name)
+
+    def _connect(self, arc: ArcEntry) -> None:
+        for rc in arc.uses:
+            self._table.rcs[rc].epoch += 1
+        arc.epochs = {rc: self._table.rcs[rc].epoch for rc in arc.uses}
+        arc.pledge = None
+        arc.began_s = self._now_s
+        self._enter(arc, RequestState.CONNECTING)
+        self._record(trace.connect(self._now_s, arc.name, arc.epochs), "it is next, and all its RCs are free (rule 3)")
+        self._tell(ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, self._now_s + arc.length_s, self._ranks(arc)))
+
+    def _ranks(self, arc: ArcEntry) -> dict[str, int]:
+        """Return the ARC's place by user priority among the holders of each sharable RC it uses."""
+
+        def place(rc: str) -> int:
+            return sum(
+                rc in other.uses and other.state in CONNECTED and higher(other.path, arc.path)
+                for other in self._table.arcs.values()
+            )
+
+        return {rc: place(rc) for rc in arc.uses if self._table.rcs[rc].sharable}
+
+    def _revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
+        """Take all its RCs from an ARC that is connected."""
+        deadline_s = self._grace_s if why == "slice" else 0.0
+        self._swap_out(arc, why, by)
+        arc.afterwards = afterwards
+        slot = self._table.slot_of(arc, self._now_s)
+        expected_s = slot.start_s + arc.settle_s if slot is not None and slot.start_s < math.inf else -1.0
+        self._tell(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, expected_s))
+
+    def _swap_out(self, arc: ArcEntry, why: str, by: str) -> None:
+        self._record(trace.revoke(self._now_s, arc.name, why, by), _because(why, by))
+        if arc.served(self._now_s):
+            arc.stamp = (self._now_s, self._next())
+            arc.last_served_s = self._now_s
+        arc.swapped_out, arc.swapped_out_by = why, by
+        arc.afterwards = Afterwards.WAIT
+        self._enter(arc, RequestState.REVOKING)
+
+    def _opened(self, name: str) -> None:
+        arc = self._table.arcs.get(name)
+        if arc is None or arc.state is not RequestState.CONNECTING:
+            return
+        arc.granted_s = self._now_s
+        arc.end_s = self._now_s + arc.minimum_s
+        arc.turns += 1
+        self._enter(arc, RequestState.RUNNING)
+        newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._table.rcs[rc].granted_epoch}
+        for rc, epoch in newest.items():
+            self._table.rcs[rc].granted_epoch = epoch
+        self._record(trace.grant(self._now_s, arc.name, newest), "its RCs have settled")
+
+    def _open_failed(self, name: str, rc: str) -> None:
+        self._rc_down(rc, lost_by=name)
+        arc = self._table.arcs.get(name)
+        if arc is None or arc.state is not RequestState.CONNECTING:
+            return
+        if rc in arc.uses:
+            self._swap_out(arc, "rc", rc)
+        else:
+            self._record(trace.about("idle", self._now_s, name), f"it could not open its gate; again in {RETRY_S:g} s")
+            self._swap_out(arc, "failed", "")
+            arc.afterwards = Afterwards.IDLE
+            arc.retry_s = self._now_s + RETRY_S
+        self._freed(name)
+
+    def _freed(self, name: str) -> None:
+        arc = self._table.arcs.get(name)
+        if arc is None or arc.state is not RequestState.REVOKING:
+            return
+        arc.epochs = {}
+        self._record(trace.about("free", self._now_s, name), "its RCs are in their safe states")
+        match arc.afterwards:
+            case Afterwards.WAIT:
+                self._enter(arc, RequestState.WAITING)
+            case Afterwards.IDLE:
+                self._enter(arc, RequestState.IDLE)
+            case Afterwards.WANT:
+                self._enter(arc, RequestState.IDLE)
+                self._wanted(name)
+            case Afterwards.GONE:
+                self._forget(arc)
+
+    def _forget(self, arc: ArcEntry) -> None:
+        del self._table.arcs[arc.name]
+        self._table.demand_changed()
+        successor = self._replaced_by.pop(arc.name, None)
+        if successor is not None:
+            self._requested(successor)
+
+    # ------------------------------------------------------------------ what ARCs want
+
+    def _requested(self, event: Requested) -> None:
+        request = event.request
+        known = self._table.arcs.get(request.arc)
+        if known is None:
+            self._add(event)
+            return
+        if known.afterwards is Afterwards.GONE and known.holds:
+            self._replaced_by[request.arc] = event  # it asks anew while its last RCs are still being freed
+            return
+        place_in_tree = self._note_nodes(request)
+        if dict(known.uses) != _chosen(request, event.rcs) or known.place_in_tree != place_in_tree:
+            self._replaced_by[request.arc] = event
+            self._departed(request.arc, "self", replaced=True)
+            return
+        known.request = request
+        self._runtime_changed(request.arc, request.minimum_runtime_s, request.maximum_runtime_s)
+        if request.idle:
+            self._idled(request.arc)
+        else:
+            self._wanted(request.arc)
+
+    def _add(self, event: Requested) -> ArcEntry:
+        request = event.request
+        for rc in event.rcs:
+            self._introduce(rc)
+        place_in_tree = self._note_nodes(request)
+        rcs = [self._table.rcs[rc] for rc in event.rcs]
+        arc = ArcEntry(
+            request=request,
+            uses=_chosen(request, event.rcs),
+            place_in_tree=place_in_tree,
+            path=self._tree.path(place_in_tree),
+            minimum_s=request.minimum_runtime_s,
+            maximum_s=max(request.minimum_runtime_s, request.maximum_runtime_s),
+            settle_s=max((rc.connect_s for rc in rcs), default=0.0),
+            release_s=max((rc.disconnect_s for rc in rcs), default=0.0),
+            since_s=self._now_s,
+        )
+        self._table.arcs[arc.name] = arc
+        self._record(self._request_line(arc), f"asked by {request.owner}")
+        if not request.idle:
+            self._queue(arc)
+        return arc
+
+    def _request_line(self, arc: ArcEntry) -> trace.Line:
+        name, number = arc.path[-1]
+        owner = (
+            trace.console_owner(name.removeprefix(CONSOLE), number)
+            if name.startswith(CONSOLE)
+            else _node_id(arc.place_in_tree)
+        )
+        return trace.request(
+            self._now_s,
+            arc.name,
+            owner,
+            minimum_s=arc.minimum_s,
+            maximum_s=arc.maximum_s,
+            uses=arc.uses,
+            idle=arc.request.idle,
+        )
+
+    def _queue(self, arc: ArcEntry) -> None:
+        """Let it wait as one who just came."""
+        arc.stamp = (self._now_s, self._next())
+        arc.pledge = None
+        arc.retry_s = None
+        arc.active_since_s = self._now_s
+        self._enter(arc, RequestState.WAITING)
+        self._table.demand_changed()
+
+    def _adopted(self, event: Adopted) -> None:
+        request, rcs = event.request, tuple(event.epochs)
+        if request.arc in self._table.arcs or any(rc not in self._table.rcs for rc in rcs):
+            return
+        arc = self._add(Requested(msgspec.structs.replace(request, idle=False), rcs))
+        holders = [other for other in self._table.arcs.values() if other.holds]
+        if not self._table.usable(arc) or not self._table.fits(arc, holders):
+            return  # it waits like everybody; the RCs drop it when its lease ends
+        arc.epochs = dict(event.epochs)
+        for rc, epoch in event.epochs.items():
+            self._table.rcs[rc].epoch = max(self._table.rcs[rc].epoch, epoch)
+            self._table.rcs[rc].granted_epoch = max(self._table.rcs[rc].granted_epoch, epoch)
+        why = "it held its RCs when this RC manager started"
+        self._record(trace.connect(self._now_s, arc.name, arc.epochs), why)
+        self._record(trace.grant(self._now_s, arc.name, arc.epochs), why)
+        arc.turns = 1
+        arc.began_s = arc.granted_s = event.granted_s
+        arc.end_s = event.granted_s + arc.minimum_s
+        self._enter(arc, RequestState.RUNNING)
+
+    def _wanted(self, name: str) -> None:
+        arc = self._table.arcs.get(name)
+        if arc is None:
+            return
+        self._replacement_idles(name, idle=False)
+        if arc.state is RequestState.REVOKING and arc.afterwards is Afterwards.IDLE:
+            arc.afterwards = Afterwards.WANT
+        elif arc.state is RequestState.IDLE:
+            self._record(trace.about("want", self._now_s, name), "it wants time again")
+            self._queue(arc)
+
+    def _idled(self, name: str) -> None:
+        arc = self._table.arcs.get(name)
+        if arc is None:
+            return
+        self._replacement_idles(name, idle=True)
+        arc.retry_s = None
+        if arc.state is RequestState.REVOKING:
+            if arc.afterwards is Afterwards.WAIT:
+                self._record(trace.about("idle", self._now_s, name), "it wants no time now")
+            if arc.afterwards is not Afterwards.GONE:
+                arc.afterwards = Afterwards.IDLE
+        elif arc.state is not RequestState.IDLE:
+            self._record(trace.about("idle", self._now_s, name), "it wants no time now")
+            if arc.state is RequestState.WAITING:
+                arc.pledge = None
+                self._enter(arc, RequestState.IDLE)
+            else:
+                self._revoke(arc, "self", "", Afterwards.IDLE)
+
+    def _replacement_idles(self, name: str, *, idle: bool) -> None:
+        """Let the request that waits for the end of the old one of this name know, too."""
+        if name in self._replaced_by:
+            event = self._replaced_by[name]
+            self._replaced_by[name] = Requested(msgspec.structs.replace(event.request, idle=idle), event.rcs)
+
+    def _departed(self, name: str, why: str, *, replaced: bool = False) -> None:
+        if not replaced:
+            self._replaced_by.pop(name, None)
+        arc = self._table.arcs.get(name)
+        if arc is None or (arc.holds and arc.afterwards is Afterwards.GONE):
+            return
+        self._record(trace.about("depart", self._now_s, name), _because(why, ""))
+        if not arc.holds:
+            self._forget(arc)
+        elif arc.state is RequestState.REVOKING:
+            arc.afterwards = Afterwards.GONE
+        else:
+            self._revoke(arc, why, "", Afterwards.GONE)
+
+    def _runtime_changed(self, name: str, minimum_s: float, maximum_s: float) -> None:
+        arc = self._table.arcs.get(name)
+        maximum_s = max(minimum_s, maximum_s)
+        if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
+            return
+        arc.minimum_s, arc.maximum_s = minimum_s, maximum_s
+        self._record(trace.runtime(self._now_s, name, minimum_s, maximum_s), "from the next slice on")
+
+    def _extended(self, name: str, until_s: float) -> None:
+        arc = self._table.arcs.get(name)
+        if arc is None or arc.state is not RequestState.RUNNING:
+            return
+        until_s = min(until_s, arc.granted_s + arc.maximum_s)
+        if until_s > arc.end_s:
+            arc.end_s = until_s
+            self._record(trace.extend(self._now_s, name, until_s), "it asked to go on (rule 14)")
+
+    def _retry(self) -> None:
+        for arc in [*self._table.arcs.values()]:
+            if arc.state is RequestState.IDLE and arc.retry_s is not None and arc.retry_s <= self._now_s:
+                self._wanted(arc.name)
+
+    # ------------------------------------------------------------------ priorities
+
+    def _note_nodes(self, request: SchedulingRequest) -> tuple[str, ...]:
+        names = self._tree.place(request.path, console=request.console)
+        self._renumber()
+        if not request.console:
+            self._introduce_nodes(names)
+        return names
+
+    def _priority_changed(self, node: str, priority: int) -> None:
+        self._tree.change(node, priority)
+        self._renumber()
+        for names in [names for names in self._traced_nodes if names[-1] == node]:
+            self._introduce_nodes(names)
+
+    def _renumber(self) -> None:
+        for arc in self._table.arcs.values():
+            arc.path = self._tree.path(arc.place_in_tree)
+        self._table.demand_changed()
+
+    def _introduce_nodes(self, names: tuple[str, ...]) -> None:
+        for depth, (_, number) in enumerate(self._tree.path(names), start=1):
+            way = names[:depth]
+            if self._traced_nodes.get(way) != number:
+                self._traced_nodes[way] = number
+                parent = _node_id(way[:-1]) if depth > 1 else None
+                self._record(trace.node(self._now_s, _node_id(way), parent, number))
+
+    # ------------------------------------------------------------------ RCs
+
+    def _rc_known(self, event: RcKnown) -> None:
+        known = self._table.rcs.get(event.rc)
+        if known is None:
+            self._table.rcs[event.rc] = RcEntry(
+                event.rc,
+                event.kind,
+                event.sharable,
+                event.capacity,
+                event.connect_s,
+                event.disconnect_s,
+                event.up,
+                event.last_epoch,
+            )
+            if event.up:
+                self._introduce(event.rc)
+            return
+        if event.up:
+            self._rc_up(event.rc, event.last_epoch)
+        else:
+            self._rc_down(event.rc)
+        self._capacity_changed(event.rc, event.capacity)
+
+    def _introduce(self, name: str) -> None:
+        """Bring the RC into the trace: when it is up for the first time, or asked for before."""
+        if name in self._traced_rcs:
+            return
+        self._traced_rcs.add(name)
+        rc = self._table.rcs[name]
+        self._record(
+            trace.rc(
+                self._now_s,
+                name,
+                sharable=rc.sharable,
+                capacity=rc.capacity,
+                connect_s=rc.connect_s,
+                disconnect_s=rc.disconnect_s,
+            )
+        )
+        if not rc.up:
+            self._record(trace.rc_state(self._now_s, name, up=False), "not started yet")
+
+    def _rc_down(self, name: str, lost_by: str = "") -> None:
+        """Take note that the RC does not answer; its holders lose all their RCs, ``lost_by`` has lost them already."""
+        rc = self._table.rcs.get(name)
+        if rc is None or not rc.up:
+            return
+        rc.up = False
+        rc.failed = True
+        self._record(trace.rc_state(self._now_s, name, up=False), "it does not answer")
+        for arc in [*self._table.arcs.values()]:
+            if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
+                self._revoke(arc, "rc", name)
+
+    def _rc_up(self, name: str, last_epoch: int) -> None:
+        rc = self._table.rcs.get(name)
+        if rc is None:
+            return
+        if rc.up and any(arc.state in CONNECTED and name in arc.uses for arc in self._table.arcs.values()):
+            self._rc_down(name)  # it was away for a moment and forgot its holders
+        rc.epoch = max(rc.epoch, last_epoch)
+        if rc.up:
+            return
+        rc.up = True
+        rc.failed = False
+        if name in self._traced_rcs:
+            self._record(trace.rc_state(self._now_s, name, up=True), "it answers")
+        self._introduce(name)
+
+    def _capacity_changed(self, name: str, capacity: float) -> None:
+        rc = self._table.rcs.get(name)
+        if rc is None or rc.capacity == capacity:
+            return
+        rc.capacity = capacity
+        self._table.demand_changed()
+        if name in self._traced_rcs:
+            self._record(trace.rc_capacity(self._now_s, name, capacity))
+        for holder in self._table.overloading(name):
+            self._revoke(holder, "capacity", name)
+
+    # ------------------------------------------------------------------ views
+
+    def choose(self, request: SchedulingRequest) -> tuple[str, ...]:
+        """Return the set of RCs this request should wait for; nothing changes.
+
+        Raises:
+            MissingRuntime: It does not say for how long it must run at least.
+            UnknownRc: All alternatives name RCs that do not exist.
+            CapacityExceeded: It could not run even alone; facts ``demanded``, ``used`` and ``free``.
+            SchedulingRefusal: It asks for nothing, or for streams that make no sense.
+        """
+        return choose(self._table, request)
+
+    def scheduled(self, arc: str, now_s: float) -> Scheduled:
+        """Return where the request of this ARC is.
+
+        Raises:
+            UnknownRequest: It has none.
+        """
+        return self._explanation.scheduled(self._known(arc), max(now_s, self._now_s))
+
+    def schedule(self, now_s: float) -> Schedule:
+        """Return who holds what, who waits for whom, and until when."""
+        return self._explanation.schedule(max(now_s, self._now_s))
+
+    def why(self, name: str, now_s: float) -> Why:
+        """Return why an ARC, an owner (name or address) or an RC is as it is.
+
+        Raises:
+            UnknownRequest: There is none of this name.
+        """
+        return self._explanation.why(name, max(now_s, self._now_s))
+
+    def leases(self) -> list[Lease]:
+        """Return all holds that must be renewed: those of ARCs that connect or run."""
+        return [
+            Lease(rc, arc.name, epoch)
+            for arc in self._table.arcs.values()
+            if arc.state in CONNECTED
+            for rc, epoch in arc.epochs.items()
+        ]
+
+    def opening_lines(self) -> list[Record]:
+        """Return the records with which a trace begins."""
+        line = trace.meta(
+            self._now_s,
+            policy=self._policy,
+            discipline=self._discipline,
+            grace_s=self._grace_s,
+            tolerance_s=self._tolerance_s,
+        )
+        return [Record(line)]
+
+    def check(self) -> None:
+        """Make sure that the schedule keeps its promises.
+
+        Raises:
+            AssertionError: It does not; with the story of the ARCs concerned.
+        """
+        for arc in self._table.arcs.values():
+            self._check_arc(arc)
+        for rc in self._table.rcs.values():
+            holders = [arc for arc in self._table.arcs.values() if rc.name in arc.epochs]
+            exclusive = [arc for arc in holders if not rc.sharable or not arc.uses[rc.name].streams]
+            self._promise(not exclusive or len(holders) == 1, f"{rc.name} has one holder", holders)
+            epochs = [arc.epochs[rc.name] for arc in holders]
+            self._promise(len({*epochs}) == len(epochs), f"{rc.name}'s epochs are given once", holders)
+            self._promise(all(epoch <= rc.epoch for epoch in epochs), f"{rc.name}'s epochs grow", holders)
+            connected = [arc for arc in holders if arc.state in CONNECTED]
+            self._promise(rc.up or not connected, f"{rc.name} is down and holds nobody", connected)
+            for arc in connected:
+                others = [other for other in connected if other is not arc]
+                self._promise(self._table.fits(arc, others), f"{rc.name} serves all its holders in time", connected)
+        self._promise(self._table.due(self._now_s) is None, "nobody's turn is forgotten", ())
+
+    def _check_arc(self, arc: ArcEntry) -> None:
+        wholly = arc.epochs.keys() == arc.uses.keys() if arc.holds else not arc.epochs
+        self._promise(wholly, f"{arc.name} holds all its RCs or none", [arc])
+        self._promise(arc.pledge is None or arc.state is RequestState.WAITING, "only who waits is pledged", [arc])
+
+    def _promise(self, kept: bool, what: str, whom: Sequence[ArcEntry]) -> None:
+        if kept:
+            return
+        names = {arc.name for arc in whom}
+        story = [line for line in self._story if not names or line.get("arc", line.get("id")) in names]
+        raise AssertionError("\n".join([f"broken at {self._now_s}: {what}", *map(str, story)]))
+
+    # ------------------------------------------------------------------ bookkeeping
+
+    def _known(self, arc: str) -> ArcEntry:
+        if arc not in self._table.arcs:
+            raise UnknownRequest(f"no request of {arc!r} is known", name=arc)
+        return self._table.arcs[arc]
+
+    def _enter(self, arc: ArcEntry, state: RequestState) -> None:
+        arc.state = state
+        arc.since_s = self._now_s
+
+    def _next(self) -> int:
+        self._count += 1
+        return self._count
+
+    def _tell(self, instruction: Instruction) -> None:
+        self._told.append(instruction)
+
+    def _record(self, line: trace.Line, cause: str = "") -> None:
+        self._story.append(line)
+        self._tell(Record(line, cause))
+
+    def _set_alarm(self, *, rang: bool) -> None:
+        """Ask to be woken when the next decision can be due without an event."""
+        retries = [arc.retry_s for arc in self._table.arcs.values() if arc.retry_s is not None]
+        slice_end_s = self._table.next_end_s(self._now_s)
+        wake_s = min([*retries, *([slice_end_s] if slice_end_s is not None else [])], default=None)
+        if rang or wake_s != self._wake_s:
+            self._wake_s = wake_s
+            self._tell(WakeAt(wake_s))
+
+
+def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:
+    """Return the alternative of these RCs."""
+    return next((dict(wish) for wish in request.alternatives if wish.keys() == {*rcs}), {rc: RcUse() for rc in rcs})
+
+
+def _node_id(names: tuple[str, ...]) -> str:
+    return "/".join(names)
+
+
+_CAUSES: Mapping[str, str] = {
+    "slice": "its slice is over and it is the turn of {by} (rules 3 and 5)",
+    "higher": "{by} is higher (rule 4)",
+    "rc": "{by} does not answer (rule 11)",
+    "capacity": "{by} can give less than before (rule 11)",
+    "failed": "it could not open its gate",
+    "self": "its owner wants no time any more",
+    "owner": "its owner ended",
+    "dead": "it died (rule 11)",
+    "silent": "it does not give signs of life (rule 11)",
+}
+
+
+def _because(why: str, by: str) -> str:
+    return _CAUSES.get(why, why).format(by=by)
