@@ -72,7 +72,7 @@ log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
 START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
-DRAIN_TIME_S = 3.0  # chosen: shorter than the time its creator gives it before SIGTERM
+DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
 
 

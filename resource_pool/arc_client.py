@@ -303,8 +303,7 @@ class ArcClient:
         """Ask what the ARC holds whenever it is back in sight: notices may have been missed meanwhile."""
         await companion.wait_there()
         while True:
-            await companion.wait_missing()
-            await companion.wait_there()
+            await companion.wait_risen(companion.times_risen + 1)
             try:
                 state = await self.state()
             except LinkError as error:

@@ -25,7 +25,7 @@ class Companion:
     def __init__(self, bus: Bus, address: str, *, gone_after_s: float = GONE_AFTER_S) -> None:
         self.address = address
         self._gone_after_s = gone_after_s
-        self._token, self._link = False, True
+        self._token, self._link, self._risen = False, True, 0
         self._changed = asyncio.Event()
         self._declared = [bus.watch_link(self._link_changed), bus.watch_alive(address, self._token_changed)]
 
@@ -34,14 +34,19 @@ class Companion:
         """True while its token stands."""
         return self._token
 
+    @property
+    def times_risen(self) -> int:
+        """How often its token was seen to rise."""
+        return self._risen
+
     async def wait_there(self) -> None:
         """Return when its token stands, at once if it does."""
         while not self._token:
             await self._changed.wait()
 
-    async def wait_missing(self) -> None:
-        """Return when its token does not stand, for whatever reason."""
-        while self._token:
+    async def wait_risen(self, times: int) -> None:
+        """Return when its token was seen to rise this many times: the first is its being there at all."""
+        while self._risen < times:
             await self._changed.wait()
 
     async def wait_gone(self) -> None:
@@ -64,6 +69,7 @@ class Companion:
 
     def _token_changed(self, _address: str, alive: bool) -> None:
         self._token = alive
+        self._risen += alive
         self._tell()
 
     def _link_changed(self, up: bool) -> None:

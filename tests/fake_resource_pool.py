@@ -1,0 +1,249 @@
+"""A placer and ARCs that speak the protocol and decide nothing: what decision processes are tested against."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.component.messages import Stop, Stopping
+from backbone.creator.messages import EndedBy, ProcessFell
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import NameTaken
+from backbone.naming import Subsystem, address
+from backbone.placer.messages import (
+    ADDRESS,
+    AskPlacement,
+    Ended,
+    NotPlaced,
+    Placement,
+    PlacerQuestion,
+    Start,
+    Started,
+    StopComponent,
+)
+from backbone.wire import Envelope, Message
+from resource_pool.messages import (
+    Accepted,
+    Applied,
+    ArcQuestion,
+    ArcState,
+    AskArc,
+    Drive,
+    Frame,
+    Halt,
+    Jump,
+    Noted,
+    Release,
+    Resumed,
+    Suspended,
+    Suspending,
+    SwappedOut,
+)
+
+WITHIN_S = 5.0
+
+
+class FakeArc:
+    """An ARC whose grants come and go when the test says so. Holds one scout and one framegrabber."""
+
+    def __init__(self, bus: Bus, clock: Clock, name: str, parameters: dict[str, Any]) -> None:
+        self.bus, self.clock, self.name, self.parameters = bus, clock, name, parameters
+        self.address = address(Subsystem.RESOURCE_POOL, name)
+        self.epoch, self.granted = 0, False
+        self.commands: list[tuple[float, int, Message]] = []
+        self.refusal: Refusal | None = None
+        self.released = ""
+        self.rcs = {"scout": parameters["wish"].get("scout", "scout3"), "framegrabber": "grabber1"}
+        bus.serve(self.address, ArcQuestion | Stop, self._answer)
+        bus.declare_alive(self.address)
+
+    @property
+    def epochs(self) -> dict[str, int]:
+        return dict.fromkeys(self.rcs.values(), self.epoch)
+
+    async def grant(self) -> None:
+        self.epoch, self.granted = self.epoch + 1, True
+        await self._tell(Resumed(self.name, self.rcs, self.epochs, self.clock.now_s() + 5.0))
+
+    async def suspend(self, reason: str = "slice", by: str = "other", deadline_s: float = 0.1) -> None:
+        if deadline_s > 0:
+            await self._tell(Suspending(self.name, reason, by, deadline_s))
+        self.granted = False
+        await self._tell(Suspended(self.name, reason, by, -1.0))
+
+    def publish(self, pixels: bytes, width_px: int, height_px: int, number: int = 0) -> None:
+        frame = Frame(
+            self.rcs["framegrabber"],
+            self.name,
+            self.epoch,
+            self.rcs["scout"],
+            number,
+            self.clock.now_s(),
+            width_px,
+            height_px,
+            memoryview(pixels),
+        )
+        self.bus.publish(self.address, Conversation.FRAMES, frame)
+
+    async def _tell(self, notice: Message) -> None:
+        await self.bus.ask(self.parameters["owner"], notice, Noted, within_s=WITHIN_S)
+
+    async def _answer(self, asked: Envelope[Any]) -> Message:
+        match asked.body:
+            case Release(reason=reason):
+                self.granted, self.released = False, reason
+                return Accepted()
+            case Stop():
+                return Stopping()
+            case AskArc():
+                epochs = self.epochs if self.granted else {}
+                owner = self.parameters["owner"]
+                return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0)
+            case Drive() | Halt() | Jump():
+                return self._command(asked.body)
+            case _:
+                return Accepted()
+
+    def _command(self, command: Message) -> Applied:
+        if not self.granted:
+            raise SwappedOut(f"{self.name} holds nothing", reason="slice", by="other", expected_start_s=-1.0)
+        if self.refusal is not None:
+            raise self.refusal
+        self.commands.append((self.clock.now_s(), self.epoch, command))
+        values = (
+            {"left_rad_s": command.left_rad_s, "right_rad_s": command.right_rad_s} if isinstance(command, Drive) else {}
+        )
+        return Applied(self.rcs["scout"], self.epoch, self.clock.now_s(), type(command).__name__.lower(), values)
+
+
+class FakePlacer:
+    """Runs components in this process: ARCs are fakes, other types are looked up in ``classes``."""
+
+    def __init__(self, network: LocalNetwork, clock: Clock, classes: dict[str, type[Component[Any]]]) -> None:
+        self.network, self.clock, self.classes = network, clock, classes
+        self.arcs: dict[str, FakeArc] = {}
+        self.components: dict[str, Component[Any]] = {}
+        self.started: list[str] = []
+        self.ended: list[str] = []
+        self.refusals: dict[str, Refusal] = {}
+        self.placed: dict[str, Start] = {}
+        self.on_arc: Callable[[FakeArc], None] = lambda arc: None
+        self._lives: dict[str, asyncio.Task[None]] = {}
+        self.bus = network.join(ADDRESS, clock)
+        self.creator = network.join("backbone/creator-local", clock)
+        self.bus.serve(ADDRESS, PlacerQuestion, self._answer)
+        self.bus.declare_alive(ADDRESS)
+
+    async def close(self) -> None:
+        for name in list(self.components):
+            await self.kill(name)
+        for name in list(self.arcs):
+            await self.kill(name)
+        await self.creator.close()
+        await self.bus.close()
+
+    async def launch(self, order: Start, requester: str = "backbone/launcher") -> Any:
+        """Run what the order says, as a creator would; return it when it is ready."""
+        if order.name in self.arcs or order.name in self.components:
+            raise NameTaken(f"{order.name} runs")
+        if order.type in self.refusals:
+            raise self.refusals[order.type]
+        self.started.append(order.name)
+        self.placed[order.name] = order
+        if order.type in self.classes:
+            await self._run(order, requester)
+            made: Any = self.components[order.name]
+        else:
+            bus = self.network.join(address(Subsystem.RESOURCE_POOL, order.name), self.clock)
+            made = self.arcs[order.name] = FakeArc(bus, self.clock, order.name, order.parameters)
+            self.on_arc(made)
+        return made
+
+    async def restart(self, name: str) -> Any:
+        """What a creator does after a death: the same order again."""
+        return await self.launch(self.placed[name])
+
+    async def kill(self, name: str) -> None:
+        """End it as a SIGKILL does: nothing is drained, its token falls."""
+        if name in self.arcs:
+            await self.arcs.pop(name).bus.close()
+            return
+        life = self._lives[name]
+        life.cancel()
+        await asyncio.wait({life})
+
+    def give_up(self, name: str) -> None:
+        """Say what a creator says of a component that fell too often."""
+        fell = ProcessFell(name, "signal 9", -1.0, [])
+        self.creator.publish("backbone/creator-local", Conversation.EVENTS, fell)
+
+    async def wait(self, condition: Callable[[], Any], within_s: float = 20.0) -> None:
+        """Return when the condition holds; it is looked at every hundredth of a (virtual) second."""
+        async with asyncio.timeout(within_s):
+            while not condition():
+                await self.clock.sleep_s(0.01)
+
+    async def _run(self, order: Start, requester: str) -> None:
+        launch = Launch(
+            self.network.mission,
+            Subsystem.MISSION_CONTROL,
+            order.name,
+            order.type,
+            "in this process",
+            "local",
+            "",
+            0.0,
+            1.0,
+            order.parameters,
+            requester,
+        )
+        bus = self.network.join(launch.address, self.clock)
+        component = self.classes[order.type](launch, bus, self.clock)
+        ready = asyncio.Event()
+        watching = self.bus.watch_alive(launch.address, lambda _address, alive: ready.set() if alive else None)
+        life = asyncio.create_task(component.run(), name=f"life of {order.name}")
+        self.components[order.name], self._lives[order.name] = component, life
+        life.add_done_callback(lambda _life: self._forget(order.name, component))
+        waiting = asyncio.create_task(ready.wait())
+        await asyncio.wait({life, waiting}, return_when=asyncio.FIRST_COMPLETED)
+        waiting.cancel()
+        watching.close()
+        if life.done():
+            await life
+
+    def _forget(self, name: str, component: Component[Any]) -> None:
+        if self.components.get(name) is component:
+            del self.components[name]
+
+    async def _answer(self, asked: Envelope[Any]) -> Message:
+        match asked.body:
+            case Start() as order:
+                await self.launch(order, asked.source)
+                subsystem = Subsystem.MISSION_CONTROL if order.type in self.classes else Subsystem.RESOURCE_POOL
+                return Started(address(subsystem, order.name), "local", 1, [])
+            case StopComponent(name=name):
+                return await self._stop(name)
+            case AskPlacement(name=name):
+                if name not in self.placed:
+                    raise NotPlaced(f"{name} was never placed")
+                return Placement(name, self.placed[name].type, "local", "", 0.0, [])
+            case _:
+                raise NotPlaced("not in this fake")
+
+    async def _stop(self, name: str) -> Ended:
+        if name not in self.placed:
+            raise NotPlaced(f"{name} was never placed")
+        del self.placed[name]
+        self.ended.append(name)
+        if name in self.arcs:
+            await self.arcs.pop(name).bus.close()
+        elif name in self.components:
+            self.components[name].end("the placer ends it")
+            await asyncio.wait({self._lives[name]})
+        return Ended(name, EndedBy.ASKING)

@@ -1,0 +1,179 @@
+"""The watcher, its parent and the skeleton, each with an ARC in one process."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from itertools import pairwise
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from fake_resource_pool import FakeArc, FakePlacer
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.messages import StoryEvent
+from backbone.keys import Conversation
+from backbone.mission.behavior_orders import behavior_order
+from mission_control.behaviors.skeleton import Skeleton
+from mission_control.behaviors.surveillance import Surveillance
+from mission_control.behaviors.watch_for_motion import WatchForMotion
+from mission_control.messages import BehaviorStatus, MotionSeen
+
+Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
+FRAME_S = 1 / 30
+SIZE = {"width_px": 320, "height_px": 240}
+
+
+@pytest.fixture
+def placer_world(local_mission: Any) -> Run:
+    def run(scene: Callable[[FakePlacer], Awaitable[None]]) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network:
+                classes = {"watch": WatchForMotion, "surveillance": Surveillance, "skeleton": Skeleton}
+                placer = FakePlacer(network, VirtualClock(), classes)
+                try:
+                    await scene(placer)
+                finally:
+                    await placer.close()
+
+        run_virtual(main())
+
+    return run
+
+
+def watcher(scout: str) -> dict[str, Any]:
+    arc = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": scout}}
+    return {"type": "watch", "name": f"watch-{scout}", "priority": 3, "arc": arc}
+
+
+def room() -> np.ndarray:
+    coarse = np.random.default_rng(1).integers(60, 180, (6, 8)).astype(np.uint8)
+    return np.asarray(cv2.resize(coarse, (320, 240), interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+async def show(placer: FakePlacer, arc: FakeArc, frames: int, *, moving: bool) -> None:
+    for number in range(frames):
+        picture = room()
+        if moving:
+            picture[100:140, 8 * number : 8 * number + 40] = 230
+        arc.publish(picture.tobytes(), **SIZE, number=number)
+        await placer.clock.sleep_s(FRAME_S)
+
+
+def test_a_watcher_tells_motion_with_time_robot_and_region_and_nothing_else(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        seen: list[Any] = []
+        told: list[Any] = []
+        placer.bus.subscribe("mission_control/*", Conversation.EVENTS, MotionSeen, seen.append)
+        placer.bus.subscribe("mission_control/*", Conversation.LOG, StoryEvent, told.append)
+        watch = await placer.launch(behavior_order(watcher("scout1"), [("iros2001", 10)]))
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        await arc.grant()
+        await show(placer, arc, 60, moving=False)
+        assert seen == []
+        began_s = placer.clock.now_s()
+        await show(placer, arc, 30, moving=True)
+        assert len(seen) == 1
+        motion = seen[0].body
+        assert motion.robot == "scout1"
+        assert began_s <= motion.at_s <= began_s + 0.5
+        assert 80 <= motion.region.y_px <= 140
+        assert seen[0].source == "mission_control/watch-scout1"
+        assert seen[0].cause.startswith("resource_pool/watch-scout1-capture#")
+        assert "motion seen through scout1" in told[0].body.what
+        assert watch.feedback.endswith("90 frames, 1 events")
+
+    placer_world(scene)
+
+
+def test_motion_that_goes_on_is_told_once_a_second(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        seen: list[Any] = []
+        placer.bus.subscribe("mission_control/*", Conversation.EVENTS, MotionSeen, seen.append)
+        await placer.launch(behavior_order(watcher("scout1"), [("iros2001", 10)]))
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        await arc.grant()
+        await show(placer, arc, 20, moving=False)
+        for _crossing in range(3):
+            await show(placer, arc, 36, moving=True)
+        times = [envelope.body.at_s for envelope in seen]
+        assert len(times) >= 3
+        assert all(later - earlier >= 1.0 for earlier, later in pairwise(times))
+
+    placer_world(scene)
+
+
+def test_a_suspended_watcher_keeps_its_counts_and_its_view(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watch = await placer.launch(behavior_order(watcher("scout1"), [("iros2001", 10)]))
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        for _turn in range(3):
+            await arc.grant()
+            await show(placer, arc, 40, moving=False)
+            await arc.suspend("higher", "console-1", deadline_s=0.0)
+            assert "suspended: higher by console-1" in watch.feedback
+        assert "120 frames, 0 events" in watch.feedback
+        assert watch.statistics()["times_suspended"] == 3
+
+    placer_world(scene)
+
+
+def test_surveillance_gathers_what_its_watchers_see(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        children = [watcher("scout1"), watcher("scout2")]
+        tree = {"type": "surveillance", "name": "surveillance", "priority": 5, "children": children}
+        top = await placer.launch(behavior_order(tree, [("iros2001", 10)]))
+        await placer.wait(lambda: len(placer.arcs) == 2)
+        for scout, arc in (("scout2", placer.arcs["watch-scout2-capture"]),):
+            await arc.grant()
+            await show(placer, arc, 20, moving=False)
+            await show(placer, arc, 30, moving=True)
+            assert f"({scout} 1)" in top.feedback
+        assert top.statistics()["events_scout2"] == 1
+        assert top.children == dict.fromkeys(("watch-scout1", "watch-scout2"), BehaviorStatus.RUNNING)
+
+    placer_world(scene)
+
+
+def test_surveillance_goes_on_without_a_watcher_that_fails_again_and_again(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        tree = {
+            "type": "surveillance",
+            "name": "surveillance",
+            "priority": 5,
+            "children": [watcher("scout1"), watcher("scout2")],
+        }
+        top = await placer.launch(behavior_order(tree, [("iros2001", 10)]))
+        tried: list[Any] = []
+        for _attempt in range(4):
+            await placer.wait(lambda: placer.components.get("watch-scout1") not in (None, *tried))
+            tried.append(placer.components["watch-scout1"])
+            tried[-1].finish(BehaviorStatus.FAILURE, {"detail": "lens cap"})
+        await placer.clock.sleep_s(2.0)
+        assert set(placer.components) == {"surveillance", "watch-scout2"}
+        assert top.status is BehaviorStatus.RUNNING
+
+    placer_world(scene)
+
+
+def test_the_skeleton_turns_keeps_count_over_a_suspension_and_succeeds(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        arc_need = {"kind": "drive", "minimum_runtime_s": 1.0}
+        order = {"type": "skeleton", "name": "bones", "priority": 1, "parameters": {"turns": 2}, "arc": arc_need}
+        bones = await placer.launch(behavior_order(order, [("iros2001", 10)]))
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        await arc.grant()
+        await placer.clock.sleep_s(1.5)
+        await arc.suspend()
+        assert bones.turned == 1
+        await arc.grant()
+        await placer.wait(lambda: bones.status is BehaviorStatus.SUCCESS)
+        assert bones.payload == {"turned": 2}
+        await placer.wait(lambda: not placer.arcs)
+
+    placer_world(scene)

@@ -1,0 +1,468 @@
+"""A behavior among an ARC, a placer, a parent and children, in one process on virtual time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from contextlib import asynccontextmanager
+from typing import Any, ClassVar
+
+import pytest
+from fake_resource_pool import FakePlacer
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.component import Component
+from backbone.errors import Refusal
+from backbone.mission.behavior_orders import behavior_order
+from backbone.placer.messages import NoHost
+from mission_control.behavior import Behavior, NotAChild
+from mission_control.behavior_tree import Decision
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
+from resource_pool.arc_client import Frame, Noted, NotMyArc, Resumed
+
+ARC = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
+Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
+
+
+class Watcher(Behavior[Any]):
+    """Writes down all it hears."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.heard: list[Any] = []
+
+    async def start(self) -> None:
+        self.heard.append("start")
+
+    async def resumed(self, rcs: Mapping[str, str]) -> None:
+        self.heard.append(("resumed", dict(rcs)))
+
+    async def suspending(self, deadline_s: float) -> None:
+        self.heard.append(("suspending", deadline_s))
+
+    async def suspended(self, reason: str, by: str) -> None:
+        self.heard.append(("suspended", reason, by))
+
+    def see(self, frame: Frame) -> None:
+        self.heard.append(("frame", frame.epoch, frame.number))
+
+
+class Parent(Behavior[Any]):
+    """Decides by a list."""
+
+    decisions: ClassVar[list[Decision]] = []
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.finished: list[tuple[str, BehaviorStatus, dict[str, Any]]] = []
+
+    async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> Decision:
+        self.finished.append((child, status, dict(payload)))
+        return self.decisions[len(self.finished) - 1]
+
+
+class Sequence(Parent):
+    children_together = False
+
+
+class Driver(Behavior[Any]):
+    """Drives while it may."""
+
+    async def act(self) -> None:
+        while True:
+            await self.arc.drive(4.0, 4.0)
+            await self.clock.sleep_s(0.1)
+
+
+CLASSES: dict[str, type[Component[Any]]] = {
+    "watcher": Watcher,
+    "parent": Parent,
+    "sequence": Sequence,
+    "driver": Driver,
+}
+
+
+def node(name: str, kind: str = "watcher", priority: int = 3, **rest: Any) -> dict[str, Any]:
+    return {"type": kind, "name": name, "priority": priority, **rest}
+
+
+@pytest.fixture
+def placer_world(local_mission: Any) -> Run:
+    """Run a scene with a placer on a fresh network."""
+
+    @asynccontextmanager
+    async def placer() -> AsyncIterator[FakePlacer]:
+        async with local_mission("iros2001") as network:
+            made = FakePlacer(network, VirtualClock(), CLASSES)
+            try:
+                yield made
+            finally:
+                await made.close()
+
+    def run(scene: Callable[[FakePlacer], Awaitable[None]]) -> None:
+        async def main() -> None:
+            async with placer() as made:
+                await scene(made)
+
+        run_virtual(main())
+
+    return run
+
+
+async def root(placer: FakePlacer, behavior: dict[str, Any]) -> Any:
+    return await placer.launch(behavior_order(behavior, [("iros2001", 10)]))
+
+
+def test_a_behavior_claims_its_arc_with_its_path_wish_and_run_time(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        asked = placer.arcs["watch1-capture"].parameters
+        assert asked["owner"] == "mission_control/watch1"
+        assert asked["path"] == [["iros2001", 10], ["watch1", 3]]
+        assert (asked["wish"], asked["minimum_runtime_s"], asked["console"]) == ({"scout": "scout1"}, 5.0, False)
+
+    placer_world(scene)
+
+
+def test_it_keeps_its_state_over_fifty_suspensions_and_hears_by_whom(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watcher = await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["watch1-capture"]
+        for turn in range(50):
+            await arc.grant()
+            assert watcher.rcs == {"scout": "scout1", "framegrabber": "grabber1"}
+            arc.publish(b"\0" * 4, 2, 2, turn)
+            await placer.clock.sleep_s(0.1)
+            await arc.suspend("higher", f"console-{turn}", deadline_s=0.0)
+            assert watcher.rcs == {}
+            arc.publish(b"\0" * 4, 2, 2, 1000)
+            await placer.clock.sleep_s(0.1)
+        assert placer.components["watch1"] is watcher
+        assert watcher.heard.count("start") == 1
+        assert [heard for heard in watcher.heard if heard[0] == "frame"] == [("frame", n + 1, n) for n in range(50)]
+        suspensions = [heard for heard in watcher.heard if heard[0] == "suspended"]
+        assert suspensions == [("suspended", "higher", f"console-{turn}") for turn in range(50)]
+        assert placer.started == ["watch1", "watch1-capture"]
+
+    placer_world(scene)
+
+
+def test_before_the_end_of_a_slice_it_may_stop_cleanly(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watcher = await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["watch1-capture"]
+        await arc.grant()
+        await arc.suspend("slice", "watch2-capture", deadline_s=0.2)
+        assert watcher.heard[-2:] == [("suspending", 0.2), ("suspended", "slice", "watch2-capture")]
+
+    placer_world(scene)
+
+
+def test_an_arc_that_died_is_claimed_again(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watcher = await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        await placer.arcs["watch1-capture"].grant()
+        await placer.kill("watch1-capture")
+        await placer.wait(lambda: placer.arcs)
+        assert watcher.heard[-1] == ("suspended", "lost", "watch1-capture")
+        arc = placer.arcs["watch1-capture"]
+        await arc.grant()
+        arc.publish(b"\0" * 4, 2, 2, 7)
+        await placer.wait(lambda: watcher.heard[-1] == ("frame", 1, 7))
+
+    placer_world(scene)
+
+
+def test_an_arc_its_creator_restarted_at_once_is_not_claimed_again_but_the_lost_grant_is_heard(
+    placer_world: Run,
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watcher = await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["watch1-capture"]
+        await arc.grant()
+        await placer.kill("watch1-capture")
+        again = await placer.restart("watch1-capture")
+        again.epoch = arc.epoch
+        await again.grant()
+        assert [heard[0] for heard in watcher.heard[-3:]] == ["resumed", "suspended", "resumed"]
+        await placer.clock.sleep_s(3.0)
+        assert placer.started.count("watch1-capture") == 2
+
+    placer_world(scene)
+
+
+def test_a_notice_missed_while_the_arc_was_out_of_sight_is_made_up_for(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        watcher = await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        await placer.arcs["watch1-capture"].grant()
+        await placer.kill("watch1-capture")
+        await placer.restart("watch1-capture")
+        await placer.wait(lambda: watcher.heard[-1] == ("suspended", "slice", "other"))
+
+    placer_world(scene)
+
+
+def test_an_arc_left_from_an_earlier_life_is_ended_and_claimed_anew(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        old = placer.arcs["watch1-capture"]
+        await placer.kill("watch1")
+        await placer.restart("watch1")
+        await placer.wait(lambda: placer.arcs.get("watch1-capture") not in (None, old))
+        assert placer.ended == ["watch1-capture"]
+
+    placer_world(scene)
+
+
+def test_a_notice_of_a_foreign_arc_is_refused(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        with pytest.raises(NotMyArc):
+            await placer.bus.ask("mission_control/watch1", Resumed("other", {}, {}, 1.0), Noted, within_s=1.0)
+
+    placer_world(scene)
+
+
+def test_it_acts_only_while_it_holds_the_robot(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        for _ in range(3):
+            await arc.grant()
+            await placer.clock.sleep_s(1.0)
+            await arc.suspend()
+            count = len(arc.commands)
+            await placer.clock.sleep_s(1.0)
+            assert len(arc.commands) == count
+        assert {epoch for _at_s, epoch, _command in arc.commands} == {1, 2, 3}
+        assert len(arc.commands) >= 27
+
+    placer_world(scene)
+
+
+def test_a_command_that_came_too_late_ends_acting_quietly(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        driver = await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        await arc.grant()
+        arc.granted = False
+        await placer.clock.sleep_s(1.0)
+        assert placer.components["driver"] is driver
+        await arc.grant()
+        await placer.wait(lambda: arc.commands and arc.commands[-1][1] == 2)
+
+    placer_world(scene)
+
+
+def test_told_to_stop_it_gives_its_arc_back(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("watch1", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["watch1-capture"]
+        placer.components["watch1"].end("test")
+        await placer.wait(lambda: not placer.components)
+        assert arc.released
+        assert placer.ended == ["watch1-capture"]
+
+    placer_world(scene)
+
+
+def test_a_parent_starts_its_children_with_their_paths_and_ends_them_with_itself(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        children = [node("left", arc=ARC), node("right", priority=4)]
+        await root(placer, node("surveillance", "parent", 5, children=children))
+        await placer.wait(lambda: {"left", "right"} <= set(placer.components) and placer.arcs)
+        path = placer.arcs["left-capture"].parameters["path"]
+        assert path == [["iros2001", 10], ["surveillance", 5], ["left", 3]]
+        placer.components["surveillance"].end("test")
+        await placer.wait(lambda: not placer.components)
+        assert set(placer.ended) == {"left", "right", "left-capture"}
+
+    placer_world(scene)
+
+
+def test_children_end_when_their_parent_was_killed(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = node("middle", "parent", 5, children=[node("leaf")])
+        await root(placer, node("top", "parent", 5, children=[top]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        await placer.kill("top")
+        await placer.wait(lambda: not placer.components, within_s=3.0)
+
+    placer_world(scene)
+
+
+def test_a_parent_restarted_at_once_finds_its_children_as_they_were(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.NEXT]
+        await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        leaf = placer.components["leaf"]
+        await placer.kill("top")
+        top = await placer.restart("top")
+        await placer.clock.sleep_s(5.0)
+        assert placer.components["leaf"] is leaf
+        assert top.children == {"leaf": BehaviorStatus.RUNNING}
+        leaf.finish(BehaviorStatus.SUCCESS)
+        await placer.wait(lambda: top.status is BehaviorStatus.SUCCESS)
+
+    placer_world(scene)
+
+
+def test_a_childs_end_is_told_to_a_parent_that_was_away(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.NEXT]
+        await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        leaf = placer.components["leaf"]
+        await placer.kill("top")
+        leaf.finish(BehaviorStatus.FAILURE, {"why": "tired"})
+        top = await placer.restart("top")
+        await placer.wait(lambda: top.finished)
+        assert top.finished == [("leaf", BehaviorStatus.FAILURE, {"why": "tired"})]
+
+    placer_world(scene)
+
+
+def test_a_finished_child_is_retried_when_its_parent_decides_so(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.RETRY, Decision.NEXT]
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        first = placer.components["leaf"]
+        first.finish(BehaviorStatus.FAILURE, {"why": "tired"})
+        await placer.wait(lambda: placer.components.get("leaf") not in (None, first))
+        placer.components["leaf"].finish(BehaviorStatus.SUCCESS)
+        await placer.wait(lambda: top.status.is_final)
+        assert top.status is BehaviorStatus.SUCCESS
+        assert [status for _child, status, _payload in top.finished] == ["failure", "success"]
+
+    placer_world(scene)
+
+
+def test_children_in_order_run_one_after_the_other(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.NEXT, Decision.NEXT]
+        top = await root(placer, node("top", "sequence", 5, children=[node("first"), node("second")]))
+        await placer.wait(lambda: "first" in placer.components)
+        await placer.clock.sleep_s(1.0)
+        assert "second" not in placer.components
+        placer.components["first"].finish(BehaviorStatus.SUCCESS)
+        await placer.wait(lambda: "second" in placer.components)
+        assert "first" not in placer.components
+        placer.components["second"].finish(BehaviorStatus.SUCCESS)
+        await placer.wait(lambda: top.status is BehaviorStatus.SUCCESS)
+
+    placer_world(scene)
+
+
+def test_an_aborting_parent_ends_the_other_children_and_fails_with_the_reason(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.ABORT]
+        top = await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
+        await placer.wait(lambda: {"a", "b"} <= set(placer.components))
+        placer.components["a"].finish(BehaviorStatus.FAILURE, {"code": "x"})
+        await placer.wait(lambda: set(placer.components) == {"top"})
+        assert (top.status, top.payload) == (BehaviorStatus.FAILURE, {"child": "a", "code": "x"})
+
+    placer_world(scene)
+
+
+def test_a_claim_that_can_never_be_served_fails_the_child_and_the_parent_hears_why(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.ABORT]
+        placer.refusals["capture"] = NoHost("no host has tag gl")
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf", arc=ARC)]))
+        await placer.wait(lambda: top.finished)
+        [(child, status, payload)] = top.finished
+        assert (child, status, payload["code"]) == ("leaf", BehaviorStatus.FAILURE, "placer.no_host")
+
+    placer_world(scene)
+
+
+def test_a_child_that_cannot_be_started_counts_as_failed(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.ABORT]
+        placer.refusals["watcher"] = NoHost("no host")
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: top.status is BehaviorStatus.FAILURE)
+        assert top.payload["code"] == "placer.no_host"
+
+    placer_world(scene)
+
+
+def test_a_child_its_creator_gave_up_counts_as_failed(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.ABORT]
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        await placer.clock.sleep_s(0.1)
+        await placer.kill("leaf")
+        placer.give_up("leaf")
+        await placer.wait(lambda: top.status is BehaviorStatus.FAILURE)
+        assert top.payload["code"] == "child.given_up"
+
+    placer_world(scene)
+
+
+def test_a_child_stopped_by_the_operator_is_left_alone(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.RETRY]
+        top = await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
+        await placer.wait(lambda: {"a", "b"} <= set(placer.components))
+        del placer.placed["a"]
+        placer.components["a"].end("the operator wants it so")
+        await placer.wait(lambda: "a" not in top.children)
+        assert set(placer.components) == {"top", "b"}
+        assert top.status is BehaviorStatus.RUNNING
+
+    placer_world(scene)
+
+
+def test_only_children_may_report(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        report = Report("leaf", BehaviorStatus.SUCCESS)
+        with pytest.raises(NotAChild):
+            await placer.bus.ask("mission_control/top", report, ReportNoted, within_s=1.0)
+
+    placer_world(scene)
+
+
+def test_it_tells_how_far_it_is_and_draws_its_branch(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        state = await placer.bus.ask("mission_control/top", AskBehavior(), BehaviorState, within_s=1.0)
+        assert state.status is BehaviorStatus.RUNNING
+        assert state.tree.splitlines()[1] == "└─ leaf (watcher, priority 3): running"
+
+    placer_world(scene)
+
+
+def test_parameters_that_do_not_fit_are_refused_before_anything_runs(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        with pytest.raises(Refusal):
+            await root(placer, node("leaf", parameters={"color": "red"}))
+
+    placer_world(scene)
+
+
+def test_a_behaviors_process_loads_neither_pydantic_nor_a_screen() -> None:
+    check = (
+        "import sys, mission_control.behaviors.watch_for_motion, mission_control.behaviors.surveillance;"
+        "sys.exit(', '.join({'pydantic', 'typer', 'textual', 'rich', 'mujoco', 'lxml'} & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", check], check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,156 @@
+"""Laws of motion detection: noise is no motion, a moving body is, a torn picture is nothing."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from mission_control.vision.motion_detection import (
+    FAST_FRAMES,
+    Blob,
+    MotionDetector,
+    changed_pixels,
+    halve,
+    largest_blob,
+    torn_rows,
+)
+
+HEIGHT_PX, WIDTH_PX = 240, 320
+Picture = NDArray[np.uint8]
+
+
+def room(seed: int = 0) -> Picture:
+    """A room of smooth shades and some edges."""
+    rng = np.random.default_rng(seed)
+    coarse = rng.integers(60, 180, (6, 8)).astype(np.uint8)
+    return np.asarray(cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX), interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def noisy(picture: Picture, rng: np.random.Generator, sigma: float) -> Picture:
+    return np.clip(picture + rng.normal(0.0, sigma, picture.shape), 0, 255).astype(np.uint8)
+
+
+def with_block(picture: Picture, x_px: int, y_px: int = 100, side_px: int = 40, grey: int = 230) -> Picture:
+    drawn = picture.copy()
+    drawn[y_px : y_px + side_px, max(x_px, 0) : x_px + side_px] = grey
+    return drawn
+
+
+def look_at(pictures: list[Picture], detector: MotionDetector | None = None) -> list[Blob | None]:
+    detector = detector or MotionDetector()
+    return [detector.look(picture) for picture in pictures]
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), sigma=st.floats(0.0, 25.0))
+def test_noise_alone_is_no_motion(seed: int, sigma: float) -> None:
+    rng = np.random.default_rng(seed)
+    assert not any(look_at([noisy(room(seed), rng, sigma) for _ in range(60)]))
+
+
+def test_a_scene_that_stands_still_is_no_motion() -> None:
+    assert not any(look_at([room()] * 60))
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 1000), speed_px=st.integers(3, 12), sigma=st.floats(0.0, 10.0))
+def test_a_block_that_crosses_the_view_is_found_where_it_is(seed: int, speed_px: int, sigma: float) -> None:
+    rng = np.random.default_rng(seed)
+    still = [noisy(room(seed), rng, sigma) for _ in range(20)]
+    crossing = [noisy(with_block(room(seed), x), rng, sigma) for x in range(0, WIDTH_PX - 40, speed_px)]
+    detector = MotionDetector()
+    assert not any(look_at(still, detector))
+    found = look_at(crossing, detector)
+    assert any(found)
+    for number, blob in enumerate(found):
+        if blob is not None:
+            assert blob.x_px <= number * speed_px + 44
+            assert 80 <= blob.y_px <= 150
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 1000), share=st.floats(0.3, 1.0))
+def test_a_picture_torn_in_many_rows_is_rejected(seed: int, share: float) -> None:
+    rng = np.random.default_rng(seed)
+    detector = MotionDetector()
+    look_at([room(seed)] * 20, detector)
+    for _ in range(30):
+        torn = room(seed).copy()
+        rows = rng.random(HEIGHT_PX // 4).repeat(4) < share
+        torn[rows] = np.where(torn[rows] > 127, 0, 255)
+        assert detector.look(torn) is None
+        for _ in range(4):
+            assert detector.look(room(seed)) is None
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 1000))
+def test_single_torn_rows_are_no_motion(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    detector = MotionDetector()
+    for _ in range(60):
+        torn = noisy(room(seed), rng, 5.0)
+        for row in rng.integers(0, HEIGHT_PX - 3, 4):
+            torn[row : row + rng.integers(1, 4)] = rng.choice([0, 255])
+        assert detector.look(torn) is None
+
+
+def test_a_flash_of_one_picture_is_outvoted() -> None:
+    detector = MotionDetector()
+    pictures = [room()] * 20 + [with_block(room(), 100)] * 2 + [room()] * 20
+    assert not any(look_at(pictures, detector))
+
+
+def test_after_a_swap_a_changed_view_is_learned_without_an_alarm() -> None:
+    """A robot that somebody drove meanwhile looks elsewhere; that is no motion."""
+    detector = MotionDetector()
+    look_at([room(1)] * 30, detector)
+    detector.swapped_in()
+    assert not any(look_at([room(2)] * 60, detector))
+
+
+def test_the_view_is_remembered_over_a_swap() -> None:
+    """What moves right after the swap is found as soon as the fast frames are over."""
+    detector = MotionDetector()
+    look_at([room()] * 30, detector)
+    detector.swapped_in()
+    found = look_at([with_block(room(), 10 * number) for number in range(20)], detector)
+    assert not any(found[:FAST_FRAMES])
+    assert any(found[FAST_FRAMES : FAST_FRAMES + 4])
+
+
+def test_a_picture_of_another_size_starts_afresh() -> None:
+    detector = MotionDetector()
+    look_at([room()] * 30, detector)
+    assert detector.look(np.full((120, 160), 200, np.uint8)) is None
+
+
+def test_only_grey_pictures_are_looked_at() -> None:
+    with pytest.raises(ValueError, match="grey"):
+        MotionDetector().look(np.zeros((4, 4, 3), np.uint8))
+
+
+def test_halving_takes_the_mean_of_four() -> None:
+    picture = np.array([[0, 100, 8, 8], [100, 200, 8, 8]], np.uint8)
+    assert halve(picture).tolist() == [[100, 8]]
+
+
+def test_the_bar_rises_with_the_mean_difference() -> None:
+    average = np.zeros((10, 10), np.float32)
+    assert not changed_pixels(average, np.full((10, 10), 60.0, np.float32)).any()
+    one = average.copy()
+    one[3, 3] = 60.0
+    assert changed_pixels(average, one).sum() == 1
+
+
+def test_a_streak_is_no_body() -> None:
+    changed = np.zeros((50, 50), np.bool_)
+    changed[10:13, 5:45] = True
+    assert not torn_rows(changed[:, :10]).all()
+    assert largest_blob(changed) is None
+    changed[20:30, 20:28] = True
+    assert largest_blob(changed) == Blob(40, 40, 16, 20, 320)
