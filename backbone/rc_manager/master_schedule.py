@@ -277,13 +277,19 @@ class MasterSchedule:
         """Return ARCs of one group in the order of rule 2."""
         return by_precedence(arcs, lambda arc: arc.path, lambda arc: arc.seniority)
 
-    def plan(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
-        """Return the place of every queued ARC of the group, in order."""
-        holders = [arc for arc in group if arc.holds]
+    def plan(self, group: Sequence[ArcEntry], now_s: float, *, handed_over: bool = False) -> list[Slot]:
+        """Return the place of every queued ARC of the group, in order.
+
+        Args:
+            group: Active ARCs.
+            now_s: From when on.
+            handed_over: Plan as if all RCs that are being freed were free already.
+        """
+        holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
         slots: list[Slot] = []
         for arc in self.in_order([arc for arc in group if arc.queued]):
             against = self._against(arc, holders, slots, now_s)
-            from_s = self.free_s(arc, now_s) if arc.holds else now_s
+            from_s = self.free_s(arc, now_s) if arc in holders else now_s
             start_s = self._earliest_s(arc, from_s, against) if self.usable(arc) else math.inf
             slots.append(Slot(arc, start_s, against))
         return slots
@@ -331,23 +337,34 @@ class MasterSchedule:
     # Whose time has come (rules 3, 4, 8).
 
     def due(self, now_s: float) -> Turn | None:
-        """Return the first ARC in order whose planned start is now, and who must go for it; None if nobody's is."""
+        """Return the first ARC in order whose time is now, and who must go for it; None if nobody's is."""
         for group in self.groups():
-            if not any(arc.state is RequestState.WAITING for arc in group):
-                continue
-            slots = self.plan(group, now_s)
-            handed_over_s = max(
-                (self.free_s(arc, now_s) for arc in group if arc.state is RequestState.REVOKING), default=now_s
-            )
-            pending: list[ArcEntry] = []
-            for slot in slots:
-                if slot.arc.state is not RequestState.WAITING:
-                    continue
-                if slot.start_s <= now_s + INSTANT_S and not self._must_let_higher_go_first(slot.arc, group):
-                    return Turn(slot.arc, self._in_the_way(slot.arc, pending, group, now_s))
-                if slot.start_s <= handed_over_s:
-                    pending.append(slot.arc)
+            turn = self._due_in(group, now_s) if any(arc.state is RequestState.WAITING for arc in group) else None
+            if turn is not None:
+                return turn
         return None
+
+    def _due_in(self, group: Sequence[ArcEntry], now_s: float) -> Turn | None:
+        slots = self.plan(group, now_s)
+        # RCs under hand-over may come free earlier than predicted. Nobody is displaced for a gap that would be gone then.
+        at_once = self._starting(self.plan(group, now_s, handed_over=True), now_s) if _in_hand_over(group) else None
+        pending: list[ArcEntry] = []
+        for slot in slots:
+            arc = slot.arc
+            if arc.state is not RequestState.WAITING or self._must_let_higher_go_first(arc, group):
+                continue
+            if slot.start_s <= now_s + INSTANT_S:
+                in_the_way = self._in_the_way(arc, pending, group, now_s)
+                if in_the_way and (at_once is None or arc in at_once):
+                    return Turn(arc, in_the_way)
+                if not in_the_way and self.fits(arc, [holder for holder in group if holder.holds]):
+                    return Turn(arc, [])
+            if at_once is not None and arc in at_once:
+                pending.append(arc)
+        return None
+
+    def _starting(self, slots: Iterable[Slot], now_s: float) -> set[ArcEntry]:
+        return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
 
     def _in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
@@ -357,9 +374,9 @@ class MasterSchedule:
         Those who only wait for RCs that are being freed (``pending``) count as if they had started:
         else the room made here is theirs in a moment and both would displace each other again and again.
         """
-        holders = [h for h in group if h.state in CONNECTED and _share_rc(h, arc)]
-        movable = [h for h in holders if self.stands_until_s(h, arc, now_s) <= now_s + INSTANT_S]
-        staying = [h for h in holders if h not in movable] + [p for p in pending if _share_rc(p, arc)]
+        holders = [holder for holder in group if holder.state in CONNECTED and _share_rc(holder, arc)]
+        movable = [holder for holder in holders if self.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S]
+        staying = [holder for holder in holders if holder not in movable] + [p for p in pending if _share_rc(p, arc)]
         return self.left_over(arc, staying, movable)
 
     def left_over(self, arc: ArcEntry, staying: Sequence[ArcEntry], movable: Sequence[ArcEntry]) -> list[ArcEntry]:
@@ -413,6 +430,10 @@ class MasterSchedule:
 def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
     """Return the holds that overlap this span."""
     return [hold for hold in holds if hold.start_s < end_s - INSTANT_S and hold.end_s > start_s + INSTANT_S]
+
+
+def _in_hand_over(group: Iterable[ArcEntry]) -> bool:
+    return any(arc.state is RequestState.REVOKING for arc in group)
 
 
 def _share_rc(a: ArcEntry, b: ArcEntry) -> bool:
