@@ -1,0 +1,56 @@
+"""What the simulated hardware refuses. This package knows no bus, so it has a tree of its own."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+
+class ScoutModelError(Exception):
+    """Root of everything this package raises on purpose.
+
+    Attributes:
+        code: Stable word for machines, ``subject.reason``.
+        remedy: What the caller can do about it.
+    """
+
+    code: ClassVar[str] = "scout_model"
+    remedy: ClassVar[str] = ""
+
+    def __str__(self) -> str:
+        detail = str(self.args[0]) if self.args else self.code
+        return f"{detail} ({self.remedy})" if self.remedy else detail
+
+
+class UnknownBody(ScoutModelError, KeyError):
+    """No body of this name is in the world."""
+
+    code = "world.unknown_body"
+    remedy = "Ask for a Scout or target named in the world's description."
+
+
+class InvalidWorld(ScoutModelError, ValueError):
+    """The description cannot be built."""
+
+    code = "world.invalid"
+    remedy = "Correct the description of the world."
+
+
+class MalformedPacket(ScoutModelError, ValueError):
+    """These bytes, or these values, are no packet of the command radio."""
+
+    code = "radio.malformed"
+    remedy = "Build packets with the encode functions of scout_model.radio_link."
+
+
+class StateMismatch(ScoutModelError, ValueError):
+    """The state belongs to another world than the camera's."""
+
+    code = "camera.state"
+    remedy = "Build the camera from the MJCF of the world whose state it shows."
+
+
+class RenderingUnavailable(ScoutModelError, RuntimeError):
+    """OpenGL cannot be used in this process."""
+
+    code = "camera.no_gl"
+    remedy = "Call scout_model.gl_probe.prepare before anything imports mujoco, or use the paint backend."

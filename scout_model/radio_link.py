@@ -1,0 +1,161 @@
+"""The command radio's packets: what a Scout understands, as bytes.
+
+A packet is one byte that says which command it is, then the command's values in network byte order:
+
+* ``D`` drive: two 32-bit floats, left and right wheel in rad/s, forward is positive
+* ``H`` halt, ``J`` jump, ``S`` safe, ``X`` transmitter off: nothing more
+* ``V`` transmitter on: name of the video frequency, 1 to 15 ASCII characters
+
+The network id that addresses a Scout is the radio's business and stands outside of the payload.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+
+from scout_model.errors import MalformedPacket
+
+MAX_FREQUENCY_NAME_BYTES = 15  # chosen: a transmitter-on packet then has 16 bytes
+FIRST_NETWORK_ID = 1
+LAST_NETWORK_ID = 254  # chosen: one byte, without all zeros and all ones
+
+_DRIVE = struct.Struct("!ff")
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Turn the wheels at these speeds, forward is positive."""
+
+    left_rad_s: float
+    right_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Stop the wheels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """Lower the foot, kick, wind the spring again."""
+
+
+@dataclass(frozen=True, slots=True)
+class TransmitterOn:
+    """Send the camera's picture on this frequency."""
+
+    frequency: str
+
+
+@dataclass(frozen=True, slots=True)
+class TransmitterOff:
+    """Send no picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class Safe:
+    """Stop the wheels and send no picture."""
+
+
+Packet = Drive | Halt | Jump | TransmitterOn | TransmitterOff | Safe
+
+
+def encode_drive(left_rad_s: float, right_rad_s: float) -> bytes:
+    """Return the packet that turns the wheels.
+
+    Raises:
+        MalformedPacket: A speed is not finite or too large for 32 bits.
+    """
+    if not (math.isfinite(left_rad_s) and math.isfinite(right_rad_s)):
+        raise MalformedPacket(f"wheel speeds {left_rad_s}, {right_rad_s} are not finite")
+    try:
+        return b"D" + _DRIVE.pack(left_rad_s, right_rad_s)
+    except OverflowError as error:
+        raise MalformedPacket(f"wheel speeds {left_rad_s}, {right_rad_s} do not fit 32 bits") from error
+
+
+def encode_halt() -> bytes:
+    """Return the packet that stops the wheels."""
+    return b"H"
+
+
+def encode_jump() -> bytes:
+    """Return the packet that makes the Scout jump."""
+    return b"J"
+
+
+def encode_transmitter_on(frequency: str) -> bytes:
+    """Return the packet that switches the video transmitter on.
+
+    Raises:
+        MalformedPacket: The name is empty, too long, or not printable ASCII without spaces.
+    """
+    _check_frequency(frequency)
+    return b"V" + frequency.encode("ascii")
+
+
+def encode_transmitter_off() -> bytes:
+    """Return the packet that switches the video transmitter off."""
+    return b"X"
+
+
+def encode_safe() -> bytes:
+    """Return the packet that stops the wheels and switches the transmitter off."""
+    return b"S"
+
+
+def decode(payload: bytes) -> Packet:
+    """Return what the packet says.
+
+    Raises:
+        MalformedPacket: The bytes are no packet.
+
+    Example:
+        >>> decode(encode_drive(1.0, -1.0))
+        Drive(left_rad_s=1.0, right_rad_s=-1.0)
+    """
+    command, values = payload[:1], payload[1:]
+    if command == b"D":
+        return _decode_drive(values)
+    if command == b"V":
+        return _decode_transmitter_on(values)
+    if values:
+        raise MalformedPacket(f"{len(values)} bytes follow a command {command!r}, which takes none")
+    match command:
+        case b"H":
+            return Halt()
+        case b"J":
+            return Jump()
+        case b"S":
+            return Safe()
+        case b"X":
+            return TransmitterOff()
+    raise MalformedPacket(f"no command begins with {command!r}")
+
+
+def _decode_drive(values: bytes) -> Drive:
+    if len(values) != _DRIVE.size:
+        raise MalformedPacket(f"drive takes {_DRIVE.size} bytes of speeds, not {len(values)}")
+    left_rad_s, right_rad_s = _DRIVE.unpack(values)
+    if not (math.isfinite(left_rad_s) and math.isfinite(right_rad_s)):
+        raise MalformedPacket(f"wheel speeds {left_rad_s}, {right_rad_s} are not finite")
+    return Drive(left_rad_s, right_rad_s)
+
+
+def _decode_transmitter_on(values: bytes) -> TransmitterOn:
+    try:
+        frequency = values.decode("ascii")
+    except UnicodeDecodeError as error:
+        raise MalformedPacket(f"the name of a frequency is not ASCII: {values!r}") from error
+    _check_frequency(frequency)
+    return TransmitterOn(frequency)
+
+
+def _check_frequency(frequency: str) -> None:
+    legal = frequency.isascii() and frequency.isprintable() and " " not in frequency
+    if not legal or not 1 <= len(frequency) <= MAX_FREQUENCY_NAME_BYTES:
+        raise MalformedPacket(
+            f"{frequency!r} names no frequency: 1 to {MAX_FREQUENCY_NAME_BYTES} printable ASCII characters, no space"
+        )

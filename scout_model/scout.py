@@ -1,0 +1,198 @@
+"""The Scout's firmware: what the robot does with the packets it hears.
+
+Packets and time go in, positions of the actuators come out; physics is the world's business.
+
+Rules:
+
+* A packet that is none changes nothing, also not the watchdog.
+* Without a packet for ``COMMAND_TIMEOUT_S`` the wheels stop and the transmitter goes off.
+* A jump is preload, kick, rewind.  Until the spring is wound another jump is refused.  Halt, safe
+  and the watchdog stop a jump that has not kicked yet; a released spring stops for nobody.
+
+Source: IROS 2001, section 2: the on-board processors do communications and actuator control only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import assert_never
+
+from scout_model.dimensions import (
+    COMMAND_TIMEOUT_S,
+    FOOT_PRELOAD_M,
+    FOOT_STROKE_M,
+    KICK_S,
+    PRELOAD_S,
+    WHEEL_SPEED_LIMIT_RAD_S,
+    WINCH_SPEED_M_S,
+)
+from scout_model.errors import MalformedPacket
+from scout_model.radio_link import Drive, Halt, Jump, Safe, TransmitterOff, TransmitterOn, decode
+
+
+class Spring(StrEnum):
+    """Where the spring foot is in its jump."""
+
+    WOUND = "wound"
+    PRELOADING = "preloading"
+    KICKING = "kicking"
+    REWINDING = "rewinding"
+
+
+@dataclass(frozen=True, slots=True)
+class Actuation:
+    """What the actuators shall do until the next tick.
+
+    Attributes:
+        left_rad_s: Left wheel, forward is positive, within ``WHEEL_SPEED_LIMIT_RAD_S``.
+        right_rad_s: Right wheel.
+        kick: True while the latch of the spring is open.
+        winch_m: How far the winch lets the foot out, 0 to ``FOOT_STROKE_M``.
+    """
+
+    left_rad_s: float
+    right_rad_s: float
+    kick: bool
+    winch_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class FirmwareStatistics:
+    """Counted since the robot was switched on.
+
+    Attributes:
+        heard: Packets obeyed.
+        malformed: Packets ignored because they were none.
+        refused_jumps: Jumps asked for while the spring was not wound.
+        timeouts: Times the watchdog stopped wheels or transmitter.
+    """
+
+    heard: int
+    malformed: int
+    refused_jumps: int
+    timeouts: int
+
+
+def clip_wheel_speed(speed_rad_s: float) -> float:
+    """Return the speed the wheel is really driven at when asked for this one.
+
+    Example:
+        >>> clip_wheel_speed(-100.0)
+        -17.5
+    """
+    return max(-WHEEL_SPEED_LIMIT_RAD_S, min(WHEEL_SPEED_LIMIT_RAD_S, speed_rad_s))
+
+
+class Firmware:
+    """One Scout's on-board program; wheels at rest, transmitter off and spring wound at the beginning."""
+
+    def __init__(self) -> None:
+        self._left_rad_s = self._right_rad_s = 0.0
+        self._frequency = ""
+        self._heard_s = 0.0
+        self._spring = Spring.WOUND
+        self._spring_since_s = 0.0
+        self._let_out_m = 0.0
+        self._heard = self._malformed = self._refused_jumps = self._timeouts = 0
+
+    @property
+    def frequency(self) -> str:
+        """Where the transmitter sends, empty while it is off."""
+        return self._frequency
+
+    @property
+    def spring(self) -> Spring:
+        """Where the spring foot is in its jump."""
+        return self._spring
+
+    def statistics(self) -> FirmwareStatistics:
+        """Return the counts so far."""
+        return FirmwareStatistics(self._heard, self._malformed, self._refused_jumps, self._timeouts)
+
+    def hear(self, payload: bytes, now_s: float) -> None:
+        """Obey one packet; ignore and count it if it is malformed.
+
+        Args:
+            payload: As ``scout_model.radio_link`` encodes it.
+            now_s: Time, never before an earlier call's.
+        """
+        try:
+            packet = decode(payload)
+        except MalformedPacket:
+            self._malformed += 1
+            return
+        self._heard += 1
+        self._heard_s = now_s
+        match packet:
+            case Drive(left_rad_s, right_rad_s):
+                self._left_rad_s, self._right_rad_s = clip_wheel_speed(left_rad_s), clip_wheel_speed(right_rad_s)
+            case Halt():
+                self._halt(now_s)
+            case Jump():
+                self._jump(now_s)
+            case TransmitterOn(frequency):
+                self._frequency = frequency
+            case TransmitterOff():
+                self._frequency = ""
+            case Safe():
+                self._safe(now_s)
+            case _:
+                assert_never(packet)
+
+    def tick(self, now_s: float) -> Actuation:
+        """Advance watchdog and jump to this time and return what the actuators shall do."""
+        is_active = self._left_rad_s or self._right_rad_s or self._frequency or self._spring is Spring.PRELOADING
+        if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
+            self._timeouts += 1
+            self._safe(now_s)
+        winch_m = self._advance_spring(now_s)
+        return Actuation(self._left_rad_s, self._right_rad_s, self._spring is Spring.KICKING, winch_m)
+
+    def _halt(self, now_s: float) -> None:
+        self._left_rad_s = self._right_rad_s = 0.0
+        if self._spring is Spring.PRELOADING:
+            self._rewind(FOOT_PRELOAD_M, now_s)
+
+    def _safe(self, now_s: float) -> None:
+        self._halt(now_s)
+        self._frequency = ""
+
+    def _jump(self, now_s: float) -> None:
+        if self._spring is not Spring.WOUND:
+            self._refused_jumps += 1
+            return
+        # A body that rolls while its foot is on the floor trips over it.
+        self._left_rad_s = self._right_rad_s = 0.0
+        self._enter(Spring.PRELOADING, now_s)
+
+    def _rewind(self, let_out_m: float, now_s: float) -> None:
+        self._let_out_m = let_out_m
+        self._enter(Spring.REWINDING, now_s)
+
+    def _enter(self, spring: Spring, now_s: float) -> None:
+        self._spring, self._spring_since_s = spring, now_s
+
+    def _advance_spring(self, now_s: float) -> float:
+        """Return how far the winch lets the foot out."""
+        elapsed_s = now_s - self._spring_since_s
+        match self._spring:
+            case Spring.WOUND:
+                return 0.0
+            case Spring.PRELOADING:
+                if elapsed_s < PRELOAD_S:
+                    return FOOT_PRELOAD_M
+                self._enter(Spring.KICKING, now_s)
+                return FOOT_STROKE_M
+            case Spring.KICKING:
+                if elapsed_s >= KICK_S:
+                    self._rewind(FOOT_STROKE_M, now_s)
+                return FOOT_STROKE_M
+            case Spring.REWINDING:
+                winch_m = self._let_out_m - WINCH_SPEED_M_S * elapsed_s
+                if winch_m > 0:
+                    return winch_m
+                self._enter(Spring.WOUND, now_s)
+                return 0.0
+            case _:
+                assert_never(self._spring)

@@ -1,0 +1,68 @@
+"""Where a target is: a pure function of time, so every trial meets the same one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scout_model.description import Target
+
+
+@dataclass(frozen=True, slots=True)
+class TargetPose:
+    """A target at one time.
+
+    Attributes:
+        x_m: Position.
+        y_m: Position.
+        heading_rad: Direction of its last or next movement.
+        walked_m: Way behind it since the path's end it came from.
+    """
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    walked_m: float
+
+
+def path_length_m(path: list[tuple[float, float]]) -> float:
+    """Return the length of the path through these points, metres."""
+    return sum(math.dist(a, b) for a, b in zip(path, path[1:], strict=False))
+
+
+def where(target: Target, time_s: float) -> TargetPose:
+    """Return the target's pose at this world time.
+
+    Before ``begin_s`` it stands at the first point.  Then it moves to the last, rests, and comes
+    back along the path (and rests again) or is at the first point at once.
+
+    Example:
+        >>> there = Target("p", "pioneer", [(0.0, 3.0), (9.0, 3.0)], speed_m_s=0.5, rest_s=2.0)
+        >>> where(there, 4.0).x_m, where(there, 19.0).x_m, where(there, 21.0).x_m
+        (2.0, 9.0, 8.5)
+    """
+    length_m = path_length_m(target.path)
+    leg_s = length_m / target.speed_m_s
+    lap_s = leg_s + target.rest_s
+    elapsed_s = max(0.0, time_s - target.begin_s)
+    lap, lap_elapsed_s = divmod(elapsed_s, lap_s)
+    walked_m = min(length_m, lap_elapsed_s * target.speed_m_s)
+    is_coming_back = target.there_and_back and lap % 2 == 1
+    return _along(target.path[::-1] if is_coming_back else target.path, walked_m)
+
+
+def _along(path: list[tuple[float, float]], walked_m: float) -> TargetPose:
+    left_m = walked_m
+    segments = [(a, b) for a, b in zip(path, path[1:], strict=False) if a != b]
+    for number, (a, b) in enumerate(segments):
+        segment_m = math.dist(a, b)
+        if left_m <= segment_m or number == len(segments) - 1:
+            share = min(1.0, left_m / segment_m)
+            return TargetPose(
+                a[0] + share * (b[0] - a[0]),
+                a[1] + share * (b[1] - a[1]),
+                math.atan2(b[1] - a[1], b[0] - a[0]),
+                walked_m,
+            )
+        left_m -= segment_m
+    raise ValueError("a path needs two different points")
