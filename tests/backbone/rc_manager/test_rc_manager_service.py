@@ -185,7 +185,11 @@ class Pool:
 def request(arc: str, *rcs: str, priority: int | None = None, minimum_runtime_s: float = 5.0) -> SchedulingRequest:
     """Ask as a behavior, or with a priority as a console."""
     uses = {rc: RcUse([Usage(0.05, 0.002)]) if rc == "radio" else RcUse() for rc in rcs}
-    path = [PathNode("local", 10), PathNode(f"owner-{arc}", 1)] if priority is None else [PathNode(f"console-{arc}", priority)]
+    path = (
+        [PathNode("local", 10), PathNode(f"owner-{arc}", 1)]
+        if priority is None
+        else [PathNode(f"console-{arc}", priority)]
+    )
     return SchedulingRequest(arc, f"mission_control/owner-{arc}", path, priority is not None, [uses], minimum_runtime_s)
 
 
@@ -217,7 +221,7 @@ def test_two_equals_share_a_frequency_five_seconds_each(pool: Any) -> None:
             second = await two.ask_for(request("two", "right", "video", "radio"))
             assert first.state is RequestState.CONNECTING
             assert (second.state, second.blockers) == (RequestState.WAITING, ["one"])
-            await here.clock.sleep_until_s(27.0)
+            await here.clock.sleep_until_s(26.0)
             opens = sorted((at, arc.name) for arc in (one, two) for what, _, at in arc.log if what == "open")
             assert [name for _, name in opens] == ["one", "two"] * 2 + ["one"]
             gaps = [later - earlier for (earlier, _), (later, _) in zip(opens, opens[1:], strict=False)]
@@ -345,7 +349,9 @@ def test_impossible_requests_are_refused_with_their_numbers(pool: Any) -> None:
             one = await here.arc("one")
             with pytest.raises(UnknownRc):
                 await one.ask_for(request("one", "nothing"))
-            greedy = msgspec.structs.replace(request("one", "left"), alternatives=[{"radio": RcUse([Usage(0.01, 0.02)])}])
+            greedy = msgspec.structs.replace(
+                request("one", "left"), alternatives=[{"radio": RcUse([Usage(0.01, 0.02)])}]
+            )
             with pytest.raises(CapacityExceeded) as refused:
                 await one.ask_for(greedy)
             assert refused.value.facts["demanded"] == pytest.approx(2.0)
