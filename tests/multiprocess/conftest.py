@@ -31,7 +31,8 @@ def judged() -> Judged:
         judge = judge_path()
         if judge is None:
             return
-        done = subprocess.run([sys.executable, str(judge), str(trace)], capture_output=True, text=True, timeout=60, check=False)
+        command = [sys.executable, str(judge), str(trace)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
         violations = [line for line in done.stdout.splitlines() if line.split(": ", 1)[-1].split(" ")[0] not in allowed]
         assert len(violations) == 1, done.stdout + done.stderr
 

@@ -46,7 +46,9 @@ class RunningMission:
     launcher: subprocess.Popen[str]
     lines: list[str] = field(default_factory=list)
 
-    def command(self, *words: str, within_s: float = 60.0, stdin: str | None = None) -> subprocess.CompletedProcess[str]:
+    def command(
+        self, *words: str, within_s: float = 60.0, stdin: str | None = None
+    ) -> subprocess.CompletedProcess[str]:
         """Run ``scout-backbone`` or ``scout-console`` with these words beside the mission."""
         return subprocess.run(
             [str(BIN / words[0]), *words[1:]],
@@ -204,5 +206,4 @@ def wait_gone(mark: str, within_s: float) -> list[psutil.Process]:
 
 def _read(launcher: subprocess.Popen[str], lines: list[str]) -> None:
     assert launcher.stderr is not None
-    for line in launcher.stderr:
-        lines.append(line.rstrip())
+    lines.extend(line.rstrip() for line in launcher.stderr)

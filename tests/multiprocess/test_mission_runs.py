@@ -15,6 +15,7 @@ from resource_pool.messages import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
+RCS = {"scout1", "scout2", "scout3", "radio", "video1", "grabber"}
 CORE_ORDER = ["nameserver", "component_database", "placer", "creator-base", "dependency_database", "rc_manager"]
 
 
@@ -38,9 +39,9 @@ def test_status_lists_every_component_under_one_of_four_subsystems(mission: Runn
     status = mission.status()
     by_name = {component["name"]: component for component in status["components"]}
     assert set(CORE_ORDER) <= set(by_name)
-    assert {by_name[rc]["subsystem"] for rc in ("scout1", "scout2", "scout3", "radio", "video1", "grabber")} == {"resource_pool"}
+    assert {by_name[rc]["subsystem"] for rc in RCS} == {"resource_pool"}
     assert by_name["watch-scout1"]["subsystem"] == "mission_control"
-    assert {rc["rc"] for rc in status["rcs"]} == {"scout1", "scout2", "scout3", "radio", "video1", "grabber"}
+    assert {rc["rc"] for rc in status["rcs"]} == RCS
     assert not status["problems"]
 
 
@@ -75,7 +76,8 @@ def test_a_second_mission_of_the_same_name_is_refused(mission: RunningMission) -
 
 def test_components_are_started_and_stopped_while_the_others_keep_their_processes(mission: RunningMission) -> None:
     before = {c["name"]: c["pid"] for c in mission.status()["components"] if "-capture" not in c["name"]}
-    started = mission.command("scout-backbone", "start", "video_frequency", "--name", "video9", "--mission", mission.name)
+    words = ("scout-backbone", "start", "video_frequency", "--name", "video9", "--mission", mission.name)
+    started = mission.command(*words)
     assert started.returncode == 0, started.stderr
     assert mission.component("video9")["state"] == "ready"
     stopped = mission.command("scout-backbone", "stop", "video9", "--mission", mission.name)
@@ -92,9 +94,8 @@ async def test_a_console_drives_a_robot_and_its_behavior_goes_on_afterwards(miss
     async with mission.bus() as bus:
         before = await bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=2)
         script = '{"at_s":0.2,"left_rad_s":6,"right_rad_s":-6}\n{"at_s":1.2,"release":true}\n'
-        done = mission.command(
-            "scout-console", "attach", "scout1", "--priority", "100", "--mission", mission.name, "--script", "-", stdin=script
-        )
+        words = ("scout-console", "attach", "scout1", "--priority", "100", "--mission", mission.name, "--script", "-")
+        done = mission.command(*words, stdin=script)
         after = await bus.ask("resource_pool/world", AskPose("scout1"), Pose, within_s=2)
     events = [json.loads(line) for line in done.stdout.splitlines()]
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{mission.story()}"
