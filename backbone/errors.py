@@ -44,7 +44,8 @@ class Refusal(BackboneError):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        _classes_by_code[cls.code] = cls
+        if "code" in cls.__dict__:  # a class that inherits its code travels as the class it inherits it from
+            _classes_by_code[cls.code] = cls
 
     def __str__(self) -> str:
         return f"{self.detail} ({self.remedy})"
@@ -62,14 +63,19 @@ class UnknownRefusal(Refusal):
 def revive(code: str, detail: str, remedy: str, facts: Mapping[str, Fact]) -> Refusal:
     """Return the refusal that was sent, as the class it had there if this process knows it.
 
+    What was sent is taken as it is: the class's own constructor is not called, so no content can
+    make this fail.
+
     Example:
         >>> revive("refused", "no", "ask later", {}).remedy
         'ask later'
     """
     kind = Refusal if code == Refusal.code else _classes_by_code.get(code)
     if kind is None:
-        return UnknownRefusal(detail, remedy=remedy, **{**facts, "code": code})
-    return kind(detail, remedy=remedy, **facts)
+        kind, facts = UnknownRefusal, {**facts, "code": code}
+    refusal = kind.__new__(kind, detail)
+    refusal.detail, refusal.remedy, refusal.facts = detail, remedy, facts
+    return refusal
 
 
 def code_of(refusal: Refusal) -> str:

@@ -6,10 +6,14 @@ The only place that knows how a key is spelt.  Components speak of addresses
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from functools import lru_cache
 
+from backbone.naming import IllegalName
+
 ROOT = "scout"
+_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # what a key expression may hold between slashes, or * for any one
 
 
 class Conversation(StrEnum):
@@ -36,7 +40,13 @@ def key(mission: str, address: str, conversation: Conversation) -> str:
     Example:
         >>> key("iros2001", "resource_pool/scout1", Conversation.ASK)
         'scout/iros2001/resource_pool/scout1/ask'
+
+    Raises:
+        IllegalName: Mission or address cannot be part of a key.
     """
+    for segment in (mission, *address.split("/")):
+        if _SEGMENT.fullmatch(segment) is None:
+            raise IllegalName(f"{segment!r} in {mission}/{address} cannot be part of a key", name=segment)
     return f"{ROOT}/{mission}/{address}/{conversation}"
 
 

@@ -40,7 +40,7 @@ class Message(
     """Base of everything said on the bus. Derived classes repeat ``frozen=True`` for the type checker."""
 
 
-class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True):
+class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forbid_unknown_fields=True):
     """A message and where it comes from.
 
     Attributes:
@@ -112,6 +112,7 @@ class WrongVersion(Refusal):
 
 
 _encoder = msgspec.msgpack.Encoder()
+_UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # all that msgspec raises on bad bytes
 
 
 def write(envelope: Envelope[Any]) -> bytes:
@@ -131,6 +132,11 @@ def schema_of(kind: type[Any]) -> str:
     return cast(str, kind.__struct_config__.tag)
 
 
+def kinds_of(accepts: type[Any] | types.UnionType) -> tuple[type[Any], ...]:
+    """Return the message classes of a union, or the one class."""
+    return typing.get_args(accepts) or (accepts,)
+
+
 class Reader(Generic[Body]):
     """Reads the messages of one conversation.
 
@@ -139,8 +145,7 @@ class Reader(Generic[Body]):
     """
 
     def __init__(self, accepts: type[Body] | types.UnionType) -> None:
-        kinds = typing.get_args(accepts) or (accepts,)
-        self._accepted = tuple(sorted(schema_of(kind) for kind in kinds))
+        self._accepted = tuple(sorted(schema_of(kind) for kind in kinds_of(accepts)))
         self._decoder = msgspec.msgpack.Decoder(Envelope[accepts])  # type: ignore[valid-type]
 
     def read(self, raw: bytes) -> Envelope[Body]:
@@ -156,7 +161,7 @@ class Reader(Generic[Body]):
             raise OversizedMessage(f"message of {len(raw)} bytes", bytes=len(raw))
         try:
             envelope = self._decoder.decode(raw)
-        except msgspec.DecodeError as error:
+        except _UNREADABLE as error:
             raise self._diagnose(raw, str(error)) from None
         if envelope.wire != WIRE_VERSION:
             raise WrongVersion(f"envelope version {envelope.wire}, this is {WIRE_VERSION}", got=envelope.wire)
@@ -165,7 +170,7 @@ class Reader(Generic[Body]):
     def _diagnose(self, raw: bytes, complaint: str) -> Refusal:
         try:
             outer = msgspec.msgpack.decode(raw)
-        except (msgspec.DecodeError, RecursionError):
+        except _UNREADABLE:
             return MalformedMessage(f"not MessagePack: {complaint}")
         match outer:
             case [int(version), *_] if version != WIRE_VERSION:

@@ -53,7 +53,11 @@ class Clock(Protocol):
 
 
 class Bus(Protocol):
-    """How components talk."""
+    """How components talk.
+
+    Addresses and missions that cannot be part of a key are refused with ``IllegalName``. On a closed bus
+    asking ends with ``NoResponder``, publishing does nothing, and declaring anything is a bug.
+    """
 
     @property
     def mission(self) -> str:
@@ -76,6 +80,7 @@ class Bus(Protocol):
             Refusal: It understood and said no, as the class it raised there.
             NoResponder: Nobody is there, or it died before it answered. The outcome is unknown.
             ReplyTimeout: No answer in time. The outcome is unknown.
+            MalformedMessage: The answer is none of class ``reply``. The outcome is unknown.
         """
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
@@ -95,7 +100,8 @@ class Bus(Protocol):
         """Call the listener, in the event loop, with each publication under this address (``*`` matches a segment).
 
         Args:
-            latest: Keep only the newest undelivered publication (pictures, states); else all, in order of each source.
+            latest: Keep only the newest undelivered publication of each address (pictures, states); else all, in
+                the order in which each source said them.
         """
 
     def declare_alive(self, address: str) -> Subscription:
@@ -122,7 +128,10 @@ class Bus(Protocol):
         """Return what passed since the bus was opened."""
 
     async def close(self) -> None:
-        """Take back everything declared and leave. Idempotent."""
+        """Take back everything declared and leave; return when that is done, however often called.
+
+        Questions still open, asked here or being answered here, end with ``NoResponder`` for their askers.
+        """
 
 
 class BusStatistics(Message, frozen=True):

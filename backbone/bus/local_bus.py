@@ -7,16 +7,14 @@ Deliveries are separate steps of the event loop in the order in which they were 
 from __future__ import annotations
 
 import asyncio
-import types
-import typing
 from collections.abc import Callable
 from typing import Any
 
 from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
-from backbone.bus.speaker import Speaker
+from backbone.bus.speaker import Speaker, settle
 from backbone.errors import NoResponder, ReplyTimeout
-from backbone.keys import Conversation
-from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, schema_of
+from backbone.keys import Conversation, key
+from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
 
 
 class LocalNetwork:
@@ -51,8 +49,7 @@ class _Declared:
 class _Server(_Declared):
     def __init__(self, owner: LocalBus, address: str, accepts: Accepted, answer: Answer) -> None:
         super().__init__(owner, lambda: self._leave(owner.network, address))
-        self.kinds, self.answer = _kinds(accepts), answer
-        self.pending: set[asyncio.Future[Envelope[Any] | None]] = set()
+        self.kinds, self.answer = kinds_of(accepts), answer
 
     def _leave(self, network: LocalNetwork, address: str) -> None:
         if network.servers.get(address) is self:
@@ -70,28 +67,26 @@ class _Listening(_Declared):
         latest: bool,
     ) -> None:
         super().__init__(owner, lambda: owner.network.listeners.remove(self))
-        self.pattern, self.conversation, self.kinds, self.listener = pattern, conversation, _kinds(accepts), listener
-        self.latest, self.waiting = latest, False
-        self.newest: Envelope[Any] | None = None
+        self.pattern, self.conversation, self.kinds, self.listener = pattern, conversation, kinds_of(accepts), listener
+        self.latest = latest
+        self.newest: dict[str, Envelope[Any]] = {}
 
-    def deliver(self, envelope: Envelope[Any]) -> None:
+    def deliver(self, address: str, envelope: Envelope[Any]) -> None:
         loop = asyncio.get_running_loop()
         if not self.latest:
             loop.call_soon(self._hand_over, envelope)
             return
-        self.newest = envelope
-        if not self.waiting:
-            self.waiting = True
+        if not self.newest:
             loop.call_soon(self._hand_over_newest)
+        self.newest[address] = envelope
 
     def _hand_over_newest(self) -> None:
-        self.waiting = False
-        if self.newest is not None:
-            envelope, self.newest = self.newest, None
+        newest, self.newest = self.newest, {}
+        for envelope in newest.values():
             self._hand_over(envelope)
 
     def _hand_over(self, envelope: Envelope[Any]) -> None:
-        if self.closed or self.owner.closed:
+        if self.closed:
             return
         if isinstance(envelope.body, self.kinds):
             self.owner.hear(self.listener, envelope)
@@ -110,7 +105,7 @@ class _Watching(_Declared):
 
     def _hand_over(self, address: str, alive: bool) -> None:
         if not self.closed:
-            self.listener(address, alive)
+            self.owner.call("", self.listener, address, alive)
 
 
 class LocalBus(Speaker):
@@ -120,58 +115,68 @@ class LocalBus(Speaker):
         super().__init__(network.mission, source, clock)
         self.network = network
         self.declared: list[_Declared] = []
-        self.closed = False
 
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
+        _check(self.mission, address)
+        answered = self.open_question()
         self.asked += 1
         asked = self.envelope(question)
-        await asyncio.sleep(0)
-        server = self.network.servers.get(address)
-        if server is None:
-            raise NoResponder(f"nobody answers at {address}")
-        answered: asyncio.Future[Envelope[Any] | None] = asyncio.get_running_loop().create_future()
-        server.pending.add(answered)
-        server.owner.start(_answer(server, asked, answered))
         try:
             async with asyncio.timeout(within_s):
+                await asyncio.sleep(0)
+                server = self.network.servers.get(address)
+                if server is None:
+                    raise NoResponder(f"nobody answers at {address}")
+                answering = server.owner.start(_answer(server, asked))
+                answering.add_done_callback(lambda task: settle(answered, _outcome(task)))
                 envelope = await answered
         except TimeoutError:
             raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
         finally:
-            server.pending.discard(answered)
+            self.end_question(answered)
         if envelope is None:
             raise NoResponder(f"{address} died before it answered {type(question).__name__}")
         if isinstance(envelope.body, Refused):
             raise envelope.body.revive()
         if not isinstance(envelope.body, reply):
+            self.unreadable += 1
             raise MalformedMessage(f"{address} answered {type(envelope.body).__name__}, not {reply.__name__}")
         return envelope.body
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> _Server:
         """Answer questions asked of this address; see ``Bus.serve``."""
+        self.require_open()
+        _check(self.mission, address)
         server = _Server(self, address, accepts, answer)
         self.network.servers[address] = server
         return server
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Hand the message to whoever subscribed; see ``Bus.publish``."""
+        if self.closed:
+            return
+        _check(self.mission, address)
         self.published += 1
         envelope = self.envelope(message)
         for listening in self.network.listeners:
             if listening.conversation == conversation and _matches(listening.pattern, address):
-                listening.deliver(envelope)
+                listening.deliver(address, envelope)
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
     ) -> _Listening:
         """Hear publications; see ``Bus.subscribe``."""
+        self.require_open()
+        _check(self.mission, address)
         listening = _Listening(self, address, conversation, accepts, listener, latest)
         self.network.listeners.append(listening)
         return listening
 
     def declare_alive(self, address: str) -> _Declared:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
+        self.require_open()
+        _check(self.mission, address)
         tokens = self.network.tokens.setdefault(address, [])
 
         def fall() -> None:
@@ -187,6 +192,8 @@ class LocalBus(Speaker):
 
     def watch_alive(self, address: str, listener: LifeListener) -> _Watching:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
+        self.require_open()
+        _check(self.mission, address)
         watching = _Watching(self, address, listener)
         self.network.watchers.append(watching)
         for standing, tokens in self.network.tokens.items():
@@ -196,40 +203,46 @@ class LocalBus(Speaker):
 
     def watch_link(self, listener: LinkListener) -> _Declared:
         """Report the link, which inside one process is up for good."""
-        asyncio.get_running_loop().call_soon(listener, True)
-        return _Declared(self, lambda: None)
+        self.require_open()
+        watching = _Declared(self, lambda: None)
 
-    async def close(self) -> None:
-        """Take back everything declared; questions still open here end with ``NoResponder``."""
-        self.closed = True
+        def hand_over() -> None:
+            if not watching.closed:
+                self.call("", listener, True)
+
+        asyncio.get_running_loop().call_soon(hand_over)
+        return watching
+
+    def take_back(self) -> None:
+        """Take back everything declared."""
         for declared in list(self.declared):
             declared.close()
-            if isinstance(declared, _Server):
-                for answered in declared.pending:
-                    if not answered.done():
-                        answered.set_result(None)
-        await self.end_tasks()
+
+    async def leave(self) -> None:
+        """Leave the network, of which nothing is held any more."""
 
     def _tell_watchers(self, address: str, *, alive: bool) -> None:
         for watching in list(self.network.watchers):
             watching.tell(address, alive)
 
 
-async def _answer(server: _Server, asked: Envelope[Any], answered: asyncio.Future[Envelope[Any] | None]) -> None:
+async def _answer(server: _Server, asked: Envelope[Any]) -> Envelope[Any] | None:
     if isinstance(asked.body, server.kinds):
-        envelope = await server.owner.reply_to(asked, server.answer)
-    else:
-        server.owner.unreadable += 1
-        schema = schema_of(type(asked.body))
-        accepted = ", ".join(sorted(schema_of(kind) for kind in server.kinds))
-        refusal = UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=accepted)
-        envelope = server.owner.envelope(Refused.of(refusal))
-    if not answered.done():
-        answered.set_result(envelope)
+        return await server.owner.reply_to(asked, server.answer)
+    server.owner.unreadable += 1
+    schema = schema_of(type(asked.body))
+    accepted = ", ".join(sorted(schema_of(kind) for kind in server.kinds))
+    refusal = UnknownMessage(f"{schema} is not answered here", schema=schema, accepted=accepted)
+    return server.owner.envelope(Refused.of(refusal))
 
 
-def _kinds(accepts: Accepted) -> tuple[type[Any], ...]:
-    return typing.get_args(accepts) if isinstance(accepts, types.UnionType) else (accepts,)
+def _outcome(answering: asyncio.Task[Envelope[Any] | None]) -> Envelope[Any] | None:
+    return None if answering.cancelled() or answering.exception() is not None else answering.result()
+
+
+def _check(mission: str, address: str) -> None:
+    """Refuse here what the bus between processes would refuse as part of a key."""
+    key(mission, address, Conversation.ASK)
 
 
 def _matches(pattern: str, address: str) -> bool:

@@ -15,12 +15,13 @@ import json
 import logging
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, cast
 
 import zenoh
 
 from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
-from backbone.bus.speaker import Speaker
+from backbone.bus.speaker import Speaker, settle
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import MalformedMessage, Message, OversizedMessage, Reader, Refused, write
@@ -63,13 +64,11 @@ def _config(settings: dict[str, Any]) -> zenoh.Config:
     return zenoh.Config.from_json5(json.dumps({"scouting": quiet, "transport": _transport(), **settings}))
 
 
+_RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}
+
+
 def client_config(endpoint: str) -> zenoh.Config:
     """Return the settings of a component that talks through the hub at ``endpoint``."""
-    retry = {
-        "period_init_ms": RETRY_FIRST_MS,
-        "period_max_ms": RETRY_MOST_MS,
-        "period_increase_factor": RETRY_FACTOR,
-    }
     return _config(
         {
             "mode": "client",
@@ -77,7 +76,7 @@ def client_config(endpoint: str) -> zenoh.Config:
                 "endpoints": [endpoint],
                 "timeout_ms": OPEN_TIMEOUT_MS,
                 "exit_on_failure": True,
-                "retry": retry,
+                "retry": _RETRY,
             },
         }
     )
@@ -91,22 +90,27 @@ def hub_config(listen: list[str], connect: list[str] | None = None) -> zenoh.Con
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
     }
     if connect:
-        settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False}
+        settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
     return _config(settings)
+
+
+def _is_hub(config: zenoh.Config) -> bool:
+    return bool(json.loads(config.get_json("mode")) == "router")
 
 
 class ZenohBus(Speaker):
     """One component's voice and ears on a Zenoh session. Open it inside a running event loop."""
 
-    def __init__(self, mission: str, source: str, clock: Clock, session: zenoh.Session) -> None:
+    def __init__(
+        self, mission: str, source: str, clock: Clock, session: zenoh.Session, *, is_hub: bool = False
+    ) -> None:
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
-        self._session = session
-        self._inbox: deque[tuple[Callable[..., None], tuple[Any, ...]]] = deque()
+        self._session, self._is_hub = session, is_hub
+        self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
-        self._declared: list[_Declared] = []
-        self._publishers: dict[str, zenoh.Publisher] = {}
-        self._closed = False
+        self._declared: set[_Declared] = set()
+        self._publishers: dict[tuple[str, Conversation], zenoh.Publisher] = {}
 
     @classmethod
     def open(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -119,7 +123,7 @@ class ZenohBus(Speaker):
             session = zenoh.open(config)
         except zenoh.ZError as error:
             raise HubUnreachable(str(error)) from error
-        return cls(mission, source, clock, session)
+        return cls(mission, source, clock, session, is_hub=_is_hub(config))
 
     @classmethod
     async def open_when_up(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -128,36 +132,42 @@ class ZenohBus(Speaker):
         Raises:
             HubUnreachable: It did not listen within ``OPEN_TIMEOUT_MS``.
         """
+        pool = ThreadPoolExecutor(max_workers=1)
+        opening = pool.submit(zenoh.open, config)
+        pool.shutdown(wait=False)
         try:
-            session = await asyncio.get_running_loop().run_in_executor(None, zenoh.open, config)
+            session = await asyncio.shield(asyncio.wrap_future(opening))
+        except asyncio.CancelledError:
+            opening.add_done_callback(_close_unwanted)
+            raise
         except zenoh.ZError as error:
             raise HubUnreachable(str(error)) from error
-        return cls(mission, source, clock, session)
+        return cls(mission, source, clock, session, is_hub=_is_hub(config))
 
     # ------------------------------------------------------------------ questions
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
+        asked_key = key(self._mission, address, Conversation.ASK)
+        answered = self.open_question()
         self.asked += 1
-        payload = write(self.envelope(question))
-        answered: asyncio.Future[Any] = self._loop.create_future()
+        arrived = _Arrived(self, answered)
         cancel = zenoh.CancellationToken()
-        self._session.get(
-            key(self._mission, address, Conversation.ASK),
-            zenoh.handlers.Callback(
-                lambda got: self._push(_settle, answered, got),
-                lambda: self._push(_settle, answered, None),
-                indirect=False,
-            ),  # type: ignore[arg-type]
-            payload=payload,
-            timeout=within_s,
-            express=True,
-            cancellation_token=cancel,
-        )
         try:
+            payload = write(self.envelope(question))
+            self._session.get(
+                asked_key,
+                zenoh.handlers.Callback(arrived.reply, arrived.end, indirect=False),
+                payload=payload,
+                timeout=max(0.0, within_s),
+                express=True,
+                cancellation_token=cancel,
+            )
             got = await answered
         except asyncio.CancelledError:
             cancel.cancel()  # type: ignore[no-untyped-call]
             raise
+        finally:
+            self.end_question(answered)
         return self._read_reply(address, question, reply, got, within_s)
 
     def _read_reply(
@@ -173,7 +183,7 @@ class ZenohBus(Speaker):
         else:
             payload = cast("zenoh.Sample", got.ok).payload.to_bytes()
         try:
-            body = _reader(reply | Refused).read(payload).body
+            body = _reply_reader(reply).read(payload).body
         except Refusal as unreadable:
             self.unreadable += 1
             raise MalformedMessage(
@@ -185,103 +195,124 @@ class ZenohBus(Speaker):
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> _Declared:
         """Answer questions asked of this address; see ``Bus.serve``."""
+        self.require_open()
         reader = _reader(accepts)
         own = key(self._mission, address, Conversation.ASK)
 
         def arrived(query: zenoh.Query) -> None:
             self.start(self._answer(reader, answer, own, query))
 
-        return self._declare(self._session.declare_queryable(own, lambda query: self._push(arrived, query)))
+        return self._declare(self._session.declare_queryable(own, lambda query: self.push(arrived, query)))
 
     async def _answer(self, reader: Reader[Any], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
-            try:
-                question = reader.read(query.payload.to_bytes() if query.payload is not None else b"")
-            except Refusal as refusal:
-                self.unreadable += 1
-                query.reply_err(write(self.envelope(Refused.of(refusal))))
-                return
+            question = reader.read(query.payload.to_bytes() if query.payload is not None else b"")
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
-                self._send_reply(query, own, envelope)
+                query.reply(own, self._write_reply(envelope), express=True)
+        except Refusal as unreadable:
+            self.unreadable += 1
+            query.reply_err(write(self.envelope(Refused.of(unreadable))))
+        except zenoh.ZError as error:  # the asker or the link is gone: nobody is left to tell
+            log.info("reply on %s not sent: %s", own, error)
+        except Exception as bug:  # the reply cannot be written
+            self.on_bug(bug)
         finally:
             query.drop()  # type: ignore[no-untyped-call]
 
-    def _send_reply(self, query: zenoh.Query, own: str, envelope: Any) -> None:
+    def _write_reply(self, envelope: Any) -> bytes:
         try:
-            payload = write(envelope)
+            return write(envelope)
         except OversizedMessage as refusal:
-            payload = write(self.envelope(Refused.of(refusal)))
-        try:
-            query.reply(own, payload, express=True)
-        except zenoh.ZError as error:  # the asker or the link is gone: nobody is left to tell
-            log.info("reply on %s not sent: %s", own, error)
+            return write(self.envelope(Refused.of(refusal)))
 
     # ------------------------------------------------------------------ publications
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Hand the message to whoever subscribed; see ``Bus.publish``."""
+        if self.closed:
+            return
+        publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
         self.published += 1
-        own = key(self._mission, address, conversation)
-        publisher = self._publishers.get(own)
-        if publisher is None:
-            priority, congestion_control, express = _QUALITY.get(conversation, _USUAL)
-            publisher = self._session.declare_publisher(
-                own, priority=priority, congestion_control=congestion_control, express=express
-            )
-            self._publishers[own] = publisher
         publisher.put(write(self.envelope(message)))
+
+    def _declare_publisher(self, address: str, conversation: Conversation) -> zenoh.Publisher:
+        priority, congestion_control, express = _QUALITY.get(conversation, _USUAL)
+        publisher = self._publishers[address, conversation] = self._session.declare_publisher(
+            key(self._mission, address, conversation),
+            priority=priority,
+            congestion_control=congestion_control,
+            express=express,
+        )
+        return publisher
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
     ) -> _Declared:
         """Hear publications; see ``Bus.subscribe``."""
+        self.require_open()
         pattern = key(self._mission, address, conversation)
         receive = _Latest(self, _reader(accepts), listener) if latest else _Each(self, _reader(accepts), listener)
         return self._declare(self._session.declare_subscriber(pattern, receive))
 
     # ------------------------------------------------------------------ life
     def declare_alive(self, address: str) -> _Declared:
-        """Raise a liveliness token; see ``Bus.declare_alive``."""
+        """Raise this component's liveliness token; see ``Bus.declare_alive``."""
+        self.require_open()
         own = key(self._mission, address, Conversation.ALIVE)
         return self._declare(self._session.liveliness().declare_token(own))
 
     def watch_alive(self, address: str, listener: LifeListener) -> _Declared:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
+        self.require_open()
 
-        def changed(of: str, alive: bool) -> None:
-            try:
-                listener(of, alive)
-            except Exception as bug:
-                self.on_bug(bug)
-
-        def arrived(sample: zenoh.Sample) -> None:
-            self._push(changed, address_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
+        def changed(sample: zenoh.Sample) -> None:
+            self.call("", listener, address_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
 
         pattern = key(self._mission, address, Conversation.ALIVE)
-        return self._declare(self._session.liveliness().declare_subscriber(pattern, arrived, history=True))
+        return self._declare(
+            self._session.liveliness().declare_subscriber(
+                pattern, lambda sample: self.push(changed, sample), history=True
+            )
+        )
 
     def watch_link(self, listener: LinkListener) -> _Declared:
-        """Report when this session's link goes or comes; see ``Bus.watch_link``."""
+        """Report when this session's link goes or comes; see ``Bus.watch_link``.
 
-        def arrived(event: zenoh.TransportEvent) -> None:
-            self._push(listener, event.kind == zenoh.SampleKind.PUT)
+        A hub is its own hub: for it the link is up for good, whoever else comes and goes.
+        """
+        self.require_open()
+        if self._is_hub:
+            always = self._declare(None)
 
-        return self._declare(self._session.info.declare_transport_events_listener(arrived, history=True))
+            def tell(_event: None) -> None:
+                if always.stands:
+                    self.call("", listener, True)
 
-    async def close(self) -> None:
-        """Take back everything declared and close the session; see ``Bus.close``."""
-        if self._closed:
-            return
-        self._closed = True
-        await self.end_tasks()
-        for declared in list(self._declared):
+            self.push(tell, None)
+            return always
+
+        def changed(event: zenoh.TransportEvent) -> None:
+            self.call("", listener, event.kind == zenoh.SampleKind.PUT)
+
+        return self._declare(
+            self._session.info.declare_transport_events_listener(lambda event: self.push(changed, event), history=True)
+        )
+
+    # ------------------------------------------------------------------ leaving
+    def take_back(self) -> None:
+        """Take back everything declared."""
+        for declared in tuple(self._declared):
             declared.close()
+
+    async def leave(self) -> None:
+        """Close the session; return when its threads have ended."""
+        self._inbox.clear()  # questions not yet begun: their askers hear that nobody answered
         await self._loop.run_in_executor(None, self._session.close)
 
     # ------------------------------------------------------------------ from zenoh's threads into the loop
-    def _push(self, act: Callable[..., None], *arguments: Any) -> None:
-        """Have the loop call ``act(*arguments)``; called from zenoh's threads."""
-        self._inbox.append((act, arguments))
+    def push(self, act: Callable[[Any], None], what: Any) -> None:
+        """Have the loop call ``act(what)``; called from zenoh's threads."""
+        self._inbox.append((act, what))
         if not self._woken:
             self._woken = True
             try:
@@ -292,31 +323,57 @@ class ZenohBus(Speaker):
     def _drain(self) -> None:
         self._woken = False
         for _ in range(len(self._inbox)):
-            act, arguments = self._inbox.popleft()
-            act(*arguments)
-        if self._inbox and not self._woken:
-            self._woken = True
-            self._loop.call_soon(self._drain)
+            act, what = self._inbox.popleft()
+            if self.closed:
+                continue
+            try:
+                act(what)
+            except Exception as bug:  # one bad arrival must not take the rest of the burst along
+                self.on_bug(bug)
 
     def _declare(self, entity: Any) -> _Declared:
         declared = _Declared(entity, self._declared)
-        self._declared.append(declared)
+        self._declared.add(declared)
         return declared
 
 
 class _Declared:
-    """A zenoh entity that can be taken back once."""
+    """A zenoh entity that can be taken back once, or none where nothing had to be declared."""
 
-    def __init__(self, entity: Any, register: list[_Declared]) -> None:
+    def __init__(self, entity: Any, register: set[_Declared]) -> None:
         self._entity, self._register = entity, register
 
+    @property
+    def stands(self) -> bool:
+        """Not taken back yet."""
+        return self in self._register
+
     def close(self) -> None:
-        if self in self._register:
+        """Take it back."""
+        if self.stands:
             self._register.remove(self)
-            try:
+            if self._entity is not None:
                 self._entity.undeclare()
-            except zenoh.ZError as error:  # the session ended first and took it along
-                log.debug("undeclare after close: %s", error)
+
+
+class _Arrived:
+    """What a question's zenoh callbacks leave for the loop: the first reply, or None when there was none."""
+
+    __slots__ = ("_answered", "_bus", "_replied")
+
+    def __init__(self, bus: ZenohBus, answered: asyncio.Future[Any]) -> None:
+        self._bus, self._answered, self._replied = bus, answered, False
+
+    def reply(self, got: zenoh.Reply) -> None:
+        self._replied = True  # exactly one answers: the end that follows has nothing to add
+        self._bus.push(self._settle, got)
+
+    def end(self) -> None:
+        if not self._replied:
+            self._bus.push(self._settle, None)
+
+    def _settle(self, got: zenoh.Reply | None) -> None:
+        settle(self._answered, got)
 
 
 class _Each:
@@ -326,9 +383,9 @@ class _Each:
         self._bus, self._reader, self._listener = bus, reader, listener
 
     def __call__(self, sample: zenoh.Sample) -> None:
-        self._bus._push(self._hand_over, sample)  # noqa: SLF001  same file, same secret
+        self._bus.push(self.hand_over, sample)
 
-    def _hand_over(self, sample: zenoh.Sample) -> None:
+    def hand_over(self, sample: zenoh.Sample) -> None:
         try:
             envelope = self._reader.read(sample.payload.to_bytes())
         except Refusal as unreadable:
@@ -339,29 +396,32 @@ class _Each:
 
 
 class _Latest(_Each):
-    """Receives only the newest sample not yet handed over."""
+    """Receives of each key only the newest sample not yet handed over.
+
+    The two threads meet in single steps of a dictionary and one flag. The order makes it safe: zenoh's
+    thread stores before it looks at the flag, the loop lowers the flag before it takes out.
+    """
 
     def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
         super().__init__(bus, reader, listener)
-        self._newest: zenoh.Sample | None = None
+        self._newest: dict[str, zenoh.Sample] = {}
+        self._pushed = False
 
     def __call__(self, sample: zenoh.Sample) -> None:
-        waiting, self._newest = self._newest is not None, sample
-        if not waiting:
-            self._bus._push(self._hand_over_newest)  # noqa: SLF001
+        self._newest[str(sample.key_expr)] = sample
+        if not self._pushed:
+            self._pushed = True
+            self._bus.push(self._hand_over_newest, None)
 
-    def _hand_over_newest(self) -> None:
-        sample, self._newest = self._newest, None
-        if sample is not None:
-            self._hand_over(sample)
-
-
-def _settle(answered: asyncio.Future[Any], got: zenoh.Reply | None) -> None:
-    if not answered.done():
-        answered.set_result(got)
+    def _hand_over_newest(self, _nothing: None) -> None:
+        self._pushed = False
+        taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
+        for sample in reversed(taken):
+            self.hand_over(sample)
 
 
 _readers: dict[Any, Reader[Any]] = {}
+_reply_readers: dict[type[Any], Reader[Any]] = {}
 
 
 def _reader(accepts: Accepted) -> Reader[Any]:
@@ -369,3 +429,16 @@ def _reader(accepts: Accepted) -> Reader[Any]:
     if reader is None:
         reader = _readers[accepts] = Reader(accepts)
     return reader
+
+
+def _reply_reader(reply: type[Any]) -> Reader[Any]:
+    reader = _reply_readers.get(reply)
+    if reader is None:
+        reader = _reply_readers[reply] = Reader(reply | Refused)
+    return reader
+
+
+def _close_unwanted(opening: Future[zenoh.Session]) -> None:
+    """Close a session that opened after its opener was cancelled: an open one would keep the process from ending."""
+    if opening.exception() is None:
+        opening.result().close()  # type: ignore[no-untyped-call]
