@@ -42,6 +42,8 @@ class Spawn(Message, frozen=True):
         requester: Address of whoever wanted it.
         policy: What to do when it ends unexpectedly.
         ready_within_s: Seconds of the machine until its liveliness token must stand.
+        pinned: True if it may run on this host only. Kept here, with the tags, for a placer that lost its memory.
+        tags: Tags its host must have.
     """
 
     subsystem: Subsystem
@@ -52,6 +54,8 @@ class Spawn(Message, frozen=True):
     requester: str = ""
     policy: RestartPolicy = RestartPolicy()
     ready_within_s: float = 20.0
+    pinned: bool = False
+    tags: list[str] = []
 
 
 class Spawned(Message, frozen=True):

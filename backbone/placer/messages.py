@@ -102,6 +102,20 @@ class NoHost(Refusal):
     remedy = "Add a host with these tags, or change the component's tags or host."
 
 
+class CreatorSilent(Refusal):
+    """The creator asked did not answer; fact ``outcome``: ``unknown``, or ``not_running`` if that much is sure."""
+
+    code = "placer.creator_silent"
+    remedy = "See with 'scout-backbone status' whether it runs; start or stop it again."
+
+
+class StoppedMeanwhile(Refusal):
+    """The component was to be stopped before it had started, and was."""
+
+    code = "placer.stopped"
+    remedy = "Start it again if it is still wanted."
+
+
 class NotPlaced(Refusal):
     """The placer never placed a component of this name."""
 

@@ -1,0 +1,384 @@
+"""Placement book: what was placed where, and what to do when a host is lost or comes back.
+
+Events go in, instructions come out. The caller owns the bus and the clock.
+
+Rules:
+
+* A name is in the book once, from its admission on, so two starts never get the same name and each
+  choice of a host counts those that are still starting.
+* Truth lives at the edge: a creator's list of processes settles what runs on its host. The book of a
+  restarted placer is rebuilt from these lists.
+* A host whose creator died has lost its components (creators take them along). Those that are
+  restarted by policy are placed again, elsewhere or, if pinned, when that creator is back. Those that
+  are not (ARCs) are forgotten: their owners claim new ones.
+* A host that was only cut off comes back with components that were placed elsewhere or stopped
+  meanwhile. These are ended there: no name runs twice for long.
+
+A start whose creator dies before it answered stays in the book: it goes to another host, or waits
+for that creator to come back, and its asker is answered then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
+from backbone.creator.messages import HostLoad, ProcessState, Spawn
+from backbone.nameserver.messages import NameTaken
+from backbone.naming import address, did_you_mean
+from backbone.placer.messages import NotPlaced, Placement
+from backbone.placer.placement import Choice, HostView, obstacle, place
+
+
+class Phase(StrEnum):
+    """How far a placement is."""
+
+    STARTING = "starting"  # somebody waits for it to become ready
+    RUNNING = "running"  # its creator has it
+    WAITING = "waiting"  # wanted, but lost its host
+    GIVEN_UP = "given up"  # ended too often; may be started anew under its name
+
+
+@dataclass(slots=True)
+class Record:
+    """One placement.
+
+    Attributes:
+        spawn: The order it is started by.
+        pin: The only host it may run on; empty: any.
+        phase: How far it is.
+        host: Where it is or is being started; empty: nowhere.
+        pid: Its process; 0 if not known.
+        since_s: Mission time of the last decision about it.
+        reasons: One line a host.
+        unwanted: True from the moment it is to be stopped.
+        suspect: True while its creator must be asked whether it still has it.
+        lost: True from the loss of its host until it has another: it may come back with the old one.
+    """
+
+    spawn: Spawn
+    pin: str
+    phase: Phase
+    host: str
+    since_s: float
+    pid: int = 0
+    reasons: tuple[str, ...] = ()
+    unwanted: bool = False
+    suspect: bool = False
+    lost: bool = False
+
+    @property
+    def address(self) -> str:
+        """Where to ask the component."""
+        return address(self.spawn.subsystem, self.spawn.name)
+
+    def placement(self) -> Placement:
+        """Return the record as others see it."""
+        spawn = self.spawn
+        return Placement(spawn.name, spawn.type, self.host, spawn.requester, self.since_s, list(self.reasons))
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceAgain:
+    """Start this component again; it lost its host."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class EndStray:
+    """End what runs on this host under this name; it is wanted elsewhere or not at all."""
+
+    host: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Inspect:
+    """Ask this host's creator what it runs, and report the answer."""
+
+    host: str
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Keep in the story that this happened to the subject."""
+
+    subject: str
+    what: str
+
+
+Instruction = PlaceAgain | EndStray | Inspect | Note
+
+
+@dataclass(slots=True)
+class _Host:
+    """What is known of one host: its view, but for the count of components, and its creator's process."""
+
+    view: HostView
+    creator_pid: int
+    told: tuple[int, int] = (-1, -1)
+    """The counts of components, by its creator and by the book, about which it was asked last."""
+
+
+class PlacementBook:
+    """All placements and hosts of one mission."""
+
+    def __init__(self) -> None:
+        self._hosts: dict[str, _Host] = {}
+        self._records: dict[str, Record] = {}
+        self._numbers: dict[str, int] = {}
+        self._left_behind: set[tuple[str, str]] = set()
+
+    # ------------------------------------------------------------------ looking
+    def record(self, name: str) -> Record:
+        """Return the record of this name.
+
+        Raises:
+            NotPlaced: There is none.
+        """
+        found = self._records.get(name)
+        if found is None:
+            raise NotPlaced(f"{name!r} was not placed{did_you_mean(name, self._records)}", name=name)
+        return found
+
+    def find(self, name: str) -> Record | None:
+        """Return the record of this name, or None."""
+        return self._records.get(name)
+
+    def records(self) -> list[Record]:
+        """Return all records, sorted by name."""
+        return [self._records[name] for name in sorted(self._records)]
+
+    def hosts(self) -> list[HostView]:
+        """Return every host with its count of components, sorted by name."""
+        counts: dict[str, int] = {}
+        for record in self._records.values():
+            counts[record.host] = counts.get(record.host, 0) + (record.phase is not Phase.GIVEN_UP)
+        return [replace(self._hosts[name].view, components=counts.get(name, 0)) for name in sorted(self._hosts)]
+
+    def is_alive(self, host: str) -> bool:
+        """Say whether this host's creator is known to be there."""
+        return host in self._hosts and self._hosts[host].view.alive
+
+    def knows_creator(self, host: str, pid: int) -> bool:
+        """Say whether this very process is known as the host's living creator."""
+        return self.is_alive(host) and self._hosts[host].creator_pid == pid
+
+    def may_find_host(self, name: str) -> bool:
+        """Say whether a host that is gone could take it, were its creator back; also if no host is known at all."""
+        record = self.record(name)
+        revived = [replace(view, alive=True) for view in self.hosts()]
+        return not revived or any(not obstacle(view, record.spawn.tags, record.pin) for view in revived)
+
+    # ------------------------------------------------------------------ starting and stopping
+    def number(self, type_name: str) -> str:
+        """Return ``<type>-<n>`` with an n that was not used before; numbers only grow, so stories never mix."""
+        self._numbers[type_name] = self._numbers.get(type_name, 0) + 1
+        return f"{type_name}-{self._numbers[type_name]}"
+
+    def refuse_second(self, component_type: ComponentType, name: str) -> None:
+        """Return unless the type may run only once and another name of it is in the book.
+
+        The nameserver cannot see one that waits for its restart or for a host; the book can.
+
+        Raises:
+            MultiplicityExceeded: It is.
+        """
+        if component_type.multiplicity is Multiplicity.MANY:
+            return
+        for record in self.records():
+            other = record.spawn
+            if other.type == component_type.name and other.name != name and record.phase is not Phase.GIVEN_UP:
+                raise MultiplicityExceeded(
+                    f"{name}: only one {other.type} may run, and {other.name} is {record.phase} on "
+                    f"{record.host or 'no host yet'}, pid {record.pid}",
+                    name=other.name,
+                    host=record.host,
+                    pid=record.pid,
+                )
+
+    def reserve(self, spawn: Spawn, pin: str, now_s: float) -> Record:
+        """Enter a new component without a host yet.
+
+        Raises:
+            NameTaken: The name is in the book.
+        """
+        taken = self._records.get(spawn.name)
+        if taken is not None:
+            raise NameTaken(
+                f"{spawn.name} is {taken.phase} on {taken.host or 'no host yet'}, asked for by {taken.spawn.requester}",
+                name=spawn.name,
+                host=taken.host,
+                pid=taken.pid,
+            )
+        self._remember_number(spawn)
+        record = self._records[spawn.name] = Record(spawn, pin, Phase.STARTING, "", now_s)
+        return record
+
+    def choose(self, name: str, now_s: float) -> Choice:
+        """Give the component a host; from here on it counts there.
+
+        Raises:
+            NoHost: None can take it.
+        """
+        record = self.record(name)
+        record.host = ""  # it must not count against the host it is leaving
+        choice = place(name, record.spawn.tags, record.pin, self.hosts())
+        record.phase, record.host, record.reasons, record.since_s = Phase.STARTING, choice.host, choice.reasons, now_s
+        record.pid, record.lost = 0, False
+        return choice
+
+    def started(self, name: str, pid: int, now_s: float) -> None:
+        """Take note that it is ready."""
+        record = self.record(name)
+        record.phase, record.pid, record.since_s, record.suspect = Phase.RUNNING, pid, now_s, False
+
+    def unsure(self, name: str, now_s: float) -> None:
+        """Take note that nobody knows whether it runs; its creator's next word settles it."""
+        record = self.record(name)
+        record.phase, record.since_s, record.suspect = Phase.RUNNING, now_s, True
+
+    def waits(self, name: str) -> None:
+        """Take note that no host can have it now."""
+        record = self.record(name)
+        record.phase, record.host = Phase.WAITING, ""
+
+    def gave_up(self, name: str) -> None:
+        """Take note that it does not run and is not tried again by itself."""
+        record = self.record(name)
+        record.phase, record.pid = Phase.GIVEN_UP, 0
+
+    def forget(self, name: str) -> None:
+        """Take the name out of the book; right also if it is not in it."""
+        self._records.pop(name, None)
+
+    # ------------------------------------------------------------------ what creators and nameserver tell
+    def creator_up(
+        self, host: str, tags: Collection[str], creator_pid: int, processes: Collection[ProcessState], asked_s: float
+    ) -> list[Instruction]:
+        """Take a creator's answer to a question of that mission time, and find hosts for those who wait."""
+        told: list[Instruction] = []
+        if self.is_alive(host) and not self.knows_creator(host, creator_pid):
+            told += self.creator_down(host)
+        old = self._hosts[host].view if host in self._hosts else HostView(host)
+        if not self.is_alive(host):
+            told.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
+        self._hosts[host] = _Host(replace(old, tags=frozenset(tags), alive=True), creator_pid)
+        for process in processes:
+            told += self._found(host, process, asked_s)
+        self._left_behind = {(where, name) for where, name in self._left_behind if where != host}
+        told += self.inspected(host, processes, asked_s)
+        return told + [
+            PlaceAgain(record.spawn.name)
+            for record in self.records()
+            if record.phase is Phase.WAITING and not record.unwanted
+        ]
+
+    def creator_down(self, host: str) -> list[Instruction]:
+        """Take note that a host's creator died, and with it all it ran."""
+        if not self.is_alive(host):
+            return []
+        known = self._hosts[host]
+        known.view = replace(known.view, alive=False)
+        told: list[Instruction] = [Note(host, "lost its creator and all it ran")]
+        for record in self.records():
+            if record.host != host:
+                continue
+            name = record.spawn.name
+            self._left_behind.add((host, name))
+            if record.phase is Phase.STARTING:
+                continue  # whoever waits for it finds out and decides
+            if record.phase is Phase.RUNNING and record.spawn.policy.restart and not record.unwanted:
+                record.phase, record.host, record.pid = Phase.WAITING, "", 0
+                record.suspect, record.lost = False, True
+                told += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
+            else:
+                self.forget(name)
+                told.append(Note(name, f"was lost with {host} and is not started again"))
+        return told
+
+    def load_heard(self, load: HostLoad) -> list[Instruction]:
+        """Take over a host's load; its creator is asked if it does not run as many as the book says."""
+        known = self._hosts.get(load.host)
+        if known is None:
+            return []
+        known.view = replace(
+            known.view, tags=frozenset(load.tags), cpu=load.cpu, memory=load.memory, cores=max(1, load.cores)
+        )
+        here = [record for record in self._records.values() if record.host == load.host]
+        if any(record.suspect for record in here):
+            return [Inspect(load.host)]
+        counts = (load.components, len(here))
+        settled = all(record.phase is not Phase.STARTING for record in here)
+        if settled and load.components != len(here) and counts != known.told:
+            known.told = counts
+            return [Inspect(load.host)]
+        return []
+
+    def component_disappeared(self, component_address: str) -> list[Instruction]:
+        """Take note that a token fell; the creator knows whether its component ended, or is being restarted."""
+        for record in self._records.values():
+            if record.address == component_address and record.phase is Phase.RUNNING and not record.unwanted:
+                record.suspect = True
+                return [Inspect(record.host)]
+        return []
+
+    def component_appeared(self, component_address: str, host: str, pid: int) -> None:
+        """Take note that a component is ready again."""
+        for record in self._records.values():
+            if (record.address, record.host) == (component_address, host) and record.phase is Phase.RUNNING:
+                record.pid, record.suspect = pid, False
+
+    def inspected(self, host: str, processes: Collection[ProcessState], asked_s: float) -> list[Instruction]:
+        """Settle the records of this host by what its creator answered to a question of that mission time."""
+        listed = {process.spawn.name: process for process in processes}
+        told: list[Instruction] = []
+        for record in self.records():
+            name = record.spawn.name
+            if record.host != host or record.phase is not Phase.RUNNING or record.since_s > asked_s:
+                continue
+            process = listed.get(name)
+            if process is None:
+                self.forget(name)
+                told.append(Note(name, f"ended by itself on {host}"))
+            elif process.given_up:
+                self.gave_up(name)
+                told.append(Note(name, f"was given up on {host}: {process.last_end}"))
+            elif process.pid:
+                record.pid = process.pid
+        return told
+
+    # ------------------------------------------------------------------
+    def _found(self, host: str, process: ProcessState, asked_s: float) -> list[Instruction]:
+        """Settle one process a creator came up with."""
+        spawn, record = process.spawn, self._records.get(process.spawn.name)
+        if record is None:
+            if (host, spawn.name) in self._left_behind:
+                return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
+            self._remember_number(spawn)
+            record = Record(spawn, host if spawn.pinned else "", Phase.RUNNING, host, asked_s)
+            self._records[spawn.name] = record
+            _adopt(record, host, process, asked_s)
+            return [Note(spawn.name, f"was found on {host}")]
+        if record.host == host:
+            return []
+        if record.lost and not record.unwanted:
+            _adopt(record, host, process, asked_s)
+            return [Note(spawn.name, f"came back with {host}")]
+        return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
+
+    def _remember_number(self, spawn: Spawn) -> None:
+        """Never give the number of a name that is or was there again."""
+        type_name, _, number = spawn.name.rpartition("-")
+        if type_name == spawn.type and number.isdecimal():
+            self._numbers[type_name] = max(self._numbers.get(type_name, 0), int(number))
+
+
+def _adopt(record: Record, host: str, process: ProcessState, asked_s: float) -> None:
+    """Take over what a creator runs as what was wanted."""
+    record.phase = Phase.GIVEN_UP if process.given_up else Phase.RUNNING
+    record.host, record.pid, record.since_s = host, process.pid, asked_s
+    record.reasons, record.lost, record.suspect = (f"{host}: its creator has it",), False, False

@@ -1,0 +1,573 @@
+"""The placer: the one who starts and stops every component that is no core service.
+
+A start is admitted by the component database, given a host by the book, and carried out by that
+host's creator. Whether an unanswered order was carried out is asked of the creator, never guessed:
+nothing is started twice.
+
+Source: S000, "component placer": everybody asks it; it asks the creator of the host it chose.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from contextlib import AsyncExitStack
+from enum import Enum
+from functools import partial
+from typing import Any, assert_never
+
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.asking import ask_until_answered
+from backbone.component.component import Component, NoParameters
+from backbone.component.launch import Launch
+from backbone.component.messages import ComponentState, LifeState
+from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
+from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
+from backbone.creator.messages import (
+    TYPE as CREATOR,
+)
+from backbone.creator.messages import (
+    EndedBy,
+    EndProcess,
+    HostLoad,
+    ListProcesses,
+    NotHere,
+    ProcessEnded,
+    Processes,
+    ProcessFell,
+    RestartPolicy,
+    Spawn,
+    Spawned,
+    creator_name,
+)
+from backbone.errors import LinkError, NoResponder, Refusal
+from backbone.keys import Conversation
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import (
+    RECONNECT_S,
+    Appeared,
+    Components,
+    Disappeared,
+    ListComponents,
+    Resolve,
+    Resolved,
+    UnknownName,
+)
+from backbone.naming import Subsystem, component_of, legal
+from backbone.placer.messages import (
+    AskPlacement,
+    CreatorSilent,
+    Ended,
+    ListPlacements,
+    NoHost,
+    Placements,
+    PlacerQuestion,
+    Start,
+    Started,
+    StopComponent,
+    StoppedMeanwhile,
+)
+from backbone.placer.placement_book import (
+    EndStray,
+    Inspect,
+    Instruction,
+    Note,
+    Phase,
+    PlaceAgain,
+    PlacementBook,
+    Record,
+)
+from backbone.wire import Envelope, Message, UnknownMessage
+
+ANSWER_EACH_S, ANSWER_WITHIN_S = 1.0, 5.0  # chosen: a killed core service is back within one second
+SPAWN_MARGIN_S = 5.0  # chosen: a creator answers this long after its own deadline at the latest, even when busy
+END_MARGIN_S = 5.0  # chosen: the same for ends
+CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
+OLD_LIFE_S = 5.0  # chosen: longer than any lease by which a lost host's components are still seen
+SPAWN_TRIES = 3  # chosen: two creators may die of something else; a third dies of the order
+AGAIN_PAUSES_S = (0.0, 0.5, 1.0, 2.0)  # chosen: before each try to start a lost component again
+
+
+class Fate(Enum):
+    """What became of an order that was not answered."""
+
+    DONE = "done"
+    NOT_DONE = "not done"
+    HOST_LOST = "host lost"
+    UNKNOWN = "unknown"
+
+
+class Placer(Component[NoParameters]):
+    """Places components, and again those that lost their host."""
+
+    accepts = PlacerQuestion
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._book = PlacementBook()
+        self._to_do: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
+        self._news = asyncio.Event()
+        self._meeting: dict[str, int] = {}
+        self._newest: dict[str, int] = {}
+        self._inspecting: set[str] = set()
+        self._ears: dict[str, list[Subscription]] = {}
+        self._type_locks: dict[str, asyncio.Lock] = {}
+        self._starts = self._refused = self._again = self._stops = self._strays = 0
+
+    # ------------------------------------------------------------------ life
+    async def connect(self) -> None:
+        """Learn from the creators that are there what runs; a restarted placer knows it before anybody asks."""
+        self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_of_somebody)
+        found = await self._creators()
+        await asyncio.gather(*(self._meet(creator) for creator in found.components))
+        self.bus.watch_alive(NAMESERVER, self._nameserver_changed)
+
+    async def serve(self) -> None:
+        """Begin what events led to."""
+        while True:
+            begin = await self._to_do.get()
+            begin()
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer ``Start``, ``StopComponent``, ``AskPlacement`` and ``ListPlacements``."""
+        match asked.body:
+            case Start() as order:
+                return await self._start(order, asked.source)
+            case StopComponent(name=name, reason=reason):
+                return await self._stop(name, reason or f"asked by {asked.source}")
+            case AskPlacement(name=name):
+                return self._book.record(name).placement()
+            case ListPlacements():
+                return Placements([record.placement() for record in self._book.records()])
+            case other:
+                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+
+    def statistics(self) -> dict[str, float]:
+        """Return how many hosts and placements there are and what happened to them."""
+        records, hosts = self._book.records(), self._book.hosts()
+        return {
+            "hosts": float(len(hosts)),
+            "hosts_alive": float(sum(host.alive for host in hosts)),
+            "placements": float(len(records)),
+            "placements_waiting": float(sum(record.phase is Phase.WAITING for record in records)),
+            "starts": float(self._starts),
+            "starts_refused": float(self._refused),
+            "placed_again": float(self._again),
+            "stops": float(self._stops),
+            "strays_ended": float(self._strays),
+        }
+
+    # ------------------------------------------------------------------ start
+    async def _start(self, order: Start, requester: str) -> Started:
+        name = legal(order.name or self._book.number(order.type))
+        self._starts += 1
+        try:
+            return await self._start_as(name, order, requester)
+        except Refusal as refusal:
+            self._refused += 1
+            self.story.note(name, f"was not started: {refusal.detail}")
+            raise
+
+    async def _start_as(self, name: str, order: Start, requester: str) -> Started:
+        old = self._book.find(name)
+        if old is not None and old.phase is Phase.GIVEN_UP:
+            await self._stop(name, "is started anew")
+        async with AsyncExitStack() as alone:
+            await alone.enter_async_context(self._type_locks.setdefault(order.type, asyncio.Lock()))
+            component_type = await self._admit(order.type, name)
+            self._book.refuse_second(component_type, name)
+            if component_type.multiplicity is Multiplicity.MANY:
+                await alone.aclose()
+            record = self._book.reserve(_spawn(name, order, component_type, requester), order.host, self.clock.now_s())
+            try:
+                return await self._bring_up(record)
+            except Refusal:
+                if record.phase is Phase.STARTING:
+                    self._book.forget(name)
+                raise
+
+    async def _admit(self, type_name: str, name: str) -> ComponentType:
+        try:
+            admitted = await ask_until_answered(
+                self.bus,
+                self.clock,
+                COMPONENT_DATABASE,
+                Admit(type_name, name),
+                Admitted,
+                each_s=ANSWER_WITHIN_S,
+                within_s=ANSWER_WITHIN_S,
+            )
+        except LinkError as error:
+            raise NoHost(f"{name}: the component database does not admit it: {error}", name=name) from error
+        return admitted.component_type
+
+    async def _bring_up(self, record: Record) -> Started:
+        """Have the component running on some host.
+
+        Raises:
+            Refusal: It does not run; the record is left STARTING, or RUNNING and suspect if its fate is unknown.
+        """
+        name = record.spawn.name
+        for tries_left in reversed(range(SPAWN_TRIES)):
+            await self._choose(record)
+            if record.phase is not Phase.STARTING:  # a host that was only cut off brought it back
+                return _started(record)
+            self.story.note(name, f"goes to {record.host}: {'; '.join(record.reasons)}")
+            spawn = record.spawn
+            try:
+                spawned = await self.bus.ask(
+                    _creator(record.host), spawn, Spawned, within_s=spawn.ready_within_s + SPAWN_MARGIN_S
+                )
+                pid = spawned.pid
+            except LinkError as error:
+                self.story.note(name, f"was ordered on {record.host} without an answer: {error}")
+                fate, pid = await self._fate_of_spawn(record)
+                lost = fate is Fate.HOST_LOST or (fate is Fate.NOT_DONE and isinstance(error, NoResponder))
+                if lost and tries_left:
+                    continue
+                if fate is not Fate.DONE:
+                    raise self._silent(record, fate, error) from error
+            if record.unwanted:
+                await self._end_on(record.host, name, "was stopped while it started")
+                self._refuse_unwanted(record)
+            self._book.started(name, pid, self.clock.now_s())
+            self.story.note(name, f"is ready on {record.host}, pid {pid}")
+            break
+        return _started(record)
+
+    async def _choose(self, record: Record) -> None:
+        """Give the component a host unless it came back; wait a while if only a creator's return can give it one.
+
+        Raises:
+            NoHost: None can take it.
+        """
+        name, until_s = record.spawn.name, self.clock.now_s() + CREATOR_BACK_S * self.clock.rate
+        while record.phase is Phase.STARTING:
+            self._refuse_unwanted(record)
+            try:
+                self._book.choose(name, self.clock.now_s())
+            except NoHost as refusal:
+                if not (self._meeting or self._book.may_find_host(name)) or self.clock.now_s() >= until_s:
+                    raise
+                self.story.note(name, f"waits for a creator: {refusal.detail}")
+                await self._news_or(until_s)
+            else:
+                return
+
+    def _refuse_unwanted(self, record: Record) -> None:
+        if record.unwanted:
+            raise StoppedMeanwhile(f"{record.spawn.name} was stopped before it had started")
+
+    async def _fate_of_spawn(self, record: Record) -> tuple[Fate, int]:
+        """Learn from the creator what became of an unanswered order, and the pid if it is done.
+
+        A component that still becomes ready is waited for: the answer was lost, not the order.
+        """
+        until_s = self.clock.now_s() + record.spawn.ready_within_s * self.clock.rate
+        while True:
+            answered = await self._ask_processes(record.host)
+            if answered is None:
+                return (Fate.UNKNOWN if self._book.is_alive(record.host) else Fate.HOST_LOST), 0
+            mine = [one for one in answered.processes if one.spawn.name == record.spawn.name and not one.given_up]
+            if not mine:
+                return Fate.NOT_DONE, 0
+            if mine[0].pid and await self._is_ready(record.spawn.name):
+                return Fate.DONE, mine[0].pid
+            if self.clock.now_s() >= until_s:
+                return Fate.UNKNOWN, 0
+            await self._news_or(min(until_s, self.clock.now_s() + ANSWER_EACH_S * self.clock.rate))
+
+    def _silent(self, record: Record, fate: Fate, error: LinkError) -> CreatorSilent:
+        name, host = record.spawn.name, record.host
+        if fate in (Fate.NOT_DONE, Fate.HOST_LOST):
+            return CreatorSilent(f"{name}: {error}; it does not run on {host}", name=name, outcome="not_running")
+        self._book.unsure(name, self.clock.now_s())
+        return CreatorSilent(f"{name}: {error}; whether it runs on {host} is unknown", name=name, outcome="unknown")
+
+    async def _is_ready(self, name: str) -> bool:
+        try:
+            resolved = await ask_until_answered(
+                self.bus,
+                self.clock,
+                NAMESERVER,
+                Resolve(name),
+                Resolved,
+                each_s=ANSWER_EACH_S,
+                within_s=ANSWER_WITHIN_S,
+            )
+        except (UnknownName, LinkError):
+            return False
+        return resolved.component.state is LifeState.READY
+
+    # ------------------------------------------------------------------ stop
+    async def _stop(self, name: str, reason: str) -> Ended:
+        record = self._book.record(name)
+        record.unwanted = True
+        self.story.note(name, f"is to be stopped: {reason}")
+        self._tell_news()
+        host = record.host
+        try:
+            by = await self._end_on(host, name, reason) if host else EndedBy.ITSELF
+        except CreatorSilent:
+            record.unwanted = False
+            raise
+        if self._book.find(name) is record and record.phase is not Phase.STARTING:
+            self._book.forget(name)
+        self._stops += 1
+        self.story.note(name, f"is stopped, by {by}")
+        return Ended(name, by)
+
+    async def _end_on(self, host: str, name: str, reason: str) -> EndedBy:
+        """End what runs there under this name.
+
+        Raises:
+            CreatorSilent: Its creator does not answer, but lives; the outcome is unknown.
+        """
+        order = EndProcess(name, reason)
+        within_s = order.ask_s + order.term_s + END_MARGIN_S
+        try:
+            return (await self.bus.ask(_creator(host), order, ProcessEnded, within_s=within_s)).by
+        except NotHere:
+            return EndedBy.ITSELF
+        except LinkError as error:
+            processes = await self._ask_processes(host)
+            if processes is None:
+                gone = not self._book.is_alive(host)
+            else:
+                gone = all(process.spawn.name != name for process in processes.processes)
+            if gone:
+                return EndedBy.ITSELF
+            raise CreatorSilent(
+                f"{name}: {error}; whether it still runs on {host} is unknown", name=name, outcome="unknown"
+            ) from error
+
+    # ------------------------------------------------------------------ events
+    def _heard_of_somebody(self, heard: Envelope[Any]) -> None:
+        match heard.body:
+            case Appeared(component=component) if component.type == CREATOR:
+                self._do(partial(self._begin_meeting, component))
+            case Appeared(component=component):
+                self._book.component_appeared(component.address, component.host, component.pid)
+                self._tell_news()
+            case Disappeared(address=gone) if gone.startswith(_creator("")):
+                host = gone.removeprefix(_creator(""))
+                self._do(lambda: self._carry_out(self._book.creator_down(host)))
+            case Disappeared(address=gone):
+                self._do(lambda: self._carry_out(self._book.component_disappeared(gone)))
+
+    def _nameserver_changed(self, _address: str, alive: bool) -> None:
+        """What was told while the link or the hub was down is lost: look again."""
+        if alive:
+            self._do(partial(self._begin, self._look_again, "look again"))
+
+    def _load_heard(self, heard: Envelope[HostLoad]) -> None:
+        self._carry_out(self._book.load_heard(heard.body))
+
+    def _fall_heard(self, heard: Envelope[ProcessFell]) -> None:
+        fell = heard.body
+        then = f"restart in {fell.restart_in_s:g} s" if fell.restart_in_s >= 0 else "not restarted"
+        self.story.note(fell.name, f"fell: {fell.how}; {then}")
+        record = self._book.find(fell.name)
+        if record is not None and fell.restart_in_s < 0:
+            self._carry_out(self._book.component_disappeared(record.address))
+
+    def _do(self, begin: Callable[[], None]) -> None:
+        """Have ``serve`` begin this; events come before the component serves."""
+        self._to_do.put_nowait(begin)
+
+    def _begin(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
+        self.start_task(work(), name)
+
+    def _carry_out(self, instructions: list[Instruction]) -> None:
+        for instruction in instructions:
+            match instruction:
+                case PlaceAgain(name=name):
+                    self._do(partial(self._begin, partial(self._place_again, name), f"place {name} again"))
+                case EndStray(host=host, name=name):
+                    self._do(partial(self._begin, partial(self._end_stray, host, name), f"end {name} on {host}"))
+                case Inspect(host=host) if host in self._inspecting:
+                    pass  # whoever is still suspect after that is asked about again with the next load
+                case Inspect(host=host):
+                    self._inspecting.add(host)
+                    self._do(partial(self._begin, partial(self._inspect, host), f"inspect {host}"))
+                case Note(subject=subject, what=what):
+                    self.story.note(subject, what)
+                case _:
+                    assert_never(instruction)
+        self._tell_news()
+
+    # ------------------------------------------------------------------ creators
+    async def _creators(self) -> Components:
+        return await ask_until_answered(
+            self.bus,
+            self.clock,
+            NAMESERVER,
+            ListComponents(type=CREATOR),
+            Components,
+            each_s=ANSWER_EACH_S,
+            within_s=ANSWER_WITHIN_S,
+        )
+
+    async def _look_again(self) -> None:
+        """Compare the nameserver's list of creators with the book, once it is complete with what is missing too."""
+        while True:
+            try:
+                found = await self._creators()
+            except LinkError as error:  # its token rises again when it is back, and this begins anew
+                self.story.note(component_of(NAMESERVER), f"does not tell who is there: {error}")
+                return
+            for creator in found.components:
+                if self._book.knows_creator(creator.host, creator.pid):
+                    self._carry_out([Inspect(creator.host)])
+                else:
+                    self._begin_meeting(creator)
+            if found.complete:
+                break
+            back_s = found.hub_since_s + RECONNECT_S * self.clock.rate
+            await self.clock.sleep_s(max(back_s - self.clock.now_s(), RECONNECT_S / 10 * self.clock.rate))
+        there = {creator.host for creator in found.components}
+        for host in self._book.hosts():
+            if host.name not in there:
+                self._carry_out(self._book.creator_down(host.name))
+
+    def _begin_meeting(self, creator: ComponentState) -> None:
+        if self._newest.get(creator.host) != creator.pid or creator.host not in self._meeting:
+            self._newest[creator.host] = creator.pid
+            self._begin(partial(self._meet, creator), f"meet {creator.host}")
+
+    async def _meet(self, creator: ComponentState) -> None:
+        """Learn what a creator has and runs, and listen to it from here on."""
+        host, asked_s = creator.host, self.clock.now_s()
+        self._newest[host] = creator.pid
+        self._meeting[host] = self._meeting.get(host, 0) + 1
+        if host not in self._ears:
+            own = _creator(host)
+            self._ears[host] = [
+                self.bus.subscribe(own, Conversation.TELEMETRY, HostLoad, self._load_heard, latest=True),
+                self.bus.subscribe(own, Conversation.EVENTS, ProcessFell, self._fall_heard),
+            ]
+        try:
+            answered = await ask_until_answered(
+                self.bus,
+                self.clock,
+                _creator(host),
+                ListProcesses(),
+                Processes,
+                each_s=ANSWER_EACH_S,
+                within_s=ANSWER_WITHIN_S,
+            )
+        except LinkError as error:  # if it lives, its token comes again
+            self.story.note(host, f"its creator does not tell what it runs: {error}")
+            return
+        finally:
+            self._meeting[host] -= 1
+            if not self._meeting[host]:
+                del self._meeting[host]
+            self._tell_news()
+        if self._newest[host] == creator.pid:  # else its successor is being met, and answers for itself
+            self._carry_out(self._book.creator_up(host, answered.tags, creator.pid, answered.processes, asked_s))
+
+    async def _inspect(self, host: str) -> None:
+        asked_s = self.clock.now_s()
+        processes = await self._ask_processes(host)
+        self._inspecting.discard(host)
+        if processes is not None:
+            self._carry_out(self._book.inspected(host, processes.processes, asked_s))
+
+    async def _ask_processes(self, host: str) -> Processes | None:
+        """Return what the host's creator says it runs; None if it does not answer or is known to be gone."""
+        until_s = self.clock.now_s() + ANSWER_WITHIN_S * self.clock.rate
+        while self.clock.now_s() < until_s and self._book.is_alive(host):
+            try:
+                return await self.bus.ask(_creator(host), ListProcesses(), Processes, within_s=ANSWER_EACH_S)
+            except LinkError:
+                await self._news_or(self.clock.now_s() + ANSWER_EACH_S / 5 * self.clock.rate)
+        return None
+
+    # ------------------------------------------------------------------ after a loss
+    async def _place_again(self, name: str) -> None:
+        """Start a component that lost its host somewhere else; if nowhere, it waits for the next creator."""
+        record = self._book.find(name)
+        if record is None or record.phase is not Phase.WAITING or record.unwanted:
+            return
+        record.phase = Phase.STARTING
+        await self._old_life_ended(record)
+        for pause_s in AGAIN_PAUSES_S:
+            await self.clock.sleep_s(pause_s * self.clock.rate)
+            try:
+                await self._bring_up(record)
+            except NoHost as refusal:
+                self.story.note(name, f"waits for a host: {refusal.detail}")
+                self._book.waits(name)
+                return
+            except StoppedMeanwhile:
+                self._book.forget(name)
+                return
+            except Refusal as refusal:
+                self.story.note(name, f"could not be started again: {refusal.detail}")
+                if record.phase is not Phase.STARTING:  # its creator will tell whether it runs
+                    return
+            else:
+                self._again += 1
+                return
+        self._book.gave_up(name)
+        self.story.note(name, "is given up: it could not be started again")
+
+    async def _old_life_ended(self, record: Record) -> None:
+        """Return when nobody has the name any more: its last holder dies a moment after its creator, or comes back."""
+        name, until_s = record.spawn.name, self.clock.now_s() + OLD_LIFE_S * self.clock.rate
+        while self.clock.now_s() < until_s and record.phase is Phase.STARTING and not record.unwanted:
+            try:
+                await self.bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=ANSWER_EACH_S)
+            except UnknownName:
+                return
+            except LinkError as error:
+                self.story.note(name, f"nobody tells whether its old life ended: {error}")
+            await self._news_or(min(until_s, self.clock.now_s() + ANSWER_EACH_S / 5 * self.clock.rate))
+
+    async def _end_stray(self, host: str, name: str) -> None:
+        try:
+            by = await self._end_on(host, name, "it is not wanted here any more")
+        except Refusal as refusal:
+            self.story.note(name, f"could not be ended on {host}: {refusal.detail}")
+            return
+        self._strays += 1
+        self.story.note(name, f"was ended on {host}, by {by}")
+
+    # ------------------------------------------------------------------ waiting for what others tell
+    def _tell_news(self) -> None:
+        self._news.set()
+        self._news = asyncio.Event()
+
+    async def _news_or(self, at_s: float) -> None:
+        """Return when something was heard, or at this mission time."""
+        news = asyncio.ensure_future(self._news.wait())
+        time = asyncio.ensure_future(self.clock.sleep_until_s(at_s))
+        try:
+            await asyncio.wait({news, time}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            news.cancel()
+            time.cancel()
+            await asyncio.gather(news, time, return_exceptions=True)
+
+
+def _creator(host: str) -> str:
+    return f"{Subsystem.BACKBONE}/{creator_name(host)}"
+
+
+def _started(record: Record) -> Started:
+    return Started(record.address, record.host, record.pid, list(record.reasons))
+
+
+def _spawn(name: str, order: Start, component_type: ComponentType, requester: str) -> Spawn:
+    return Spawn(
+        subsystem=component_type.subsystem,
+        name=name,
+        type=component_type.name,
+        class_path=component_type.class_path,
+        parameters=order.parameters,
+        requester=requester,
+        policy=RestartPolicy(restart=component_type.restart),
+        pinned=bool(order.host),
+        tags=sorted({*component_type.tags, *order.tags}),
+    )
