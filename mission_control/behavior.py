@@ -33,6 +33,7 @@ from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import (
     AskPlacement,
+    CreatorSilent,
     Ended,
     NotPlaced,
     Placement,
@@ -390,7 +391,7 @@ class Behavior(Component[B], Generic[B]):
         while True:
             try:
                 host = await self._start_or_adopt(order)
-            except LinkError as error:
+            except (LinkError, CreatorSilent) as error:
                 log.info("%s: started without an answer: %s", name, error)
                 await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
                 continue

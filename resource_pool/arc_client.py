@@ -20,7 +20,7 @@ from backbone.keys import Conversation
 from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Ended, Start, Started, StopComponent
+from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
 from backbone.rc_manager.messages import PathNode, Usage
 from backbone.wire import Envelope, Message
 from resource_pool.messages import (
@@ -285,7 +285,7 @@ class ArcClient:
             except NameTaken as refusal:
                 log.info("%s is left from before: %s", self.arc, refusal.detail)
                 await self._end_leftover()
-            except LinkError as error:
+            except (LinkError, CreatorSilent) as error:
                 log.info("%s: claimed without an answer: %s", self.arc, error)
             await clock.sleep_s(pause_s * clock.rate)
             pause_s = min(2 * pause_s, AGAIN_MOST_S)

@@ -1,0 +1,113 @@
+"""What a person wants of a robot, and for how long a pressed key counts.
+
+Rules of this file: no bus, no clock; times are seconds of the machine, for hands do not speed up
+with the mission's clock.
+
+A terminal tells that a key is pressed, and again and again while it is held, never that it is let
+go. So a command stands for a moment after the last press and ends by itself (dead-man).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
+REPEATED_HOLD_S = (0.15, FIRST_HOLD_S)  # chosen: bounds of the hold once the rhythm of the repeats is known
+HOLD_INTERVALS = 3.0  # chosen: two lost repeats are bridged
+REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at the robot
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Turn the wheels at these speeds, rad/s, forward is positive."""
+
+    left_rad_s: float
+    right_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """Stop the wheels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """Jump once."""
+
+
+@dataclass(frozen=True, slots=True)
+class GiveBack:
+    """Release the robot."""
+
+
+Command = Drive | Halt | Jump
+Wish = Command | GiveBack
+
+Direction = Literal["forward", "backward", "left", "right"]
+
+
+def drive_towards(direction: Direction, speed_rad_s: float) -> Drive:
+    """Return the wheel speeds for a direction key; turns are on the spot, at half the speed.
+
+    Example:
+        >>> drive_towards("left", 4.0)
+        Drive(left_rad_s=-2.0, right_rad_s=2.0)
+    """
+    turn = speed_rad_s / 2
+    match direction:
+        case "forward":
+            return Drive(speed_rad_s, speed_rad_s)
+        case "backward":
+            return Drive(-speed_rad_s, -speed_rad_s)
+        case "left":
+            return Drive(-turn, turn)
+        case "right":
+            return Drive(turn, -turn)
+
+
+class DeadMan:
+    """Turns key presses into commands that repeat while a key is held, and one halt after it.
+
+    Laws: a command is due only within the hold of a press; every drive is followed by a halt.
+    """
+
+    def __init__(self) -> None:
+        self._held: Drive | None = None
+        self._pressed_s = self._until_s = self._next_s = 0.0
+        self._repeats = 0
+        self._must_halt = False
+
+    def press(self, drive: Drive, now_s: float) -> None:
+        """A key is down, for the first time or again."""
+        if drive == self._held and now_s < self._until_s:
+            self._repeats += 1
+            least, most = REPEATED_HOLD_S
+            rhythm_s = HOLD_INTERVALS * (now_s - self._pressed_s)
+            hold_s = min(max(rhythm_s, least), most) if self._repeats >= 2 else FIRST_HOLD_S
+        else:
+            self._repeats, hold_s, self._next_s = 0, FIRST_HOLD_S, now_s
+        self._held, self._pressed_s, self._until_s = drive, now_s, now_s + hold_s
+
+    def stop(self) -> None:
+        """Nothing is held any more: a halt is due at once, also if nothing was."""
+        self._held, self._must_halt = None, True
+
+    def due(self, now_s: float) -> Drive | Halt | None:
+        """Return the command to send now, if one is due; asking counts as sending."""
+        if self._held is not None and now_s >= self._until_s:
+            self._held, self._must_halt = None, True
+        if self._held is None:
+            must_halt, self._must_halt = self._must_halt, False
+            return Halt() if must_halt else None
+        if now_s < self._next_s:
+            return None
+        self._next_s = now_s + REPEAT_EVERY_S
+        return self._held
+
+    @property
+    def next_s(self) -> float | None:
+        """When something will be due next; None: not before a press."""
+        if self._must_halt:
+            return 0.0
+        return None if self._held is None else min(self._next_s, self._until_s)
