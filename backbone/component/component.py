@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
-from backbone.bus.interface import Bus, Clock
+from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
@@ -47,6 +47,7 @@ from backbone.wire import Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
 
+MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
 REGISTER_WITHIN_S = 10.0  # chosen: a hub that is being restarted on a busy machine is back long before
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
@@ -105,14 +106,16 @@ class Component(Generic[P]):
         self._state, self._since_s = LifeState.CONNECTING, clock.now_s()
         self._end = asyncio.Event()
         self._bug: BaseException | None = None
-        self._tasks: asyncio.TaskGroup | None = None
+        self._group: asyncio.TaskGroup | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._token: Subscription | None = None
 
     # ------------------------------------------------------------------ hooks
     async def connect(self) -> None:
         """Get hold of what the component needs.
 
-        When: once, before anybody can ask it. What: subscribe, ask others, open devices.
-        Not: wait for something that waits for this component's readiness.
+        When: once, before anybody can ask it; cancelled if it is told to end meanwhile. What: subscribe,
+        ask others, open devices. Not: wait for something that waits for this component's readiness.
         """
 
     async def serve(self) -> None:
@@ -125,19 +128,23 @@ class Component(Generic[P]):
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Return the reply to one of the questions in ``accepts``; raise a ``Refusal`` to say no.
 
-        When: any time between readiness and stop, several at once. Not: wait for the asker.
+        When: any time between readiness and stop, while it drains too, several at once. Not: wait for the asker.
         """
         raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     async def drain(self) -> None:
         """Go to the safe state.
 
-        When: once, after ``serve`` was cancelled, while the bus is still open. What: finish or undo what
-        was begun, leave hardware safe. Not: begin anything new.
+        When: once if ``connect`` succeeded, after a bug too: when ``serve`` and all tasks have ended, while
+        the bus is open and the liveliness token still stands. What: finish or undo what was begun, leave
+        hardware safe. Not: begin anything new.
         """
 
     def parameters_changed(self) -> None:
-        """Take over ``self.parameters``, which were just replaced by checked new ones."""
+        """Take over ``self.parameters``, which were just replaced by checked new ones.
+
+        When: after each change, not at the start. A ``Refusal`` raised here brings the old ones back.
+        """
 
     def statistics(self) -> dict[str, float]:
         """Return named counters and measures, units in the names."""
@@ -160,11 +167,23 @@ class Component(Generic[P]):
         return self._state
 
     def start_task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
-        """Run the coroutine beside ``serve``; its bug is the component's bug, its life ends with it."""
-        if self._tasks is None:
+        """Run the coroutine beside ``serve``; its bug is the component's bug, its life ends with it.
+
+        When the component is about to end nothing new begins: the task returned is then being cancelled.
+
+        Raises:
+            RuntimeError: The component does not live yet.
+        """
+        if self._group is None and not self._end.is_set():
             work.close()
-            raise RuntimeError(f"{self.address} starts {name} before it serves")
-        return self._tasks.create_task(work, name=f"{self.name}:{name}")
+            raise RuntimeError(f"{self.address} starts {name} before it connects")
+        task = (self._group or asyncio.get_running_loop()).create_task(work, name=f"{self.name}:{name}")
+        if self._group is None:
+            task.cancel()
+        else:
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+        return task
 
     def report(self, feedback: str) -> None:
         """Say in one line what the component is doing; published if it is news."""
@@ -187,6 +206,8 @@ class Component(Generic[P]):
         """End because of a bug; ``run`` raises it."""
         if self._bug is None:
             self._bug = bug
+            self.feedback = f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
+            self.story.note(self.name, f"failed: {self.feedback}")
             log.error("%s failed", self.address, exc_info=bug)
         self._end.set()
 
@@ -208,6 +229,8 @@ class Component(Generic[P]):
     async def run(self) -> None:
         """Live the whole life; return after a good end.
 
+        Cancelled, it dies as if its process were killed: it drains nothing and says nothing any more.
+
         Raises:
             NameTaken: A living component has the name; nobody heard of this one.
             LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
@@ -215,17 +238,9 @@ class Component(Generic[P]):
         """
         self.bus.on_bug = self.fail
         try:
-            await self._claim_name()
-        except BaseException:  # said nothing yet under an address that may be another's
-            await self.bus.close()
-            raise
-        try:
-            await self.connect()
-            accepts = CommonQuestion if self.accepts is None else CommonQuestion | self.accepts
-            self.bus.serve(self.address, accepts, self._answer)
-            await self._serve_until_end()
+            if await self._unless_ended(self._claim_name(), "claim"):
+                await self._live_and_say_so()
         finally:
-            self._enter(LifeState.FAILED if self._bug else LifeState.STOPPED)
             await self.bus.close()
         if self._bug is not None:
             raise self._bug
@@ -246,26 +261,54 @@ class Component(Generic[P]):
         )
         self.bus.declare_alive(claim_address(state.address, state.host, state.pid))
 
-    async def _serve_until_end(self) -> None:
+    async def _live_and_say_so(self) -> None:
         try:
-            async with asyncio.TaskGroup() as tasks:
-                self._tasks = tasks
-                serving = tasks.create_task(self.serve(), name=f"{self.name}:serve")
-                self._enter(LifeState.READY)
-                token = self.bus.declare_alive(self.address)
-                await self._end.wait()
-                self._enter(LifeState.DRAINING)
-                serving.cancel()
-                for task in tasks._tasks:  # noqa: SLF001  the group offers no public way to end its tasks
+            await self._live()
+        except Exception as bug:
+            self.fail(bug)
+        self._enter(LifeState.FAILED if self._bug else LifeState.STOPPED)
+        if self._token is not None:
+            self._token.close()
+
+    async def _live(self) -> None:
+        connected = False
+        try:
+            async with asyncio.TaskGroup() as group:
+                self._group = group
+                connected = await self._unless_ended(self.connect(), "connect")
+                if connected:
+                    await self._serve_until_end()
+                self._group = None
+                for task in self._tasks:
                     task.cancel()
         except* Exception as bugs:
-            if self._bug is None:
-                self._bug = bugs
-                log.error("%s failed", self.address, exc_info=bugs)
+            self.fail(bugs.exceptions[0] if len(bugs.exceptions) == 1 else bugs)
         finally:
-            self._tasks = None
-        await self.drain()
-        token.close()
+            self._group = None
+        if connected:
+            await self.drain()
+
+    async def _serve_until_end(self) -> None:
+        self.bus.serve(
+            self.address, CommonQuestion if self.accepts is None else CommonQuestion | self.accepts, self._answer
+        )
+        self.start_task(self.serve(), "serve")
+        self._enter(LifeState.READY)
+        self._token = self.bus.declare_alive(self.address)
+        await self._end.wait()
+        self._enter(LifeState.DRAINING)
+
+    async def _unless_ended(self, work: Coroutine[Any, Any, None], name: str) -> bool:
+        """Do the work unless the component is told to end first; say whether it was done."""
+        working = asyncio.create_task(work, name=f"{self.name}:{name}")
+        ending = asyncio.create_task(self._end.wait(), name=f"{self.name}:end")
+        try:
+            await asyncio.wait({working, ending}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            working.cancel()
+            ending.cancel()
+            await asyncio.wait({working, ending})
+        return not working.cancelled() and working.result() is None
 
     def _enter(self, state: LifeState) -> None:
         self._state, self._since_s = state, self.clock.now_s()
@@ -300,9 +343,13 @@ class Component(Generic[P]):
         old = msgspec.to_builtins(self.parameters)
         if name not in old:
             raise WrongParameter(f"{self.name} has no parameter {name!r}; it has: {', '.join(sorted(old)) or 'none'}")
-        self.parameters = cast(P, _convert({**old, name: value}, self.parameters_type))
+        before, self.parameters = self.parameters, cast(P, _convert({**old, name: value}, self.parameters_type))
+        try:
+            self.parameters_changed()
+        except Refusal:
+            self.parameters = before
+            raise
         self.story.note(name, f"{user} set {name} from {old[name]!r} to {value!r}")
-        self.parameters_changed()
         return Parameters(msgspec.to_builtins(self.parameters))
 
 

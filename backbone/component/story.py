@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
+from functools import lru_cache
 
 from backbone.bus.interface import Clock, current_cause
 from backbone.component.messages import StoryEvent
@@ -30,4 +32,14 @@ class StoryBook:
 
     def of(self, subject: str = "") -> list[StoryEvent]:
         """Return the events about a subject, or all, oldest first."""
-        return [event for event in self._events if not subject or event.subject == subject or subject in event.what]
+        return [event for event in self._events if not subject or _is_about(event, subject)]
+
+
+def _is_about(event: StoryEvent, subject: str) -> bool:
+    """Say whether the event's subject or a whole name in its text is this one: not scout10 for scout1."""
+    return event.subject == subject or _spoken_of(subject).search(event.what) is not None
+
+
+@lru_cache(maxsize=64)
+def _spoken_of(name: str) -> re.Pattern[str]:
+    return re.compile(rf"(?<![\w-]){re.escape(name)}(?![\w-])")
