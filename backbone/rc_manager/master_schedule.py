@@ -277,20 +277,24 @@ class MasterSchedule:
         """Return ARCs of one group in the order of rule 2."""
         return by_precedence(arcs, lambda arc: arc.path, lambda arc: arc.seniority)
 
-    def plan(self, group: Sequence[ArcEntry], now_s: float, *, handed_over: bool = False) -> list[Slot]:
+    def plan(
+        self, group: Sequence[ArcEntry], now_s: float, *, handed_over: bool = False, slack_s: float | None = None
+    ) -> list[Slot]:
         """Return the place of every queued ARC of the group, in order.
 
         Args:
             group: Active ARCs.
             now_s: From when on.
             handed_over: Plan as if all RCs that are being freed were free already.
+            slack_s: By how much an ARC may overlap those before it; None: by the tolerance of this run.
         """
+        forgiven_s = self._slack_s if slack_s is None else slack_s
         holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
         slots: list[Slot] = []
         for arc in self.in_order([arc for arc in group if arc.queued]):
             against = self._against(arc, holders, slots, now_s)
             from_s = self.free_s(arc, now_s) if arc in holders else now_s
-            start_s = self._earliest_s(arc, from_s, against) if self.usable(arc) else math.inf
+            start_s = self._earliest_s(arc, from_s, against, forgiven_s) if self.usable(arc) else math.inf
             slots.append(Slot(arc, start_s, against))
         return slots
 
@@ -324,13 +328,16 @@ class MasterSchedule:
         ]
         return [hold for hold in holds if hold.end_s > now_s + INSTANT_S]
 
-    def _earliest_s(self, arc: ArcEntry, from_s: float, against: Sequence[Hold]) -> float:
+    def _earliest_s(self, arc: ArcEntry, from_s: float, against: Sequence[Hold], forgiven_s: float) -> float:
         """Return the first time from which the ARC fits for its whole length; infinite if there is none."""
-        times = {from_s, *(hold.end_s for hold in against if from_s < hold.end_s < math.inf)}
-        return next((start_s for start_s in sorted(times) if self._fits_from(arc, start_s, against)), math.inf)
+        length_s = arc.length_s - forgiven_s
+        times = sorted({from_s, *(hold.end_s for hold in against if from_s < hold.end_s < math.inf)})
+        return next(
+            (time_s for time_s in times if self._fits_between(arc, time_s, time_s + length_s, against)), math.inf
+        )
 
-    def _fits_from(self, arc: ArcEntry, start_s: float, against: Sequence[Hold]) -> bool:
-        met = meeting(against, start_s, start_s + arc.length_s - self._slack_s)
+    def _fits_between(self, arc: ArcEntry, start_s: float, end_s: float, against: Sequence[Hold]) -> bool:
+        met = meeting(against, start_s, end_s)
         moments = {start_s, *(hold.start_s for hold in met if hold.start_s > start_s)}
         return all(self.fits(arc, [hold.arc for hold in met if hold.covers(moment)]) for moment in moments)
 
@@ -345,25 +352,28 @@ class MasterSchedule:
         return None
 
     def _due_in(self, group: Sequence[ArcEntry], now_s: float) -> Turn | None:
-        slots = self.plan(group, now_s)
-        # RCs under hand-over may come free earlier than predicted. Nobody is displaced for a gap that would be gone then.
-        at_once = self._starting(self.plan(group, now_s, handed_over=True), now_s) if _in_hand_over(group) else None
         pending: list[ArcEntry] = []
-        for slot in slots:
+        certain = self._starting_for_certain(group, now_s)
+        for slot in self.plan(group, now_s):
             arc = slot.arc
             if arc.state is not RequestState.WAITING or self._must_let_higher_go_first(arc, group):
                 continue
             if slot.start_s <= now_s + INSTANT_S:
                 in_the_way = self._in_the_way(arc, pending, group, now_s)
-                if in_the_way and (at_once is None or arc in at_once):
+                if in_the_way and arc in certain:
                     return Turn(arc, in_the_way)
                 if not in_the_way and self.fits(arc, [holder for holder in group if holder.holds]):
                     return Turn(arc, [])
-            if at_once is not None and arc in at_once:
+            if arc in certain:
                 pending.append(arc)
         return None
 
-    def _starting(self, slots: Iterable[Slot], now_s: float) -> set[ArcEntry]:
+    def _starting_for_certain(self, group: Sequence[ArcEntry], now_s: float) -> set[ArcEntry]:
+        """Return those whose start is now even if all hand-overs end earlier than predicted and no overlap is forgiven.
+
+        Only for them is anybody displaced: else a slice might be ended for a gap that closes meanwhile.
+        """
+        slots = self.plan(group, now_s, handed_over=True, slack_s=0.0)
         return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
 
     def _in_the_way(
