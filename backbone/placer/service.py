@@ -84,6 +84,7 @@ SPAWN_MARGIN_S = 5.0  # chosen: a creator answers this long after its own deadli
 END_MARGIN_S = 5.0  # chosen: the same for ends
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
 OLD_LIFE_S = 5.0  # chosen: longer than any lease by which a lost host's components are still seen
+LEAVING = (LifeState.DRAINING, LifeState.STOPPED, LifeState.FAILED)
 SPAWN_TRIES = 3  # chosen: two creators may die of something else; a third dies of the order
 AGAIN_PAUSES_S = (0.0, 0.5, 1.0, 2.0)  # chosen: before each try to start a lost component again
 
@@ -159,10 +160,10 @@ class Placer(Component[NoParameters]):
 
     # ------------------------------------------------------------------ start
     async def _start(self, order: Start, requester: str) -> Started:
-        name = legal(order.name or self._book.number(order.type))
+        name = order.name or self._book.number(order.type)
         self._starts += 1
         try:
-            return await self._start_as(name, order, requester)
+            return await self._start_as(legal(name), order, requester)
         except Refusal as refusal:
             self._refused += 1
             self.story.note(name, f"was not started: {refusal.detail}")
@@ -396,6 +397,12 @@ class Placer(Component[NoParameters]):
                     assert_never(instruction)
         self._tell_news()
 
+    def _creator_status_heard(self, heard: Envelope[ComponentState]) -> None:
+        """Move a creator's components at its first word of leaving; its token still stands while it ends them."""
+        creator = heard.body
+        if creator.state in LEAVING and self._book.knows_creator(creator.host, creator.pid):
+            self._carry_out(self._book.creator_down(creator.host))
+
     # ------------------------------------------------------------------ creators
     async def _creators(self) -> Components:
         return await ask_until_answered(
@@ -445,6 +452,7 @@ class Placer(Component[NoParameters]):
             self._ears[host] = [
                 self.bus.subscribe(own, Conversation.TELEMETRY, HostLoad, self._load_heard, latest=True),
                 self.bus.subscribe(own, Conversation.EVENTS, ProcessFell, self._fall_heard),
+                self.bus.subscribe(own, Conversation.STATUS, ComponentState, self._creator_status_heard),
             ]
         try:
             answered = await ask_until_answered(
