@@ -29,6 +29,7 @@ class ComponentType(Message, frozen=True):
         core: True for core services, which only the bring-up starts.
         tags: Host tags its components need.
         restart: True if its creator restarts it after an unexpected end.
+        needs: Kinds of RC it holds one of each; empty if it is no ARC.
     """
 
     name: str
@@ -38,6 +39,7 @@ class ComponentType(Message, frozen=True):
     core: bool = False
     tags: list[str] = []
     restart: bool = True
+    needs: list[str] = []
 
 
 class Admit(Message, frozen=True):

@@ -1,0 +1,199 @@
+"""What has to fit together in the behavior tree: types, parameters, and the ARCs its nodes claim."""
+
+from __future__ import annotations
+
+from backbone.component_database.messages import Multiplicity
+from backbone.mission.behavior_orders import TREE_PARAMETERS
+from backbone.mission.document import Element
+from backbone.mission.report import Report, told_names
+from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
+from backbone.naming import Subsystem
+
+TRIES_AT_MOST = 10_000  # chosen: 10 ms; sets that fit are found in the first few unless hardly anything fits
+
+
+def check_behaviors(tables: Tables, report: Report) -> None:
+    """Report what does not fit in the behavior tree."""
+    of_one: dict[str, Element] = {}
+    for behavior in tables.behaviors:
+        kind, name = behavior.text("type"), behavior.text("name")
+        if is_known(behavior, "type", "component type", tables.types, report):
+            if tables.types[kind].text("subsystem") != Subsystem.MISSION_CONTROL:
+                report.fault(
+                    behavior.place_of("type"),
+                    f"type {kind} is no behavior",
+                    f"Behaviors are the types of subsystem mission_control: {told_names(_behavior_types(tables))}",
+                )
+            _check_multiplicity(behavior, "type", tables, of_one, report)
+        if name and name == tables.root.text("name"):
+            report.fault(
+                behavior.place_of("name"),
+                f"behavior {name} has the name of the mission, which is its tree's root",
+                "Choose another name",
+            )
+        check_parameters(behavior, TREE_PARAMETERS, report)
+    for behavior, arc in tables.claims():
+        _check_runtime(behavior, arc, report)
+        if not is_known(arc, "kind", "kind of ARC", [name for name in tables.types if tables.needs(name)], report):
+            continue
+        _check_multiplicity(arc, "kind", tables, of_one, report)
+        if _wishes_fit(arc, tables, report):
+            _check_set(behavior, arc, tables, report)
+
+
+def _behavior_types(tables: Tables) -> list[str]:
+    return [name for name, kind in tables.types.items() if kind.text("subsystem") == Subsystem.MISSION_CONTROL]
+
+
+def _check_multiplicity(
+    element: Element, attribute: str, tables: Tables, of_one: dict[str, Element], report: Report
+) -> None:
+    kind = element.text(attribute)
+    if tables.types[kind].text("multiplicity") != Multiplicity.ONE:
+        return
+    before = of_one.setdefault(kind, element)
+    if before is not element:
+        report.fault(
+            element.place_of(attribute),
+            f"a second {kind}, of which only one may run; the first is in line {before.place.line}",
+            'Remove one, or write multiplicity="many" at the type',
+        )
+
+
+def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:
+    minimum_s, maximum_s = arc.number("minimum-runtime-s"), arc.number("maximum-runtime-s")
+    if minimum_s is not None and maximum_s is not None and 0 < maximum_s < minimum_s:
+        report.fault(
+            arc.place_of("maximum-runtime-s"),
+            f"maximum run time {maximum_s:g} s of {behavior.text('name')} is less than the minimum, {minimum_s:g} s",
+            "Write at least the minimum, or leave it out",
+        )
+
+
+# ---------------------------------------------------------------------- what an ARC wishes and needs
+def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
+    """Report wishes that nothing can fulfil; say whether there is none."""
+    kind, needs = arc.text("kind"), tables.needs(arc.text("kind"))
+    wishes = arc.all("wish")
+    check_unique(wishes, "type", "wish for a", report)
+    fits = True
+    for wish in wishes:
+        wanted, name, features = wish.text("type"), wish.text("name"), wish.words("features")
+        if wanted not in needs:
+            fits = False
+            if is_known(wish, "type", "component type", tables.types, report):
+                report.fault(
+                    wish.place_of("type"),
+                    f"an ARC of kind {kind} has no {wanted}{report.hint(wanted, needs)}",
+                    f"It needs: {told_names(needs)}",
+                )
+            continue
+        there = tables.resources_of(wanted)
+        if name and not is_known(wish, "name", wanted, [resource.text("name") for resource in there], report):
+            fits = False
+            continue
+        candidates = [tables.resources[name]] if name else there
+        if there and not any(_has(resource, features) for resource in candidates):
+            fits = False
+            known = sorted({feature for resource in candidates for feature in resource.words("features")})
+            hints = "".join(report.hint(feature, known) for feature in features if feature not in known)
+            report.fault(
+                wish.place_of("features"),
+                f"{name or f'no {wanted}'} {'lacks' if name else 'has'} {told_names(features)}{hints}",
+                f"There is: {told_names(known) or 'no feature at all'}",
+            )
+    for needed in needs:
+        if not tables.resources_of(needed) and tables.is_resource_type(needed):
+            fits = False
+            report.fault(
+                arc.place_of("kind"),
+                f"an ARC of kind {kind} needs a {needed}, but the mission has none",
+                f'Add <resource type="{needed}" name="…"/>, or claim another kind',
+            )
+    return fits
+
+
+def _check_set(behavior: Element, arc: Element, tables: Tables, report: Report) -> None:
+    """Report a demand no sharable resource can serve, and resources that cannot be used together."""
+    needs = [needed for needed in dict.fromkeys(tables.needs(arc.text("kind"))) if tables.resources_of(needed)]
+    wishes = {wish.text("type"): wish for wish in arc.all("wish")}
+    roles = {
+        needed: [resource for resource in tables.resources_of(needed) if _wanted(resource, wishes.get(needed))]
+        for needed in needs
+    }
+    demand = _check_demand(behavior, arc, report)
+    if demand is None:
+        return
+    enough = {
+        needed: [
+            resource
+            for resource in candidates
+            if not resource.flag("sharable") or demand <= (resource.number("capacity") or 0.0)
+        ]
+        for needed, candidates in roles.items()
+    }
+    tight = [needed for needed in needs if not enough[needed]]
+    for needed in tight:
+        best = max((resource.number("capacity") or 0.0 for resource in roles[needed]), default=0.0)
+        report.fault(
+            arc.place_of("period-s"),
+            f"{behavior.text('name')} alone asks for {demand:.0%} of a {needed}; "
+            f"{told_names([resource.text('name') for resource in roles[needed]])} can give {best:.0%}",
+            "Write a longer period-s or a shorter packet-time-s, or raise the capacity",
+        )
+    if not tight and not _some_set_fits(list(enough.values())):
+        report.fault(
+            arc.place_of("kind"),
+            f"no {told_names(needs)} that {behavior.text('name')} may have can be used together",
+            "Look at the <uses> of these resources, or wish for others",
+        )
+
+
+def _check_demand(behavior: Element, arc: Element, report: Report) -> float | None:
+    """Return the share of a sharable resource that the ARC asks for; None if that is told or cannot be told."""
+    period_s, packet_time_s = arc.number("period-s"), arc.number("packet-time-s")
+    if period_s is None or packet_time_s is None or period_s <= 0 or packet_time_s <= 0:
+        return None
+    if packet_time_s > period_s:
+        report.fault(
+            arc.place_of("packet-time-s"),
+            f"a packet of {behavior.text('name')} takes {packet_time_s:g} s, but the next is due after {period_s:g} s",
+            "Write a longer period-s or a shorter packet-time-s",
+        )
+        return None
+    return packet_time_s / period_s
+
+
+def _some_set_fits(roles: list[list[Element]]) -> bool:
+    """Say whether one of each role can be used together; True if that is too much work to find out."""
+    tries = 0
+
+    def extend(chosen: list[Element]) -> bool:
+        nonlocal tries
+        if len(chosen) == len(roles):
+            return True
+        for candidate in roles[len(chosen)]:
+            tries += 1
+            if tries > TRIES_AT_MOST:
+                return True
+            fits = all(_together(candidate, other) and _together(other, candidate) for other in chosen)
+            if fits and extend([*chosen, candidate]):
+                return True
+        return False
+
+    return extend([])
+
+
+def _together(resource: Element, other: Element) -> bool:
+    named = [used.text("name") for used in resource.all("uses") if used.text("type") == other.text("type")]
+    return not named or other.text("name") in named
+
+
+def _wanted(resource: Element, wish: Element | None) -> bool:
+    if wish is None:
+        return True
+    return wish.text("name") in ("", resource.text("name")) and _has(resource, wish.words("features"))
+
+
+def _has(resource: Element, features: list[str]) -> bool:
+    return set(features) <= set(resource.words("features"))

@@ -1,0 +1,360 @@
+"""What has to fit together in a mission file: hosts, core services, types, resources, names.
+
+Pure: elements in, faults out. Values that the schema has refused are passed over here, so that one
+mistake is told once. World and behaviors have files of their own.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from collections.abc import Iterator
+
+from backbone.component_database.messages import Multiplicity
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.creator.messages import creator_name
+from backbone.mission.behavior_checks import check_behaviors
+from backbone.mission.class_paths import class_path_fault
+from backbone.mission.document import Element
+from backbone.mission.report import Place, Report, told, told_names
+from backbone.mission.tables import (
+    CORE_SERVICES,
+    NETWORK_ID,
+    SIMULATED,
+    WORLD,
+    Tables,
+    check_host,
+    check_parameters,
+    check_unique,
+    host_tags_lacking,
+    is_known,
+    parameters,
+    section,
+)
+from backbone.mission.world_checks import check_world
+from backbone.naming import MAX_NAME_LENGTH, Subsystem, is_legal
+
+LAUNCHER = "launcher"  # the component that 'up' is itself
+FIRST_NETWORK_ID, LAST_NETWORK_ID = 1, 254  # as the radio's packets carry it: one byte, without 0 and 255
+SET_BY_RESOURCE = ("driver", "sharable", "capacity", "links")  # Resource.rc_parameters
+
+
+def check(root: Element, report: Report) -> None:
+    """Report everything that does not fit."""
+    tables = Tables.of(root)
+    _check_hosts(tables, report)
+    _check_core(tables, report)
+    _check_types(tables, report)
+    _check_resources(tables, report)
+    check_world(tables, report)
+    check_behaviors(tables, report)
+    _check_component_names(tables, report)
+
+
+# ---------------------------------------------------------------------- hosts and core services
+def _check_hosts(tables: Tables, report: Report) -> None:
+    hosts = section(tables.root, "hosts")
+    check_unique(hosts, "name", "host", report)
+    for host in hosts:
+        address = host.text("address")
+        if (re.fullmatch(r"[0-9.]+", address) or ":" in address) and not _is_ip(address):
+            report.fault(host.place_of("address"), f"{told(address)} is no IP address", "Write it like 192.0.2.7")
+        name = creator_name(host.text("name"))
+        if is_legal(host.text("name")) and not is_legal(name):
+            report.fault(
+                host.place_of("name"), "the name is too long for a creator's", f"{name} must fit {MAX_NAME_LENGTH}"
+            )
+
+
+def _is_ip(address: str) -> bool:
+    try:
+        ipaddress.ip_address(address)
+    except ValueError:
+        return False
+    return True
+
+
+def _check_core(tables: Tables, report: Report) -> None:
+    core = tables.root.first("core")
+    if core is None:
+        return
+    first: dict[tuple[str, str], Element] = {}
+    for service in core.all("service"):
+        name, host = service.text("type"), service.text("host")
+        if is_known(service, "type", "core service", CORE_SERVICES, report):
+            is_known(service, "type", "component type", tables.types, report)
+            before = first.setdefault((name, host if name == CREATOR else ""), service)
+            if before is not service:
+                report.fault(
+                    service.place,
+                    f"a second {name}{f' on {host}' if name == CREATOR else ''}; "
+                    f"the first is in line {before.place.line}",
+                    "Remove one; creator runs once on each host, every other core service once in the mission",
+                )
+        check_host(service, tables, report)
+        main = _main_host(tables)
+        if name in CORE_SERVICES and name != CREATOR and host in tables.hosts and host != main:
+            report.fault(
+                service.place_of("host"),
+                f"{name} on host {host}: other hosts than the first run only their creator",
+                f"Put it on {main}",
+            )
+    there = {name for name, _host in first}
+    for name in CORE_SERVICES:
+        if name not in there and name != CREATOR:
+            report.fault(
+                core.place,
+                f"core service {name} is missing",
+                f'Add <service type="{name}" host="{_main_host(tables)}"/>',
+            )
+    for host in tables.hosts.values():
+        if (CREATOR, host.text("name")) not in first:
+            report.fault(
+                host.place,
+                f"host {host.text('name')} has no creator",
+                f'Add <service type="{CREATOR}" host="{host.text("name")}"/> to <core>',
+            )
+
+
+def _main_host(tables: Tables) -> str:
+    """Return the name of the host that runs the core services."""
+    return next(iter(tables.hosts), "…")
+
+
+# ---------------------------------------------------------------------- types
+def _check_types(tables: Tables, report: Report) -> None:
+    types = section(tables.root, "types")
+    check_unique(types, "name", "type", report)
+    only_here = all(_is_loopback(host.text("address")) for host in tables.hosts.values())
+    for component_type in types:
+        _check_core_type(component_type, report)
+        _check_needs(component_type, tables, report)
+        _check_type_tags(component_type, tables, report)
+        class_path = component_type.text("class")
+        if only_here and re.fullmatch(r"\w+(\.\w+)*:\w+", class_path):
+            _check_class(component_type, class_path, report)
+
+
+def _is_loopback(address: str) -> bool:
+    return address == "localhost" or (_is_ip(address) and ipaddress.ip_address(address).is_loopback)
+
+
+def _check_core_type(component_type: Element, report: Report) -> None:
+    name, core = component_type.text("name"), component_type.flag("core")
+    if core and name not in CORE_SERVICES and is_legal(name):
+        report.fault(
+            component_type.place_of("core"),
+            f"{name} is no core service{report.hint(name, CORE_SERVICES)}",
+            f"Core services are {', '.join(CORE_SERVICES)}; others are started by the placer, without core",
+        )
+    if name not in CORE_SERVICES:
+        return
+    if not core:
+        report.fault(component_type.place_of("core"), f"{name} is a core service", 'Add core="true"')
+    if component_type.text("subsystem") != Subsystem.BACKBONE and component_type.text("subsystem") in set(Subsystem):
+        report.fault(
+            component_type.place_of("subsystem"), f"{name} belongs to the backbone", 'Write subsystem="backbone"'
+        )
+    right = Multiplicity.MANY if name == CREATOR else Multiplicity.ONE
+    if component_type.text("multiplicity") != right and component_type.text("multiplicity") in set(Multiplicity):
+        why = "there is one on each host" if name == CREATOR else "there is one in a mission"
+        report.fault(
+            component_type.place_of("multiplicity"), f"multiplicity of {name}: {why}", f'Write multiplicity="{right}"'
+        )
+
+
+def _check_needs(component_type: Element, tables: Tables, report: Report) -> None:
+    needs = component_type.all("needs")
+    check_unique(needs, "type", "need of", report)
+    known = tables.resource_types()
+    for needed in needs:
+        is_known(needed, "type", "type of resource", known, report)
+    for used in dict.fromkeys(component_type.words("uses")):
+        if used not in known and is_legal(used):
+            report.fault(
+                component_type.place_of("uses"),
+                f"no type of resource is named {told(used)}{report.hint(used, known)}",
+                f"There is: {told_names(known)}",
+            )
+    if component_type.text("uses") and not tables.is_resource_type(component_type.text("name")):
+        report.fault(
+            component_type.place_of("uses"),
+            f"type {component_type.text('name')} has no resources that could use others",
+            "Remove uses; an ARC says what it needs by <needs>",
+        )
+    if needs and component_type.text("subsystem") in set(Subsystem) - {Subsystem.RESOURCE_POOL}:
+        report.fault(
+            component_type.place_of("subsystem"),
+            "a type with <needs> is an ARC, which belongs to the resource pool",
+            'Write subsystem="resource_pool", or remove <needs>',
+        )
+
+
+def _check_type_tags(component_type: Element, tables: Tables, report: Report) -> None:
+    if not tables.hosts or not component_type.words("tags"):
+        return
+    lacking = {name: host_tags_lacking(host, component_type) for name, host in tables.hosts.items()}
+    if all(lacking.values()):
+        reasons = "; ".join(f"{name} lacks {', '.join(tags)}" for name, tags in lacking.items())
+        report.fault(
+            component_type.place_of("tags"),
+            f"no host can run type {component_type.text('name')}: {reasons}",
+            "Give a host these tags, or remove them here",
+        )
+
+
+def _check_class(component_type: Element, class_path: str, report: Report) -> None:
+    wrong = class_path_fault(class_path)
+    if wrong is None:
+        return
+    message, there = wrong
+    name = message.rpartition(" ")[2] if message.startswith("no module") else class_path.rpartition(":")[2]
+    report.fault(
+        component_type.place_of("class"),
+        f"{class_path}: {message}{report.hint(name.rpartition('.')[2], there)}",
+        "Write the class as package.module:Class, importable on this machine",
+    )
+
+
+# ---------------------------------------------------------------------- resources
+def _check_resources(tables: Tables, report: Report) -> None:
+    resources = section(tables.root, "resources")
+    of_one: dict[str, Element] = {}
+    ids: dict[int, Element] = {}
+    for resource in resources:
+        kind = resource.text("type")
+        if is_known(resource, "type", "component type", tables.types, report) and not tables.is_resource_type(kind):
+            report.fault(
+                resource.place_of("type"),
+                f"type {kind} runs no hardware",
+                f"Types of resource are those of subsystem resource_pool without <needs>: "
+                f"{told_names(tables.resource_types())}",
+            )
+        check_host(resource, tables, report)
+        check_parameters(resource, SET_BY_RESOURCE, report)
+        _check_uses(resource, tables, report)
+        _check_driver(resource, tables, report)
+        _check_network_id(resource, ids, report)
+        capacity = resource.number("capacity")
+        if capacity is not None and 0 < capacity < 1 and not resource.flag("sharable"):
+            report.fault(
+                resource.place_of("capacity"),
+                f"capacity {capacity:g} of {resource.text('name')}, which is not sharable",
+                'Add sharable="true", or remove the capacity',
+            )
+        if kind in tables.types and tables.types[kind].text("multiplicity") == Multiplicity.ONE:
+            before = of_one.setdefault(kind, resource)
+            if before is not resource:
+                report.fault(
+                    resource.place_of("type"),
+                    f"a second resource of type {kind}, of which only one may run; the first is in line "
+                    f"{before.place.line}",
+                    'Remove one, or write multiplicity="many" at the type',
+                )
+
+
+def _check_uses(resource: Element, tables: Tables, report: Report) -> None:
+    uses = resource.all("uses")
+    check_unique(uses, "name", "use of", report)
+    for used in uses:
+        kind = used.text("type")
+        type_fits = is_known(used, "type", "type of resource", tables.resource_types(), report)
+        of_kind = [other.text("name") for other in tables.resources_of(kind)] if type_fits else list(tables.resources)
+        name = used.text("name")
+        if type_fits and name in tables.resources and name not in of_kind and tables.resources[name].text("type"):
+            report.fault(
+                used.place_of("name"),
+                f"{name} is a {tables.resources[name].text('type')}, no {kind}",
+                f"Write its type, or name one of these: {told_names(of_kind) or 'there is none'}",
+            )
+        elif is_known(used, "name", kind if type_fits else "resource", of_kind, report) and name == resource.text(
+            "name"
+        ):
+            report.fault(used.place_of("name"), f"{name} uses itself", "Name another resource")
+    used_kinds = {used.text("type") for used in uses}
+    component_type = tables.types.get(resource.text("type"))
+    for kind in [] if component_type is None else dict.fromkeys(component_type.words("uses")):
+        if kind not in used_kinds and is_legal(kind):
+            there = told_names([other.text("name") for other in tables.resources_of(kind)])
+            report.fault(
+                resource.place,
+                f"{resource.text('type')} {resource.text('name')} is on no {kind}",
+                f'Add <uses type="{kind}" name="…"/>; there is: {there}' if there else f"Add a resource of type {kind}",
+            )
+
+
+def _check_driver(resource: Element, tables: Tables, report: Report) -> None:
+    if resource.text("driver") != SIMULATED:
+        return
+    if tables.world is None:
+        report.fault(
+            resource.place_of("driver"),
+            f"{resource.text('name')} is simulated, but there is no world that plays it",
+            "Add a <world>, or name the driver of real hardware",
+        )
+        return
+    for given in resource.all("parameter"):
+        name = tables.world.text("name")
+        if given.text("name") == WORLD and given.text("value") != name and is_legal(name):
+            report.fault(
+                given.place_of("value"),
+                f"no world is named {told(given.text('value'))}{report.hint(given.text('value'), [name])}",
+                f"Write {name}, or leave the parameter out",
+            )
+
+
+def _check_network_id(resource: Element, ids: dict[int, Element], report: Report) -> None:
+    for given in resource.all("parameter"):
+        if given.text("name") != NETWORK_ID:
+            continue
+        value = parameters(resource)[NETWORK_ID]
+        if isinstance(value, bool) or not isinstance(value, int) or not FIRST_NETWORK_ID <= value <= LAST_NETWORK_ID:
+            report.fault(
+                given.place_of("value"),
+                f"network id {told(given.text('value'))} of {resource.text('name')} is illegal",
+                f"Write a whole number from {FIRST_NETWORK_ID} to {LAST_NETWORK_ID}",
+            )
+            return
+        before = ids.setdefault(value, resource)
+        if before is not resource:
+            report.fault(
+                given.place_of("value"),
+                f"network id {value} of {resource.text('name')} is {before.text('name')}'s too",
+                "Give each robot its own",
+            )
+        return
+
+
+# ---------------------------------------------------------------------- names
+def _check_component_names(tables: Tables, report: Report) -> None:
+    """Report names that two components would have: RCs, world, behaviors, their ARCs, core services."""
+    reserved = {LAUNCHER, *CORE_SERVICES, *(creator_name(host) for host in tables.hosts)}
+    first: dict[str, tuple[str, Place]] = {}
+    for name, what, place in sorted(_components(tables), key=lambda component: component[2]):
+        if not is_legal(name):
+            if len(name) > MAX_NAME_LENGTH and what.startswith("ARC"):
+                report.fault(place, f"the name of {what}, {name}, is too long", "Shorten the behavior's name")
+            continue
+        if name in reserved:
+            report.fault(place, f"{what} has the name {told(name)} of a core service", "Choose another name")
+            continue
+        before, line = first.setdefault(name, (what, place))
+        if line != place:
+            report.fault(
+                place,
+                f"{what} has the name {told(name)} of {before} in line {line.line}",
+                "Give each component of the mission its own name",
+            )
+
+
+def _components(tables: Tables) -> Iterator[tuple[str, str, Place]]:
+    for resource in section(tables.root, "resources"):
+        yield resource.text("name"), f"resource {resource.text('name')}", resource.place_of("name")
+    if tables.world is not None:
+        yield tables.world.text("name"), "the world", tables.world.place_of("name")
+    for behavior in tables.behaviors:
+        yield behavior.text("name"), f"behavior {behavior.text('name')}", behavior.place_of("name")
+    for behavior, arc in tables.claims():
+        if arc.text("kind") in tables.types and is_legal(behavior.text("name")):
+            name = f"{behavior.text('name')}-{arc.text('kind')}"
+            yield name, f"ARC of behavior {behavior.text('name')}", arc.place_of("kind")

@@ -1,0 +1,45 @@
+"""Whether a class path leads to a class, found without running any of its code."""
+
+from __future__ import annotations
+
+import re
+from importlib.machinery import ModuleSpec, PathFinder
+from importlib.util import find_spec
+from pathlib import Path
+
+
+def class_path_fault(class_path: str) -> tuple[str, list[str]] | None:
+    """Return what is wrong with ``package.module:Class`` on this machine, and the names there are instead.
+
+    No module is imported: the source is looked at. A module that has no source is taken to be right.
+
+    Returns:
+        None if nothing is found wrong.
+    """
+    module, _, name = class_path.partition(":")
+    top, *below = module.split(".")
+    spec, found, folders = _find_top(top), top, list[str]()
+    for part in below:
+        if spec is None:
+            break
+        found, folders = f"{found}.{part}", list(spec.submodule_search_locations or ())
+        spec = PathFinder.find_spec(found, folders)
+    if spec is None:
+        return f"no module {found}", _modules(folders)
+    if spec.origin is None or not spec.origin.endswith(".py"):
+        return None
+    source = Path(spec.origin).read_text("utf-8", errors="replace")
+    if re.search(rf"\b{name}\b", source):
+        return None
+    return f"no class {name} in {module}", re.findall(r"^class (\w+)", source, re.MULTILINE)
+
+
+def _find_top(name: str) -> ModuleSpec | None:
+    try:
+        return find_spec(name)
+    except ValueError:  # a module that runs as a program has no spec
+        return None
+
+
+def _modules(folders: list[str]) -> list[str]:
+    return sorted(file.stem for folder in folders for file in Path(folder).glob("*.py") if file.stem != "__init__")

@@ -1,0 +1,216 @@
+"""A mission file as elements that know where they stand.
+
+One parser reads the file (expat, which tells line and column); what is validated afterwards is made
+from its elements, so no second parser can see something else in the same bytes.
+
+Rules of this file:
+
+* A document type declaration is refused where it begins: without one there are no entities that
+  could grow or fetch anything.
+* Size is judged before reading, depth while reading; neither time nor memory follow a hostile file.
+"""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from backbone.mission.report import Place, Report, told
+
+MAX_BYTES = 1024 * 1024  # chosen: a robot with its behavior is 600 bytes, so this is more than a thousand robots
+MAX_ELEMENTS = 50_000  # chosen: same; a robot with its behavior is 10 elements
+MAX_DEPTH = 32  # chosen: the behavior tree of RAM 2002 is 3 deep
+BEGINNING = Place(1, 1)
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_ATTRIBUTE = re.compile(rb"""\s([^\s=<>"'/]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+_DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+
+
+@dataclass(slots=True)
+class Attribute:
+    """A value and where its name stands."""
+
+    value: str
+    place: Place
+
+
+@dataclass(slots=True)
+class Element:
+    """An element and where its tag begins.
+
+    The reading methods never fail: a value that is missing or illegal is the schema's to report, and
+    reads as empty here.
+    """
+
+    tag: str
+    place: Place
+    attributes: dict[str, Attribute] = field(default_factory=dict)
+    children: list[Element] = field(default_factory=list)
+
+    def __iter__(self) -> Iterator[Element]:
+        """Yield this element and all below it, in the order of the file."""
+        yield self
+        for child in self.children:
+            yield from child
+
+    def all(self, tag: str) -> list[Element]:
+        """Return the children of this tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Element | None:
+        """Return the first child of this tag, if there is one."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def place_of(self, attribute: str) -> Place:
+        """Return where the attribute stands; the element's own place if it has none."""
+        found = self.attributes.get(attribute)
+        return self.place if found is None else found.place
+
+    def text(self, attribute: str) -> str:
+        """Return the value as it stands, empty if there is none."""
+        found = self.attributes.get(attribute)
+        return "" if found is None else found.value
+
+    def words(self, attribute: str) -> list[str]:
+        """Return the names in the value."""
+        return self.text(attribute).split()
+
+    def number(self, attribute: str) -> float | None:
+        """Return the value as a number; None if it is none."""
+        value = self.text(attribute).strip()
+        return float(value) if _DECIMAL.fullmatch(value) else None
+
+    def flag(self, attribute: str) -> bool:
+        """Say whether the value is true."""
+        return self.text(attribute).strip() in ("true", "1")
+
+
+def read_bytes(path: Path, report: Report) -> bytes | None:
+    """Return what the file holds; None, with a fault, if it cannot be a mission file."""
+    try:
+        if path.exists() and not path.is_file():
+            report.fault(BEGINNING, "is no file", "Name a mission file.")
+            return None
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError) as error:
+        reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        report.fault(BEGINNING, f"cannot be read: {reason}", "Name a mission file that this user may read.")
+        return None
+    if len(data) > MAX_BYTES:
+        report.fault(BEGINNING, f"is larger than {MAX_BYTES} bytes", "Split the mission; no honest one is so large.")
+        return None
+    return data
+
+
+def parse(data: bytes, report: Report) -> Element | None:
+    """Return the root element; None, with a fault, if the bytes are no well-formed, harmless XML."""
+    data = data.removeprefix(_BYTE_ORDER_MARK)
+    try:
+        data.decode()
+    except UnicodeDecodeError as error:
+        place = _Lines(data).place(error.start)
+        report.fault(place, f"byte 0x{data[error.start]:02x} is no UTF-8", "Save the file in UTF-8.")
+        return None
+    return _Parse(data, report).root()
+
+
+class _Refused(Exception):
+    """Raised inside expat's handlers to end the parse; its fault is in the report."""
+
+
+class _Lines:
+    """Tells line and column of a position in UTF-8 bytes."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._starts = [0, *(match.end() for match in re.finditer(b"\n", data))]
+
+    def place(self, offset: int) -> Place:
+        line = bisect.bisect_right(self._starts, offset)
+        before = self._data[self._starts[line - 1] : offset]
+        return Place(line, len(before.decode(errors="replace")) + 1)
+
+
+class _Parse:
+    """One run of expat over one file."""
+
+    def __init__(self, data: bytes, report: Report) -> None:
+        self._data, self._report, self._lines = data, report, _Lines(data)
+        self._open: list[Element] = []
+        self._root: Element | None = None
+        self._count = 0
+        self._in_text = False
+        self._parser = expat.ParserCreate("utf-8")
+        self._parser.XmlDeclHandler = self._declaration
+        self._parser.StartDoctypeDeclHandler = self._doctype
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._text
+
+    def root(self) -> Element | None:
+        try:
+            self._parser.Parse(self._data, True)
+        except _Refused:
+            return None
+        except expat.ExpatError as error:
+            where = Place(error.lineno, error.offset + 1)
+            still_open = f"; <{self._open[-1].tag}> of line {self._open[-1].place.line} is open" if self._open else ""
+            reason = expat.ErrorString(error.code)
+            self._report.fault(where, f"no well-formed XML: {reason}{still_open}", "Mend the XML here, or just before.")
+            return None
+        return self._root
+
+    def _here(self) -> Place:
+        return self._lines.place(self._parser.CurrentByteIndex)
+
+    def _declaration(self, _version: str, encoding: str | None, _standalone: int) -> None:
+        if encoding is not None and encoding.lower() not in ("utf-8", "us-ascii"):
+            self._report.fault(self._here(), f"is written in {encoding}", "Save the file in UTF-8 and say so here.")
+            raise _Refused
+
+    def _doctype(self, *_declared: object) -> None:
+        self._report.fault(
+            self._here(), "a document type declaration", "Remove <!DOCTYPE …>; mission files have no entities."
+        )
+        raise _Refused
+
+    def _start(self, tag: str, values: dict[str, str]) -> None:
+        offset = self._parser.CurrentByteIndex
+        element = Element(tag, self._lines.place(offset))
+        self._count += 1
+        if len(self._open) == MAX_DEPTH:
+            self._report.fault(element.place, f"elements are nested deeper than {MAX_DEPTH}", "Flatten the tree.")
+            raise _Refused
+        if self._count > MAX_ELEMENTS:
+            self._report.fault(element.place, f"more than {MAX_ELEMENTS} elements", "Split the mission.")
+            raise _Refused
+        found = itertools.islice(_ATTRIBUTE.finditer(self._data, offset), len(values))
+        places = {match.group(1).decode(): self._lines.place(match.start(1)) for match in found}
+        element.attributes = {name: Attribute(value, places[name]) for name, value in values.items()}
+        if self._open:
+            self._open[-1].children.append(element)
+        else:
+            self._root = element
+        self._open.append(element)
+        self._in_text = False
+
+    def _end(self, _tag: str) -> None:
+        self._open.pop()
+        self._in_text = False
+
+    def _text(self, text: str) -> None:
+        if self._in_text or not text.strip():  # expat hands text over in pieces
+            return
+        self._in_text = True
+        blanks = len(text) - len(text.lstrip())
+        place = Place(self._here().line, self._here().column + blanks)
+        self._report.fault(
+            place, f"text {told(text.strip())} between elements", "Remove it, or make it a <!-- comment -->."
+        )

@@ -1,0 +1,183 @@
+"""From a mission file to a checked mission description, or to everything that is wrong with it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from backbone.component_database.messages import ComponentType, Multiplicity
+from backbone.dependency_database.messages import Resource
+from backbone.mission.checks import check
+from backbone.mission.document import Element, parse, read_bytes
+from backbone.mission.model import ArcWish, Behavior, Component, CoreService, Host, MissionDescription
+from backbone.mission.report import Fault, MissionInvalid, Report
+from backbone.mission.schema import apply_schema, schema_text
+from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, Tables, parameters, section
+from backbone.naming import Subsystem
+
+__all__ = ["Fault", "MissionInvalid", "read_mission", "schema_text"]
+
+
+def read_mission(path: str | Path) -> MissionDescription:
+    """Return the mission the file describes. Nothing is started, nothing of what it names is imported.
+
+    Args:
+        path: The mission file; faults name it as it is given here.
+
+    Raises:
+        MissionInvalid: With every fault of the file, in its order.
+    """
+    report = Report(str(path))
+    data = read_bytes(Path(path), report)
+    root = None if data is None else parse(data, report)
+    if root is not None and apply_schema(root, report):
+        check(root, report)
+    faults = report.faults()
+    if faults or root is None:
+        raise MissionInvalid(faults)
+    return _describe(root, str(path))
+
+
+def _describe(root: Element, source: str) -> MissionDescription:
+    """Return the description of a tree without faults."""
+    tables = Tables.of(root)
+    return MissionDescription(
+        name=root.text("name"),
+        priority=int(root.text("priority")),
+        hosts=tuple(
+            Host(name=host.text("name"), address=host.text("address"), tags=tuple(host.words("tags")))
+            for host in section(root, "hosts")
+        ),
+        core=tuple(_core(root, list(tables.hosts))),
+        types=tuple(_component_type(component_type) for component_type in section(root, "types")),
+        resources=tuple(_resource(resource, tables) for resource in section(root, "resources")),
+        components=() if tables.world is None else (_world(tables.world, tables),),
+        behaviors=tuple(_behavior(behavior) for behavior in section(root, "behaviors")),
+        source=source,
+    )
+
+
+def _core(root: Element, hosts: list[str]) -> list[CoreService]:
+    services = [CoreService(type=service.text("type"), host=service.text("host")) for service in section(root, "core")]
+    return sorted(services, key=lambda service: (CORE_SERVICES.index(service.type), hosts.index(service.host)))
+
+
+def _component_type(component_type: Element) -> ComponentType:
+    return ComponentType(
+        name=component_type.text("name"),
+        class_path=component_type.text("class"),
+        subsystem=Subsystem(component_type.text("subsystem")),
+        multiplicity=Multiplicity(component_type.text("multiplicity")),
+        core=component_type.flag("core"),
+        tags=component_type.words("tags"),
+        restart=component_type.flag("restart"),
+        needs=[needed.text("type") for needed in component_type.all("needs")],
+    )
+
+
+def _resource(resource: Element, tables: Tables) -> Resource:
+    links: dict[str, list[str]] = {}
+    for used in resource.all("uses"):
+        links.setdefault(used.text("type"), []).append(used.text("name"))
+    world = tables.world if resource.text("driver") == SIMULATED else None
+    return Resource(
+        name=resource.text("name"),
+        type=resource.text("type"),
+        host=resource.text("host"),
+        sharable=resource.flag("sharable"),
+        capacity=_number(resource, "capacity"),
+        connect_s=_number(resource, "connect-s"),
+        disconnect_s=_number(resource, "disconnect-s"),
+        driver=resource.text("driver"),
+        parameters={**({} if world is None else {WORLD: world.text("name")}), **parameters(resource)},
+        features=resource.words("features"),
+        links=links,
+    )
+
+
+def _world(world: Element, tables: Tables) -> Component:
+    return Component(
+        type=world.text("type"),
+        name=world.text("name"),
+        host=world.text("host"),
+        parameters={**parameters(world), WORLD: _world_content(world, tables)},
+    )
+
+
+def _world_content(world: Element, tables: Tables) -> dict[str, Any]:
+    """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
+    room = world.first("room")
+    if room is None:
+        raise AssertionError("a world without a room passed the schema")
+    ids = {name: parameters(resource).get(NETWORK_ID) for name, resource in tables.resources.items()}
+    return {
+        "width_m": _number(room, "width-m"),
+        "depth_m": _number(room, "depth-m"),
+        "seed": int(world.text("seed")),
+        "furniture": [
+            {
+                "name": box.text("name"),
+                "x_m": _number(box, "x-m"),
+                "y_m": _number(box, "y-m"),
+                "width_m": _number(box, "width-m"),
+                "depth_m": _number(box, "depth-m"),
+                "height_m": _number(box, "height-m"),
+            }
+            for box in world.all("furniture")
+        ],
+        "scouts": [
+            {
+                "name": scout.text("name"),
+                "network_id": ids[scout.text("name")],
+                "x_m": _number(scout, "x-m"),
+                "y_m": _number(scout, "y-m"),
+                "heading_rad": math.radians(_number(scout, "heading-deg")),
+            }
+            for scout in world.all("scout")
+        ],
+        "targets": [
+            {
+                "name": target.text("name"),
+                "shape": target.text("shape"),
+                "path": [[_number(point, "x-m"), _number(point, "y-m")] for point in target.all("point")],
+                "speed_m_s": _number(target, "speed-m-s"),
+                "begin_s": _number(target, "begin-s"),
+                "rest_s": _number(target, "rest-s"),
+                "there_and_back": target.flag("there-and-back"),
+            }
+            for target in world.all("target")
+        ],
+    }
+
+
+def _behavior(behavior: Element) -> Behavior:
+    arc = behavior.first("arc")
+    return Behavior(
+        type=behavior.text("type"),
+        name=behavior.text("name"),
+        priority=int(behavior.text("priority")),
+        parameters=parameters(behavior),
+        arc=None if arc is None else _arc(arc),
+        children=tuple(_behavior(child) for child in behavior.all("behavior")),
+    )
+
+
+def _arc(arc: Element) -> ArcWish:
+    wishes = arc.all("wish")
+    return ArcWish(
+        kind=arc.text("kind"),
+        wish={wish.text("type"): wish.text("name") for wish in wishes if wish.text("name")},
+        features={wish.text("type"): tuple(wish.words("features")) for wish in wishes if wish.words("features")},
+        minimum_runtime_s=_number(arc, "minimum-runtime-s"),
+        maximum_runtime_s=_number(arc, "maximum-runtime-s"),
+        period_s=_number(arc, "period-s"),
+        packet_time_s=_number(arc, "packet-time-s"),
+    )
+
+
+def _number(element: Element, attribute: str) -> float:
+    value = element.number(attribute)
+    if value is None:
+        raise AssertionError(f"<{element.tag}> without a number in {attribute} passed the schema")
+    return value

@@ -1,0 +1,106 @@
+"""Faults of a mission file: collected, never raised one by one, told in the order of the file."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from backbone.errors import BackboneError
+from backbone.naming import MAX_NAME_LENGTH
+
+HINTS_AT_MOST = 50  # chosen: nobody reads more at once, and looking for one costs milliseconds
+NAMES_TOLD_AT_MOST = 8  # chosen: fits a line
+VALUE_LENGTH_TOLD = 60  # chosen: same
+
+
+class Place(NamedTuple):
+    """Where something stands in a file; both count from 1, columns in characters."""
+
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong.
+
+    Attributes:
+        file: The file, as it was named to the reader.
+        line: From 1.
+        column: From 1, in characters.
+        message: What is wrong.
+        remedy: What to do about it.
+    """
+
+    file: str
+    line: int
+    column: int
+    message: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}: {self.message} ({self.remedy})"
+
+
+class MissionInvalid(BackboneError):
+    """A mission file cannot be used; its text is every fault, one a line.
+
+    Attributes:
+        faults: All of them, in the order of the file.
+    """
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("\n".join(map(str, self.faults)))
+
+
+class Report:
+    """Collects the faults of one file.
+
+    Args:
+        file: The file, as it was named to the reader.
+    """
+
+    def __init__(self, file: str) -> None:
+        self._file = file
+        self._faults: list[Fault] = []
+        self._hints_left = HINTS_AT_MOST
+
+    def fault(self, place: Place, message: str, remedy: str) -> None:
+        """Add a fault."""
+        self._faults.append(Fault(self._file, place.line, place.column, message, remedy.rstrip(".")))
+
+    def nearest(self, name: str, known: Collection[str]) -> str:
+        """Return the known name nearest to a wrong one; empty if none is near, or once enough were looked for."""
+        if self._hints_left == 0 or not known:
+            return ""
+        self._hints_left -= 1
+        return next(iter(difflib.get_close_matches(name[:MAX_NAME_LENGTH], known, n=1)), "")
+
+    def hint(self, name: str, known: Collection[str]) -> str:
+        """Return a remark on the nearest known name, to be put behind a wrong one."""
+        near = self.nearest(name, known)
+        return f" (did you mean {near!r}?)" if near else ""
+
+    def faults(self) -> list[Fault]:
+        """Return each fault once, in the order of the file."""
+        return sorted(dict.fromkeys(self._faults), key=lambda fault: (fault.line, fault.column))
+
+
+def told(value: str) -> str:
+    """Return the value quoted, shortened if it is long."""
+    return repr(value if len(value) <= VALUE_LENGTH_TOLD else f"{value[:VALUE_LENGTH_TOLD]}…")
+
+
+def told_names(names: Collection[str]) -> str:
+    """Return names as a list for people, shortened if there are many.
+
+    Example:
+        >>> told_names(["radio", "grabber"])
+        'radio, grabber'
+    """
+    first = list(names)[:NAMES_TOLD_AT_MOST]
+    rest = len(names) - len(first)
+    return ", ".join(first) + (f" and {rest} more" if rest else "")

@@ -1,0 +1,173 @@
+"""The named elements of a mission file, so that checks and reader can find what a name means."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+import msgspec
+
+from backbone.mission.document import Element
+from backbone.mission.report import Report, told, told_names
+from backbone.naming import Subsystem, is_legal
+
+CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "dependency_database", "rc_manager")
+"""In their order of start. Source: RAM 2002, "Backbone"."""
+
+SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
+WORLD = "world"  # the parameter that tells it, and the world's own
+NETWORK_ID = "network_id"  # the parameter by which the radio tells robots apart
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Elements by name; of several with one name, the first.
+
+    Attributes:
+        root: The mission.
+        hosts: Machines.
+        types: Component types.
+        resources: Hardware.
+        world: The simulated world, if there is one.
+        behaviors: Every node of the behavior tree, parents before their children.
+    """
+
+    root: Element
+    hosts: dict[str, Element]
+    types: dict[str, Element]
+    resources: dict[str, Element]
+    world: Element | None
+    behaviors: list[Element]
+
+    @classmethod
+    def of(cls, root: Element) -> Tables:
+        """Return the tables of a mission."""
+        behaviors = root.first("behaviors")
+        return cls(
+            root,
+            _by_name(section(root, "hosts")),
+            _by_name(section(root, "types")),
+            _by_name(section(root, "resources")),
+            root.first("world"),
+            [] if behaviors is None else [element for element in behaviors if element.tag == "behavior"],
+        )
+
+    def needs(self, kind: str) -> list[str]:
+        """Return the kinds of resource an ARC of this kind needs; none if it is no ARC."""
+        found = self.types.get(kind)
+        return [] if found is None else [needed.text("type") for needed in found.all("needs")]
+
+    def is_resource_type(self, name: str) -> bool:
+        """Say whether this type runs a piece of hardware, so is no service, ARC, behavior or world."""
+        found = self.types.get(name)
+        return (
+            found is not None
+            and found.text("subsystem") == Subsystem.RESOURCE_POOL
+            and not found.all("needs")
+            and (self.world is None or name != self.world.text("type"))
+        )
+
+    def resource_types(self) -> list[str]:
+        """Return the names of all types that run hardware."""
+        return [name for name in self.types if self.is_resource_type(name)]
+
+    def resources_of(self, kind: str) -> list[Element]:
+        """Return the resources of a type, in the order of the file."""
+        return [resource for resource in self.resources.values() if resource.text("type") == kind]
+
+    def claims(self) -> list[tuple[Element, Element]]:
+        """Return every behavior that claims an ARC, with the ARC."""
+        return [(behavior, arc) for behavior in self.behaviors if (arc := behavior.first("arc")) is not None]
+
+
+def section(root: Element, tag: str) -> list[Element]:
+    """Return what stands in a section of the mission; nothing if it is left out."""
+    found = root.first(tag)
+    return [] if found is None else found.children
+
+
+def parameter_value(text: str) -> bool | int | float | str:
+    """Return the value of a parameter: a JSON number, true or false if it reads as one, otherwise the text.
+
+    Example:
+        >>> parameter_value("15"), parameter_value("0.5"), parameter_value("true"), parameter_value("/dev/video0")
+        (15, 0.5, True, '/dev/video0')
+    """
+    try:
+        value = msgspec.json.decode(text.encode())
+    except msgspec.DecodeError:
+        return text
+    return value if isinstance(value, bool | int | float) else text
+
+
+def parameters(element: Element) -> dict[str, bool | int | float | str]:
+    """Return the parameters written in an element."""
+    return {given.text("name"): parameter_value(given.text("value")) for given in element.all("parameter")}
+
+
+def host_tags_lacking(host: Element, component_type: Element) -> list[str]:
+    """Return the tags a type asks for and a host does not have."""
+    return [tag for tag in component_type.words("tags") if tag not in host.words("tags")]
+
+
+# ---------------------------------------------------------------------- what all checks say alike
+def is_known(element: Element, attribute: str, what: str, known: Collection[str], report: Report) -> bool:
+    """Say whether the attribute names something that exists; if it is a legal name that does not, report it."""
+    name = element.text(attribute)
+    if name in known:
+        return True
+    if is_legal(name):
+        there = f"There is: {told_names(known)}" if known else f"Declare a {what} of this name"
+        report.fault(element.place_of(attribute), f"no {what} is named {told(name)}{report.hint(name, known)}", there)
+    return False
+
+
+def check_unique(elements: Iterable[Element], attribute: str, what: str, report: Report) -> None:
+    """Report every element that repeats another's value."""
+    first: dict[str, Element] = {}
+    for element in elements:
+        name = element.text(attribute)
+        before = first.setdefault(name, element)
+        if name and before is not element:
+            report.fault(
+                element.place_of(attribute),
+                f"a second {what} {told(name)}; the first is in line {before.place.line}",
+                "Give each its own name, or remove one",
+            )
+
+
+def check_parameters(element: Element, reserved: Collection[str], report: Report) -> None:
+    """Report parameters given twice, and those that are set by something else."""
+    given = element.all("parameter")
+    check_unique(given, "name", "parameter", report)
+    for parameter in given:
+        if parameter.text("name") in reserved:
+            report.fault(
+                parameter.place_of("name"),
+                f"parameter {told(parameter.text('name'))} of a <{element.tag}> is set by the rest of the file",
+                f"Give the parameter another name; taken are: {told_names(sorted(reserved))}",
+            )
+
+
+def check_host(element: Element, tables: Tables, report: Report) -> None:
+    """Report a host that does not exist, or that cannot run the element's type."""
+    if not element.text("host") or not is_known(element, "host", "host", tables.hosts, report):
+        return
+    component_type = tables.types.get(element.text("type"))
+    if component_type is None:
+        return
+    lacking = host_tags_lacking(tables.hosts[element.text("host")], component_type)
+    if lacking:
+        report.fault(
+            element.place_of("host"),
+            f"host {element.text('host')} lacks {told_names(lacking)}, which type {element.text('type')} asks for",
+            "Name a host with these tags, or add them to the host",
+        )
+
+
+def _by_name(elements: list[Element]) -> dict[str, Element]:
+    found: dict[str, Element] = {}
+    for element in elements:
+        if is_legal(element.text("name")):
+            found.setdefault(element.text("name"), element)
+    return found
