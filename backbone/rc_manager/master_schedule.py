@@ -194,6 +194,10 @@ class Slot(NamedTuple):
         """End of its minimum run time."""
         return self.start_s + self.arc.length_s
 
+    def starts(self, now_s: float) -> bool:
+        """Say whether its time has come."""
+        return self.start_s <= now_s + INSTANT_S
+
 
 class Turn(NamedTuple):
     """An ARC whose time has come, and the holders that must go first (none: it connects)."""
@@ -352,13 +356,16 @@ class MasterSchedule:
         return None
 
     def _due_in(self, group: Sequence[ArcEntry], now_s: float) -> Turn | None:
+        slots = self.plan(group, now_s)
+        if not any(slot.starts(now_s) for slot in slots):
+            return None
+        certain = {slot.arc for slot in self._certain_plan(group, now_s) if slot.starts(now_s)}
         pending: list[ArcEntry] = []
-        certain = self._starting_for_certain(group, now_s)
-        for slot in self.plan(group, now_s):
+        for slot in slots:
             arc = slot.arc
             if arc.state is not RequestState.WAITING or self._must_let_higher_go_first(arc, group):
                 continue
-            if slot.start_s <= now_s + INSTANT_S:
+            if slot.starts(now_s):
                 in_the_way = self._in_the_way(arc, pending, group, now_s)
                 if in_the_way and arc in certain:
                     return Turn(arc, in_the_way)
@@ -368,13 +375,13 @@ class MasterSchedule:
                 pending.append(arc)
         return None
 
-    def _starting_for_certain(self, group: Sequence[ArcEntry], now_s: float) -> set[ArcEntry]:
-        """Return those whose start is now even if all hand-overs end earlier than predicted and no overlap is forgiven.
+    def _certain_plan(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+        """Return the plan for the case that all hand-overs end at once, in which no overlap is forgiven.
 
-        Only for them is anybody displaced: else a slice might be ended for a gap that closes meanwhile.
+        Only who starts now by this plan, too, displaces anybody: else a slice might be ended for a gap
+        that closes meanwhile.
         """
-        slots = self.plan(group, now_s, handed_over=True, slack_s=0.0)
-        return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
+        return self.plan(group, now_s, handed_over=True, slack_s=0.0)
 
     def _in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
@@ -440,10 +447,6 @@ class MasterSchedule:
 def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
     """Return the holds that overlap this span."""
     return [hold for hold in holds if hold.start_s < end_s - INSTANT_S and hold.end_s > start_s + INSTANT_S]
-
-
-def _in_hand_over(group: Iterable[ArcEntry]) -> bool:
-    return any(arc.state is RequestState.REVOKING for arc in group)
 
 
 def _share_rc(a: ArcEntry, b: ArcEntry) -> bool:
