@@ -185,6 +185,7 @@ class Placer(Component[NoParameters]):
             except Refusal:
                 if record.phase is Phase.STARTING:
                     self._book.forget(name)
+                    self._tell_news()
                 raise
 
     async def _admit(self, type_name: str, name: str) -> ComponentType:
@@ -312,11 +313,19 @@ class Placer(Component[NoParameters]):
         except CreatorSilent:
             record.unwanted = False
             raise
-        if self._book.find(name) is record and record.phase is not Phase.STARTING:
+        if record.phase is Phase.STARTING:
+            await self._start_left_off(record)
+        elif self._book.find(name) is record:
             self._book.forget(name)
         self._stops += 1
         self.story.note(name, f"is stopped, by {by}")
         return Ended(name, by)
+
+    async def _start_left_off(self, record: Record) -> None:
+        """Return when whoever was starting the component has seen that it is unwanted, and it is out of the book."""
+        until_s = self.clock.now_s() + (record.spawn.ready_within_s + SPAWN_MARGIN_S) * self.clock.rate
+        while self._book.find(record.spawn.name) is record and self.clock.now_s() < until_s:
+            await self._news_or(until_s)
 
     async def _end_on(self, host: str, name: str, reason: str) -> EndedBy:
         """End what runs there under this name.
@@ -510,6 +519,7 @@ class Placer(Component[NoParameters]):
                 return
             except StoppedMeanwhile:
                 self._book.forget(name)
+                self._tell_news()
                 return
             except Refusal as refusal:
                 self.story.note(name, f"could not be started again: {refusal.detail}")

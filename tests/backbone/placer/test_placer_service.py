@@ -172,6 +172,16 @@ class Mission:
         await self._lives[name][0].bus.close()
         await self.kill(name)
 
+    def cut_off(self, host: str) -> None:
+        """Let the creator's token fall, as a cut link does; the creator and what it runs live on."""
+        for token in list(self.network.tokens[f"backbone/creator-{host}"]):
+            token.close()
+
+    def reconnect(self, host: str) -> None:
+        """Let the token rise again."""
+        creator = self.creators[host]
+        creator.bus.declare_alive(creator.address)
+
     async def kill_all(self) -> None:
         for name in ["placer", *[f"creator-{host}" for host in self.creators], "component_database", "nameserver"]:
             if name in self._lives:
@@ -302,10 +312,41 @@ async def test_a_component_stopped_while_it_starts_does_not_stay(one: Mission) -
     starting = asyncio.create_task(one.start("watcher", "w"))
     await one.clock.sleep_s(1.0)
     await one.stop("w")
-    with pytest.raises(StoppedMeanwhile):
-        await starting
     assert one.creators["a"].lives == {}
     assert await one.placements() == {}
+    with pytest.raises(StoppedMeanwhile):
+        await starting
+
+
+@on("a")
+async def test_a_component_stopped_while_it_waits_for_a_host_is_not_placed_again(one: Mission) -> None:
+    await one.start("watcher", "w")
+    await one.crash("creator-a")
+    await one.clock.sleep_s(1.0)
+    assert await one.stop("w") == Ended("w", EndedBy.ITSELF)
+    creator = await one.begin_creator("a")
+    await one.clock.sleep_s(10.0)
+    assert creator.spawns == []
+    assert await one.placements() == {}
+
+
+@on("a", "b")
+async def test_a_host_that_was_only_cut_off_keeps_what_waited_for_it_and_loses_what_moved(one: Mission) -> None:
+    await one.start("scout", "scout1", host="a")
+    await one.start("watcher", "w", host="")
+    assert await one.placements() == {"scout1": "a", "w": "b"}
+    await one.start("watcher", "w2", host="")
+    creator, order = one.creators["a"], one.creators["a"].lives["w2"][0]
+    one.cut_off("a")
+    await creator.kill_child("w2")
+    await one.clock.sleep_s(10.0)
+    assert await one.placements() == {"scout1": "", "w": "b", "w2": "b"}
+    creator.given_up["w2"] = order
+    one.reconnect("a")
+    await one.clock.sleep_s(2.0)
+    assert await one.placements() == {"scout1": "a", "w": "b", "w2": "b"}
+    assert creator.given_up == {}
+    assert creator.spawns == ["scout1", "w2"]
 
 
 @on("a")
