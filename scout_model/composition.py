@@ -63,7 +63,8 @@ def check(description: WorldDescription) -> None:
     width_m, depth_m = description.width_m, description.depth_m
     if not (0 < width_m < math.inf and 0 < depth_m < math.inf):
         raise InvalidWorld(f"a room of {width_m} by {depth_m} m")
-    names = Counter(part.name for part in (*description.furniture, *description.scouts, *description.targets))
+    parts: list[Furniture | ScoutPlace | Target] = [*description.furniture, *description.scouts, *description.targets]
+    names = Counter(part.name for part in parts)
     for name, uses in names.items():
         if uses > 1 or not name or "/" in name:
             raise InvalidWorld(f"name {name!r} is empty, has a '/', or is used {uses} times")

@@ -14,9 +14,7 @@ BODY_DIAMETER_M = 0.040  # RAM 2002, same place: 4 cm wide; IROS 2001, section 2
 BODY_MASS_KG = 0.200  # RAM 2002, same place: approximately 200 g
 WHEEL_RADIUS_M = BODY_DIAMETER_M / 2  # chosen: the wheels are the widest part, so they carry the body's diameter
 WHEEL_THICKNESS_M = 0.012  # chosen: leaves 86 mm of the length for the shell between the wheels
-TRACK_M = (
-    BODY_LENGTH_M - WHEEL_THICKNESS_M
-)  # distance between the wheels' middles, where their ellipsoids touch the floor
+TRACK_M = BODY_LENGTH_M - WHEEL_THICKNESS_M  # between the wheels' middles, where they touch the floor
 
 # Drive
 WHEEL_SPEED_LIMIT_RAD_S = 17.5  # chosen: 0.35 m/s, a brisk pace for 4 cm wheels; the papers give no speed

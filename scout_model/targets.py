@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from scout_model.description import Target
 
@@ -27,7 +28,7 @@ class TargetPose:
 
 def path_length_m(path: list[tuple[float, float]]) -> float:
     """Return the length of the path through these points, metres."""
-    return sum(math.dist(a, b) for a, b in zip(path, path[1:], strict=False))
+    return sum(math.dist(a, b) for a, b in pairwise(path))
 
 
 def where(target: Target, time_s: float) -> TargetPose:
@@ -53,7 +54,7 @@ def where(target: Target, time_s: float) -> TargetPose:
 
 def _along(path: list[tuple[float, float]], walked_m: float) -> TargetPose:
     left_m = walked_m
-    segments = [(a, b) for a, b in zip(path, path[1:], strict=False) if a != b]
+    segments = [(a, b) for a, b in pairwise(path) if a != b]
     for number, (a, b) in enumerate(segments):
         segment_m = math.dist(a, b)
         if left_m <= segment_m or number == len(segments) - 1:

@@ -1,0 +1,100 @@
+"""Find out whether this machine can render, without importing mujoco here.
+
+Importing mujoco with a MUJOCO_GL that does not work raises errors of many kinds or ends the process,
+so each candidate is tried in a child.  Afterwards ``prepare`` sets this process up, before the first
+import of mujoco in it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from typing import Literal
+
+from scout_model.errors import RenderingUnavailable
+
+Backend = Literal["egl", "osmesa", "none"]
+
+MISSING_PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"  # measured on bare Debian 12: these three render, fewer do not
+TRIAL_TIME_S = 20.0  # chosen: a trial takes half a second; a hanging driver must not hang a mission
+
+_CANDIDATES: tuple[Backend, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa has dropped it
+_MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "disable"}
+
+
+@dataclass(frozen=True, slots=True)
+class GlSupport:
+    """What can draw here.
+
+    Attributes:
+        backend: Which OpenGL works; ``none``: none does.
+        renderer: Its own name, such as ``llvmpipe (LLVM 15.0.6, 256 bits)``; empty without OpenGL.
+        missing_packages: Debian packages that give the rendered picture; empty with OpenGL.
+    """
+
+    backend: Backend
+    renderer: str
+    missing_packages: str
+
+    @property
+    def camera_backend(self) -> Literal["gl", "paint"]:
+        """The best backend for ``scout_model.camera.Camera`` here."""
+        return "paint" if self.backend == "none" else "gl"
+
+    @property
+    def summary(self) -> str:
+        """One line for people."""
+        if self.backend == "none":
+            return f"camera pictures are drawn, not rendered; for rendered ones install: {self.missing_packages}"
+        return f"camera pictures are rendered by {self.renderer} over {self.backend}"
+
+
+def probe(trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
+    """Return what can draw on this machine. Blocks for about a second, at worst for two trials' time."""
+    for backend in _CANDIDATES:
+        renderer = _try(backend, trial_time_s)
+        if renderer:
+            return GlSupport(backend, renderer, "")
+    return GlSupport("none", "", MISSING_PACKAGES)
+
+
+def prepare(backend: Backend) -> None:
+    """Set this process up to draw with this backend; call it before the first import of mujoco.
+
+    Raises:
+        RenderingUnavailable: Mujoco is already imported here, set up for something else.
+    """
+    wanted = _MUJOCO_GL[backend]
+    if "mujoco" in sys.modules and backend != "none" and os.environ.get("MUJOCO_GL") != wanted:
+        raise RenderingUnavailable(f"mujoco was imported before it was prepared for {backend}")
+    os.environ.update(_environment(backend))
+
+
+def _environment(backend: Backend) -> dict[str, str]:
+    return {
+        "MUJOCO_GL": _MUJOCO_GL[backend],
+        "LP_NUM_THREADS": "0",  # the software renderer stays on one core, at the same cost
+        "OPENBLAS_NUM_THREADS": "1",  # numpy here handles vectors too small to share
+    }
+
+
+def _try(backend: Backend, trial_time_s: float) -> str:
+    """Return the renderer's name, empty if this backend does not work."""
+    environment = {**os.environ, **_environment(backend)}
+    environment.pop("PYOPENGL_PLATFORM", None)  # mujoco sets it, a child would inherit the wrong one
+    try:
+        trial = subprocess.run(
+            [sys.executable, "-m", "scout_model.gl_trial"],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            timeout=trial_time_s,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return ""
+    if trial.returncode != 0:
+        return ""
+    return trial.stdout.decode("utf-8", "replace").strip() or "unnamed renderer"

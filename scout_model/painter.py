@@ -1,0 +1,276 @@
+"""Camera pictures without OpenGL: the painter's algorithm on OpenCV polygons.
+
+Geoms become convex polygons once; each picture projects them, drops those that face away, and
+paints the rest from far to near, shaded by the model's own lights.  Order of painting:
+
+1. floor and walls (geom group 0), behind everything because the camera is inside the room,
+2. marks on them (group 1),
+3. things (group 2), body by body; a body's marks right after the body.
+
+Which of two bodies is in front is decided by an axis-aligned plane between their bounding boxes,
+not by distance: the near corner of a long table says nothing about what stands behind its far end.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from scout_model.dimensions import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
+
+_Floats = NDArray[np.float64]
+
+_SLICES = 16  # chosen: what the OpenGL renderer is told in room.xml
+_STACKS = 8  # chosen: same
+_FLOOR_REACH_M = 100.0  # chosen: an endless plane ends beyond every room
+_NEAR_M = 0.02  # chosen: as in room.xml
+_SUBPIXEL_BITS = 4  # chosen: edges move smoothly, a sixteenth of a pixel at a time
+_FARTHEST_PX = 1e6  # chosen: OpenCV's fixed-point coordinates hold it
+_ROOM, _MARKS, _THINGS = 0, 1, 2  # geom groups, see room.xml
+_LUMA = np.array([0.299, 0.587, 0.114])  # as OpenCV's RGB to gray
+
+
+@dataclass(frozen=True, slots=True)
+class _Mesh:
+    """A geom as convex polygons in its own frame: corners (n, 3), and each polygon's corners and normal."""
+
+    corners: _Floats
+    polygons: list[NDArray[np.intp]]
+    normals: _Floats
+
+
+class Painter:
+    """Pictures of one model."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        geoms = [geom for geom in range(model.ngeom) if model.geom_group[geom] <= _THINGS]
+        meshes = [_mesh(model, geom) for geom in geoms]
+        self._geoms = np.array(geoms)
+        self._groups = model.geom_group[self._geoms]
+        self._bodies = model.body_rootid[model.geom_bodyid[self._geoms]]
+        self._levels: _Floats = 255 * model.geom_rgba[self._geoms, :3] @ _LUMA
+        self._corners = np.concatenate([mesh.corners for mesh in meshes])
+        self._geom_of_corner = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
+        self._normals = np.concatenate([mesh.normals for mesh in meshes])
+        self._geom_of_polygon = np.repeat(np.arange(len(meshes)), [len(mesh.polygons) for mesh in meshes])
+        first_corner = np.cumsum([0, *(len(mesh.corners) for mesh in meshes)])
+        self._polygons = [
+            polygon + first_corner[number] for number, mesh in enumerate(meshes) for polygon in mesh.polygons
+        ]
+        self._a_corner = np.array([polygon[0] for polygon in self._polygons])
+        self._polygons_of_geom = [np.flatnonzero(self._geom_of_polygon == geom) for geom in range(len(geoms))]
+        self._background = [geom for group in (_ROOM, _MARKS) for geom in self._of_room(group)]
+        self._things = self._group_things()
+
+    def draw(self, data: mujoco.MjData, camera: int) -> NDArray[np.uint8]:
+        """Return the picture: grey levels 0 to 255, shape (240, 320), row 0 on top."""
+        rotations = data.geom_xmat[self._geoms].reshape(-1, 3, 3)
+        corners = np.einsum("nij,nj->ni", rotations[self._geom_of_corner], self._corners)
+        corners += data.geom_xpos[self._geoms][self._geom_of_corner]
+        normals = np.einsum("nij,nj->ni", rotations[self._geom_of_polygon], self._normals)
+        eye_m = data.cam_xpos[camera]
+        view = _View(eye_m, data.cam_xmat[camera].reshape(3, 3), float(self._model.cam_fovy[camera]), corners)
+        levels = np.clip(self._levels[self._geom_of_polygon] * self._brightness(data, normals), 0, 255)
+        is_seen = np.einsum("ni,ni->n", normals, eye_m - corners[self._a_corner]) > 0
+        canvas = np.zeros((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), np.uint8)
+
+        def paint(geom: int) -> None:
+            for polygon in self._polygons_of_geom[geom]:
+                if is_seen[polygon]:
+                    view.fill(canvas, self._polygons[polygon], float(levels[polygon]))
+
+        for geom in self._background:
+            paint(geom)
+        own_body = self._model.body_rootid[self._model.cam_bodyid[camera]]
+        others = [thing for thing in self._things if self._bodies[thing.solids[0]] != own_body]
+        boxes = [thing.bounds(corners) for thing in others]
+        for number in _far_to_near(np.array([low for low, _ in boxes]), np.array([high for _, high in boxes]), eye_m):
+            thing = others[number]
+            centres_m = data.geom_xpos[self._geoms[thing.solids]]
+            for solid in np.argsort(-np.linalg.norm(centres_m - eye_m, axis=1), kind="stable"):
+                paint(thing.solids[solid])
+            for mark in thing.marks:
+                paint(mark)
+        return canvas
+
+    def close(self) -> None:
+        """Do nothing: OpenCV holds nothing."""
+
+    def _of_room(self, group: int) -> list[int]:
+        return [int(geom) for geom in np.flatnonzero((self._groups == group) & (self._bodies == 0))]
+
+    def _group_things(self) -> list[_Thing]:
+        furniture = [[geom] for geom in self._of_room(_THINGS)]
+        moving = [
+            [int(geom) for geom in np.flatnonzero((self._bodies == body) & (self._groups == _THINGS))]
+            for body in np.unique(self._bodies)
+            if body != 0
+        ]
+        return [self._thing(solids) for solids in (*furniture, *moving) if solids]
+
+    def _thing(self, solids: list[int]) -> _Thing:
+        body = self._bodies[solids[0]]
+        # The marks of the room's own body are on its walls and painted before all things.
+        marks = np.flatnonzero((self._bodies == body) & (self._groups == _MARKS) & (body != 0))
+        return _Thing(
+            solids=np.array(solids),
+            marks=[int(mark) for mark in marks],
+            corners=np.flatnonzero(np.isin(self._geom_of_corner, solids)),
+        )
+
+    def _brightness(self, data: mujoco.MjData, normals: _Floats) -> _Floats:
+        """Return what share of its own color each polygon shows, as OpenGL's fixed lighting has it."""
+        model = self._model
+        brightness: _Floats = np.full(len(normals), float(model.vis.headlight.ambient @ _LUMA))
+        for light in range(model.nlight):
+            slant = np.maximum(0.0, -(normals @ data.light_xdir[light]))
+            brightness += model.light_ambient[light] @ _LUMA + slant * float(model.light_diffuse[light] @ _LUMA)
+        return brightness
+
+
+@dataclass(frozen=True, slots=True)
+class _Thing:
+    """What is painted together: geoms with a body of their own, and which corners bound them."""
+
+    solids: NDArray[np.intp]
+    marks: list[int]
+    corners: NDArray[np.intp]
+
+    def bounds(self, corners: _Floats) -> tuple[_Floats, _Floats]:
+        own = corners[self.corners]
+        return own.min(axis=0), own.max(axis=0)
+
+
+class _View:
+    """A pinhole camera: world corners in its frame (x right, y up, z ahead), and on the picture."""
+
+    def __init__(self, eye_m: _Floats, axes: _Floats, vertical_view_deg: float, corners: _Floats) -> None:
+        self._focal_px = PICTURE_HEIGHT_PX / 2 / math.tan(math.radians(vertical_view_deg) / 2)
+        self._corners: _Floats = (corners - eye_m) @ axes
+        self._corners[:, 2] *= -1
+        self._is_ahead = self._corners[:, 2] >= _NEAR_M
+        self._pixels = self._project(np.where(self._is_ahead[:, np.newaxis], self._corners, 1.0))
+
+    def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float) -> None:
+        """Paint the polygon, as far as it lies before the camera, with this grey level."""
+        is_ahead = self._is_ahead[polygon]
+        if is_ahead.all():
+            pixels = self._pixels[polygon]
+        elif is_ahead.any():
+            pixels = self._project(_clip_near(self._corners[polygon]))
+        else:
+            return
+        # Edges without anti-aliasing, as the OpenGL pictures have them.
+        cv2.fillConvexPoly(canvas, pixels, level, cv2.LINE_8, _SUBPIXEL_BITS)
+
+    def _project(self, corners: _Floats) -> NDArray[np.int32]:
+        scale = self._focal_px / corners[:, 2]
+        # OpenCV's whole coordinates are the middles of pixels.
+        columns = PICTURE_WIDTH_PX / 2 - 0.5 + corners[:, 0] * scale
+        rows = PICTURE_HEIGHT_PX / 2 - 0.5 - corners[:, 1] * scale
+        pixels = np.clip(np.stack([columns, rows], axis=1), -_FARTHEST_PX, _FARTHEST_PX)
+        return np.rint(pixels * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+
+
+def _clip_near(corners: _Floats) -> _Floats:
+    """Return the part of a convex polygon that lies beyond the near plane; some corner does."""
+    kept: list[_Floats] = []
+    for here, there in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        if here[2] >= _NEAR_M:
+            kept.append(here)
+        if (here[2] >= _NEAR_M) != (there[2] >= _NEAR_M):
+            kept.append(here + (there - here) * ((_NEAR_M - here[2]) / (there[2] - here[2])))
+    return np.array(kept)
+
+
+def _far_to_near(lows: _Floats, highs: _Floats, eye_m: _Floats) -> list[int]:
+    """Return an order in which no box is painted over by one behind it, if there is such an order.
+
+    Args:
+        lows: Least corner of each box, shape (n, 3).
+        highs: Greatest corner of each box.
+        eye_m: Where they are seen from.
+    """
+    if len(lows) == 0:
+        return []
+    above = lows[:, np.newaxis] >= highs[np.newaxis]  # [i, j, axis]: a plane across the axis has i above and j below
+    is_nearer = (above & (eye_m >= lows)[:, np.newaxis]).any(axis=2)
+    is_nearer |= (above.transpose(1, 0, 2) & (eye_m <= highs)[:, np.newaxis]).any(axis=2)
+    hides: NDArray[np.bool_] = np.asarray(is_nearer & ~is_nearer.T, bool)
+    distances_m = np.linalg.norm((lows + highs) / 2 - eye_m, axis=1)
+    left = [int(number) for number in np.argsort(-distances_m, kind="stable")]
+    order: list[int] = []
+    while left:
+        # Boxes can hide each other in a ring; then distance decides.
+        free = next((number for number in left if not hides[number, left].any()), left[0])
+        left.remove(free)
+        order.append(free)
+    return order
+
+
+def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
+    size = model.geom_size[geom]
+    kind = mujoco.mjtGeom(model.geom_type[geom])
+    match kind:
+        case mujoco.mjtGeom.mjGEOM_PLANE:
+            reach = _FLOOR_REACH_M
+            flat = [[-reach, -reach, 0], [reach, -reach, 0], [reach, reach, 0], [-reach, reach, 0]]
+            return _polyhedron(np.array(flat, float), [[0, 1, 2, 3]])
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+            sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+            if model.geom_group[geom] == _MARKS:
+                # OpenCV paints a polygon's outline too, and a mark's thin edges would become lines.
+                thin = 2 * int(np.argmin(size))
+                sides = sides[thin : thin + 2]
+            return _polyhedron(signs * size, sides)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return _cylinder(float(size[0]), float(size[1]), has_lids=model.geom_group[geom] != _MARKS)
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return _sphere(float(size[0]))
+    raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which nobody taught the painter")
+
+
+def _polyhedron(corners: _Floats, polygons: list[list[int]]) -> _Mesh:
+    """Return the mesh; the corners of each polygon run counter-clockwise seen from outside."""
+    normals = []
+    for polygon in polygons:
+        # Not the first corner: at the poles of a sphere it is doubled.
+        a, b, c = corners[polygon[-1]], corners[polygon[1]], corners[polygon[2]]
+        normal = np.cross(b - a, c - a)
+        normals.append(normal / np.linalg.norm(normal))
+    return _Mesh(corners, [np.array(polygon) for polygon in polygons], np.array(normals))
+
+
+def _cylinder(radius_m: float, half_length_m: float, *, has_lids: bool) -> _Mesh:
+    """Return a cylinder along z. The band that marks a body has no lids: they would cover what stands on it."""
+    angles = 2 * np.pi * np.arange(_SLICES) / _SLICES
+    ring = np.stack([radius_m * np.cos(angles), radius_m * np.sin(angles)], axis=1)
+    levels_m = np.repeat([-half_length_m, half_length_m], _SLICES)[:, np.newaxis]
+    corners = np.concatenate([np.concatenate([ring, ring]), levels_m], axis=1)
+    n = _SLICES
+    polygons = [[i, (i + 1) % n, n + (i + 1) % n, n + i] for i in range(n)]
+    if has_lids:
+        polygons += [list(range(n - 1, -1, -1)), list(range(n, 2 * n))]
+    return _polyhedron(corners, polygons)
+
+
+def _sphere(radius_m: float) -> _Mesh:
+    n = _SLICES
+    latitudes = np.pi * (np.arange(_STACKS + 1) / _STACKS - 0.5)
+    angles = 2 * np.pi * np.arange(n) / n
+    corners = radius_m * np.array(
+        [[np.cos(up) * np.cos(a), np.cos(up) * np.sin(a), np.sin(up)] for up in latitudes for a in angles]
+    )
+    polygons = [
+        [row * n + i, row * n + (i + 1) % n, (row + 1) * n + (i + 1) % n, (row + 1) * n + i]
+        for row in range(_STACKS)
+        for i in range(n)
+    ]
+    return _polyhedron(corners, polygons)
