@@ -219,7 +219,7 @@ class Behavior(Component[B], Generic[B]):
         if self.status.is_final or not status.is_final:
             return
         self.status, self.payload = status, dict(payload or {})
-        self.announce(f"finished: {status}")
+        self.tell(self.name, f"finished: {status}")
         self._begin(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, Any]) -> None:
@@ -227,10 +227,6 @@ class Behavior(Component[B], Generic[B]):
         self.payload = dict(payload)
         if self._parent is not None and not self.status.is_final:
             self._begin(self._report_once(self._parent.address, self._report()), "report")
-
-    def announce(self, what: str) -> None:
-        """Let people know what just happened: it stands in the story and is published to logs and screens."""
-        self.bus.publish(self.address, Conversation.LOG, self.story.note(self.name, what))
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
@@ -396,7 +392,7 @@ class Behavior(Component[B], Generic[B]):
                 await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
                 continue
             except Refusal as refusal:
-                self.announce(f"child {name} was refused: {refusal}")
+                self.tell(name, f"could not be started: {refusal}")
                 self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
                 return
             break
@@ -440,7 +436,7 @@ class Behavior(Component[B], Generic[B]):
                     log.info("child %s is away, the placer does not answer: %s", name, error)
         finally:
             child.close()
-        self.announce(f"child {name} was ended by somebody else")
+        self.tell(name, "was ended by somebody else")
         self._watched.pop(name, None)
         self._carry_out(self._children.left(name))
 

@@ -49,7 +49,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
         """Start a failed watcher again some times, then go on without it."""
         if status is BehaviorStatus.FAILURE:
             self._failures[child] += 1
-            self.announce(f"{child} failed: {payload.get('detail', 'no reason given')}")
+            self.tell(child, f"failed: {payload.get('detail', 'no reason given')}")
         retry = status is BehaviorStatus.FAILURE and self._failures[child] <= self.parameters.retries
         return Decision.RETRY if retry else Decision.NEXT
 

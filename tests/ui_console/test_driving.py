@@ -1,0 +1,80 @@
+"""Laws of the dead man: no key, no command; every drive ends in a halt."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ui_console.driving import FIRST_HOLD_S, REPEAT_EVERY_S, DeadMan, Drive, Halt, drive_towards
+
+FORWARD = drive_towards("forward", 4.0)
+TICK_S = 0.01
+
+
+def commands(presses_s: list[float], until_s: float, stops_s: tuple[float, ...] = ()) -> list[tuple[float, object]]:
+    hand, sent = DeadMan(), []
+    pending, stops = sorted(presses_s), sorted(stops_s)
+    for tick in range(int(until_s / TICK_S)):
+        now_s = tick * TICK_S
+        while pending and pending[0] <= now_s:
+            hand.press(FORWARD, now_s)
+            pending.pop(0)
+        while stops and stops[0] <= now_s:
+            hand.stop()
+            stops.pop(0)
+        if (command := hand.due(now_s)) is not None:
+            sent.append((now_s, command))
+    return sent
+
+
+def test_without_a_key_nothing_is_sent() -> None:
+    assert commands([], 5.0) == []
+
+
+def test_one_press_drives_half_a_second_at_ten_hertz_then_halts() -> None:
+    sent = commands([1.0], 5.0)
+    assert [command for _at_s, command in sent] == [FORWARD] * 5 + [Halt()]
+    assert sent[0][0] == 1.0
+    assert abs(sent[-1][0] - (1.0 + FIRST_HOLD_S)) < 2 * TICK_S
+
+
+def test_a_held_key_drives_without_a_gap_and_stops_soon_after_it_is_let_go() -> None:
+    repeats = [1.0] + [1.5 - TICK_S + 0.04 * n for n in range(50)]
+    sent = commands(repeats, 6.0)
+    assert [command for _at_s, command in sent].count(Halt()) == 1
+    assert sent[-1][0] - repeats[-1] < 0.2
+
+
+def test_the_stop_key_halts_at_once_and_also_when_nothing_is_held() -> None:
+    assert commands([1.0], 3.0, stops_s=(1.2,))[-1] == (1.2, Halt())
+    assert commands([], 3.0, stops_s=(1.0,)) == [(1.0, Halt())]
+
+
+def test_another_direction_takes_over_at_once() -> None:
+    hand = DeadMan()
+    hand.press(FORWARD, 0.0)
+    assert hand.due(0.0) == FORWARD
+    left = drive_towards("left", 4.0)
+    hand.press(left, 0.02)
+    assert hand.due(0.02) == left
+
+
+@given(st.lists(st.floats(0.0, 8.0), max_size=40), st.lists(st.floats(0.0, 8.0), max_size=3))
+def test_a_drive_is_only_sent_within_the_hold_of_a_press_and_always_followed_by_a_halt(
+    presses: list[float], stops: list[float]
+) -> None:
+    sent = commands(presses, 10.0, tuple(stops))
+    for at_s, command in sent:
+        if isinstance(command, Drive):
+            assert any(press - TICK_S <= at_s <= press + FIRST_HOLD_S + 2 * TICK_S for press in presses)
+    if any(isinstance(command, Drive) for _at_s, command in sent):
+        assert sent[-1][1] == Halt()
+
+
+@given(st.lists(st.floats(0.0, 8.0), max_size=40))
+def test_what_will_be_due_is_due_when_it_was_said_to_be(presses: list[float]) -> None:
+    hand = DeadMan()
+    for press in sorted(presses):
+        hand.press(FORWARD, press)
+        hand.due(press)
+        next_s = hand.next_s
+        assert next_s is not None
+        assert press < next_s <= press + REPEAT_EVERY_S + 1e-9

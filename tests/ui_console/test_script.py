@@ -1,0 +1,124 @@
+"""Laws of scripts: what is wrong is refused with its line; what is right is played in its time."""
+
+import json
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, Wish
+from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
+
+EXAMPLE = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
+
+
+def play(player: ScriptPlayer, until_s: float) -> list[tuple[float, Wish]]:
+    """Ask only when the player said so, as the loop does."""
+    done: list[tuple[float, Wish]] = []
+    now_s = 0.0
+    while now_s <= until_s:
+        done += [(now_s, wish) for wish in player.due(now_s)]
+        if player.next_s is None:
+            break
+        assert player.next_s >= now_s
+        now_s = player.next_s
+    return done
+
+
+def test_the_example_drives_from_its_time_until_the_release() -> None:
+    done = play(ScriptPlayer(read_script(EXAMPLE)), 10.0)
+    assert done[0] == (0.5, Drive(4.0, 4.0))
+    assert done[-1] == (3.0, GiveBack())
+    times = [at_s for at_s, _wish in done]
+    assert all(later - earlier <= REPEAT_EVERY_S + 1e-9 for earlier, later in pairwise(times))
+
+
+def test_the_end_of_a_script_releases() -> None:
+    assert play(ScriptPlayer(read_script('{"at_s":1,"halt":true}')), 5.0) == [(1.0, Halt()), (1.0, GiveBack())]
+    assert play(ScriptPlayer([]), 5.0) == [(0.0, GiveBack())]
+
+
+def test_after_a_halt_nothing_is_repeated() -> None:
+    script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.2,"halt":true}\n{"at_s":5,"release":true}'
+    done = play(ScriptPlayer(read_script(script)), 10.0)
+    assert [wish for at_s, wish in done if at_s > 0.15] == [Halt(), GiveBack()]
+
+
+def test_a_jump_does_not_interrupt_a_drive() -> None:
+    script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.25,"jump":true}\n{"at_s":0.6,"release":true}'
+    wishes = [wish for _at_s, wish in play(ScriptPlayer(read_script(script)), 10.0)]
+    assert wishes.count(Jump()) == 1
+    assert wishes[-2] == Drive(1.0, 1.0)
+
+
+def test_a_streamed_script_waits_for_its_next_line_and_repeats_the_last_meanwhile() -> None:
+    player = ScriptPlayer()
+    assert player.next_s is None
+    player.add(Step(0.0, Drive(1.0, 1.0)))
+    assert player.due(0.0) == [Drive(1.0, 1.0)]
+    assert player.due(0.05) == []
+    assert player.due(2.0) == [Drive(1.0, 1.0)]
+    player.end()
+    assert player.due(2.01) == [GiveBack()]
+    assert player.is_over
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("drive", "malformed"),
+        ('{"left_rad_s":1,"right_rad_s":1}', "at_s"),
+        ('{"at_s":0}', "exactly one"),
+        ('{"at_s":0,"halt":true,"jump":true}', "exactly one"),
+        ('{"at_s":0,"left_rad_s":1}', "belong together"),
+        ('{"at_s":0,"left_rad_s":1e999,"right_rad_s":1}', ""),
+        ('{"at_s":-1,"halt":true}', "comes after"),
+        ('{"at_s":0,"halt":true,"color":"red"}', "color"),
+        ('{"at_s":"now","halt":true}', "float"),
+        ("[]", "object"),
+    ],
+)
+def test_a_wrong_line_is_refused_with_its_number(line: str, complaint: str) -> None:
+    with pytest.raises(WrongScript, match="line 3") as refused:
+        read_script('{"at_s":0,"halt":true}\n\n' + line)
+    assert refused.value.facts["line"] == 3
+    assert complaint in refused.value.detail
+
+
+def test_time_may_not_run_backwards_and_nothing_follows_a_release() -> None:
+    reader = ScriptReader()
+    reader.read('{"at_s":2,"halt":true}')
+    with pytest.raises(WrongScript, match="comes after"):
+        reader.read('{"at_s":1,"halt":true}')
+    with pytest.raises(WrongScript, match="release"):
+        read_script('{"at_s":0,"release":true}\n{"at_s":1,"halt":true}')
+
+
+_speeds = st.floats(-30.0, 30.0)
+_wishes = st.one_of(st.builds(Drive, _speeds, _speeds), st.just(Halt()), st.just(Jump()))
+_scripts = st.lists(st.tuples(st.floats(0.0, 3.0), _wishes), max_size=12).map(
+    lambda steps: [Step(at_s, wish) for at_s, wish in sorted(steps, key=lambda step: step[0])]
+)
+
+
+@given(_scripts)
+def test_every_step_is_done_once_in_order_at_its_time_and_the_release_comes_last(steps: list[Step]) -> None:
+    done = play(ScriptPlayer(steps), 100.0)
+    assert [wish for _at_s, wish in done].count(GiveBack()) == 1
+    assert done[-1][1] == GiveBack()
+    left = list(steps)
+    for at_s, wish in done[:-1]:
+        if left and wish is left[0].wish:
+            assert at_s == left.pop(0).at_s
+        else:
+            assert isinstance(wish, Drive)
+    assert left == []
+
+
+@given(st.binary(max_size=60))
+def test_any_bytes_are_a_step_or_a_refusal(raw: bytes) -> None:
+    try:
+        read_script(raw.decode(errors="replace"))
+    except WrongScript as refusal:
+        json.dumps(refusal.facts["line"])

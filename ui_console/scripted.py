@@ -1,0 +1,143 @@
+"""Driving without a screen: a script in, JSON lines out."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import Callable
+
+from backbone.errors import Refusal, code_of
+from backbone.rc_manager.messages import StaleEpoch
+from resource_pool.arc_client import SwappedOut
+from ui_console.console_model import Asked, CommandRefused, ConsoleEvent, PictureSeen, event_json
+from ui_console.driving import GiveBack, Jump
+from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
+from ui_console.teleoperation import Teleoperation
+
+DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
+READ_BYTES = 65536
+_FOR_SCREENS_ONLY = (Asked, PictureSeen)
+
+
+class ScriptDriver:
+    """Plays one script on one console.
+
+    Args:
+        write: Gets each line of JSON, without its end; must hand it on at once.
+        steps: The whole script; None: steps come by ``feed``.
+        within_s: Mission seconds the grant may take; 0: any time.
+    """
+
+    def __init__(
+        self, write: Callable[[bytes], None], steps: list[Step] | None = None, *, within_s: float = 0.0
+    ) -> None:
+        self._write, self._within_s = write, within_s
+        self._player = ScriptPlayer(steps)
+        self._reader = ScriptReader()
+        self._news = asyncio.Event()
+        self._granted = self._failed = False
+        self._wrong: WrongScript | None = None
+
+    def show(self, event: ConsoleEvent) -> None:
+        """Write the event, if it is one for scripts."""
+        if isinstance(event, _FOR_SCREENS_ONLY):
+            return
+        if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
+            self._failed = True
+        self._write(event_json(event))
+
+    def feed(self, line: str | None) -> None:
+        """Take the next line of the script; None: its end. A wrong line ends the script there."""
+        if self._wrong is None:
+            try:
+                step = None if line is None else self._reader.read(line)
+            except WrongScript as wrong:
+                self._wrong, step, line = wrong, None, None
+            if step is not None:
+                self._player.add(step)
+            if line is None:
+                self._player.end()
+            self._news.set()
+
+    async def drive(self, console: Teleoperation) -> None:
+        """Wait for the grant, play the script to its end, give the robot back."""
+        try:
+            async with asyncio.timeout(self._within_s / console.clock.rate if self._within_s else None):
+                await console.wait_granted()
+        except TimeoutError:
+            self._failed = True
+            detail = f"not granted within {self._within_s:g} s"
+            remedy = "Ask 'scout-backbone why' for the reason, use a higher --priority, or wait longer."
+            now_s = console.clock.now_s()
+            self._write(event_json(CommandRefused(now_s, "console.not_granted", detail, remedy)))
+            await console.give_back("not granted in time")
+            return
+        except Refusal:
+            return
+        self._granted = True
+        await self._play(console, console.clock.now_s())
+
+    def exit_code(self, console: Teleoperation) -> int:
+        """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
+        if self._wrong is not None:
+            return USAGE
+        if console.refusal is not None or self._failed:
+            return REFUSED
+        return DONE if self._granted and console.given_back else NO_BACKBONE
+
+    async def _play(self, console: Teleoperation, granted_s: float) -> None:
+        clock = console.clock
+        while True:
+            self._news.clear()
+            for wish in self._player.due(clock.now_s() - granted_s):
+                if isinstance(wish, GiveBack):
+                    self._tell_wrong(clock.now_s())
+                    await console.give_back("the script is over")
+                    return
+                if console.is_held or isinstance(wish, Jump):
+                    await console.do(wish)
+            await self._wait_news(console, granted_s)
+
+    async def _wait_news(self, console: Teleoperation, granted_s: float) -> None:
+        """Return when the next step is due or another one arrived."""
+        next_s = self._player.next_s
+        wait_s = None
+        if next_s is not None:
+            wait_s = max(0.0, granted_s + next_s - console.clock.now_s()) / console.clock.rate
+        try:
+            async with asyncio.timeout(wait_s):
+                await self._news.wait()
+        except TimeoutError:
+            return
+
+    def _tell_wrong(self, now_s: float) -> None:
+        if self._wrong is not None:
+            wrong = self._wrong
+            self._write(event_json(CommandRefused(now_s, code_of(wrong), wrong.detail, wrong.remedy)))
+
+
+def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:
+    """Hand the lines read from a file descriptor to ``feed`` in this event loop, then None.
+
+    The thread that reads dies with the process: a pipe that stays open holds nothing up.
+    """
+    loop = asyncio.get_running_loop()
+
+    def hand_over(line: str | None) -> None:
+        try:
+            loop.call_soon_threadsafe(feed, line)
+        except RuntimeError:  # the loop is closed: the script is over
+            return
+
+    def read() -> None:
+        rest = b""
+        while chunk := os.read(descriptor, READ_BYTES):
+            *lines, rest = (rest + chunk).split(b"\n")
+            for line in lines:
+                hand_over(line.decode(errors="replace"))
+        if rest:
+            hand_over(rest.decode(errors="replace"))
+        hand_over(None)
+
+    threading.Thread(target=read, name="script", daemon=True).start()

@@ -1,0 +1,308 @@
+"""Teleoperation: a person's hold on one robot.
+
+Claims an ARC as a behavior does, with a priority of its own beside the mission's, and gives it back
+on request, at its end, or by its death, which the ARC sees. Faces (terminal, script) hear events
+through ``show`` and pictures through ``see``, and call the verbs.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import types
+from collections.abc import Awaitable, Callable
+from typing import Any, ClassVar
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.launch import Launch
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskWhy, Schedule, Why
+from backbone.wire import Envelope, Message, UnknownMessage
+from resource_pool.arc_client import (
+    ArcClient,
+    ArcNotice,
+    Frame,
+    NotMyArc,
+    PathNode,
+    Resumed,
+    Suspended,
+    Suspending,
+    arc_name,
+    claim_parameters,
+)
+from ui_console.console_model import (
+    ROBOT_KIND,
+    Asked,
+    CommandApplied,
+    CommandRefused,
+    ConsoleEvent,
+    GivenBack,
+    Granted,
+    LinkTrouble,
+    Lost,
+    PictureSeen,
+    WhyHeard,
+)
+from ui_console.driving import Command, DeadMan, Drive, Halt, Jump
+from ui_console.observer import REPLY_TIME_S, Observer
+
+log = logging.getLogger(__name__)
+
+ANY_CAMERA = {ROBOT_KIND: ["camera"]}
+
+
+class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of ``Teleoperation``.
+
+    Attributes:
+        robot: Robot to claim; empty: any free one with a camera.
+        kind: Component type of the ARC.
+        priority: Among the consoles and the mission; larger is higher.
+        minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
+    """
+
+    robot: str = ""
+    kind: str = "capture"
+    priority: int = 100
+    minimum_runtime_s: float = 5.0
+
+
+class Teleoperation(Observer[TeleoperationParameters]):
+    """One console.
+
+    Args:
+        show: Called with each event, in order.
+        see: Called with the newest picture; pictures of earlier grants never arrive.
+        work: Run once the console is ready, instead of waiting for somebody to end it; its end is the console's.
+        takes: Claim at once.
+        watches: Also tell what happens to others.
+    """
+
+    parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice
+
+    def __init__(
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        *,
+        show: Callable[[ConsoleEvent], None],
+        see: Callable[[Frame], None] | None = None,
+        work: Callable[[Teleoperation], Awaitable[None]] | None = None,
+        takes: bool = True,
+        watches: bool = True,
+    ) -> None:
+        super().__init__(launch, bus, clock, show=show, watches=watches)
+        self._see, self._work, self._takes = see, work, takes
+        self._arc: ArcClient | None = None
+        self._keeping: asyncio.Task[None] | None = None
+        self._frames: Subscription | None = None
+        self._releasing = False
+        self._asked_s = 0.0
+        self._grants = 0
+        self._decided = asyncio.Event()
+        self._dead_man = DeadMan()
+        self._pressed = asyncio.Event()
+        self._asking_why: asyncio.Task[None] | None = None
+        self.refusal: Refusal | None = None
+        """Why the claim was refused; None if it was not."""
+        self.given_back: bool | None = None
+        """Whether the last release was confirmed; None before one."""
+
+    # ------------------------------------------------------------------ verbs
+    @property
+    def is_held(self) -> bool:
+        """True while commands pass."""
+        return self._arc is not None and self._arc.granted is not None
+
+    def take(self) -> None:
+        """Claim the robot, unless it is claimed."""
+        if self._keeping is not None:
+            return
+        wished = self.parameters
+        self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
+        if self._see is not None:
+            self._frames = self._arc.frames(self._saw)
+        self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None
+        self._decided.clear()
+        self.show(Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
+        self._keeping = self.start_task(self._keep(self._arc), "arc")
+
+    async def wait_granted(self) -> None:
+        """Return when the claim was granted.
+
+        Raises:
+            Refusal: It was refused.
+        """
+        await self._decided.wait()
+        if self.refusal is not None:
+            raise self.refusal
+
+    def hold(self, drive: Drive) -> None:
+        """A drive key is down: the command repeats until the hold ends, then the wheels stop."""
+        self._dead_man.press(drive, asyncio.get_running_loop().time())
+        self._pressed.set()
+
+    def stop(self) -> None:
+        """Stop the wheels now."""
+        self._dead_man.stop()
+        self._pressed.set()
+
+    def jump(self) -> None:
+        """Jump once."""
+        if self.is_held:
+            self.start_task(self._jump(), "jump")
+
+    async def do(self, command: Command) -> bool:
+        """Have one command carried out and tell what became of it; return True if it was applied."""
+        if self._arc is None:
+            return False
+        try:
+            match command:
+                case Drive(left_rad_s, right_rad_s):
+                    applied = await self._arc.drive(left_rad_s, right_rad_s)
+                case Halt():
+                    applied = await self._arc.halt()
+                case Jump():
+                    applied = await self._arc.jump()
+        except Refusal as refusal:
+            self._tell_refusal(refusal)
+            return False
+        except LinkError as error:
+            self.show(LinkTrouble(self.clock.now_s(), str(error)))
+            return False
+        self.show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values))
+        return True
+
+    async def give_back(self, reason: str = "released") -> None:
+        """Give the robot back; afterwards the console watches until the next ``take``."""
+        keeping, self._keeping = self._keeping, None
+        if keeping is None or self._arc is None:
+            return
+        self._releasing = True
+        self._dead_man = DeadMan()
+        keeping.cancel()
+        await asyncio.wait({keeping})
+        try:
+            await self._arc.release(reason)
+            confirmed = True
+        except LinkError as error:
+            log.info("the release was not confirmed: %s", error)
+            confirmed = False
+        if self._frames is not None:
+            self._frames.close()
+        self._arc, self._frames, self._releasing = None, None, False
+        self.given_back = confirmed
+        self.show(GivenBack(self.clock.now_s(), reason, confirmed))
+
+    # ------------------------------------------------------------------ the component's hooks
+    async def serve(self) -> None:
+        """Claim, then listen; the keys have a task of their own."""
+        if self._takes:
+            self.take()
+        self.start_task(self._drive_while_held(), "keys")
+        if self._work is not None:
+            self.start_task(self._work_and_end(self._work), "work")
+        await super().serve()
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer the ARC's notices."""
+        if not isinstance(asked.body, ArcNotice):
+            raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
+        if self._arc is None:
+            raise NotMyArc(f"{self.name} claims no ARC")
+        return await self._arc.handle(asked.body)
+
+    async def drain(self) -> None:
+        """Give the robot back if it was not."""
+        await self.give_back("the console ends")
+
+    def schedule_changed(self, schedule: Schedule) -> None:
+        """Take note, and ask why this console waits if it does."""
+        super().schedule_changed(schedule)
+        if self._keeping is not None and not self.is_held and self._asking_why is None:
+            self._asking_why = self.start_task(self._ask_why(), "why")
+
+    # ------------------------------------------------------------------ the ARC
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Tell it; see ``ArcListener``."""
+        again, self._grants = self._grants > 0, self._grants + 1
+        now_s = self.clock.now_s()
+        robot = notice.rcs.get(ROBOT_KIND, "no robot")
+        self.report(f"drives {robot}")
+        self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
+        self._decided.set()
+
+    async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
+        """Stop the wheels within the deadline; see ``ArcListener``."""
+        await self.do(Halt())
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Tell it; see ``ArcListener``."""
+        self._dead_man = DeadMan()
+        if not self._releasing:
+            self.report(f"waits: {notice.reason} by {notice.by}")
+            self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
+
+    async def _keep(self, arc: ArcClient) -> None:
+        wished = self.parameters
+        parameters = claim_parameters(
+            self.address,
+            path=[PathNode(self.name, wished.priority)],
+            minimum_runtime_s=wished.minimum_runtime_s,
+            wish={ROBOT_KIND: wished.robot} if wished.robot else {},
+            features={} if wished.robot else ANY_CAMERA,
+            console=True,
+        )
+        try:
+            await arc.keep(self.clock, wished.kind, parameters)
+        except Refusal as refusal:
+            self._keeping = None
+            self.refusal = refusal
+            self._tell_refusal(refusal)
+            self._decided.set()
+
+    def _tell_refusal(self, refusal: Refusal) -> None:
+        self.show(CommandRefused(self.clock.now_s(), code_of(refusal), refusal.detail, refusal.remedy))
+
+    def _saw(self, frame: Frame) -> None:
+        if self._see is not None:
+            self.show(PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
+            self._see(frame)
+
+    async def _ask_why(self) -> None:
+        try:
+            question = AskWhy(arc_name(self.bus, self.parameters.kind))
+            why = await self.bus.ask(RC_MANAGER, question, Why, within_s=REPLY_TIME_S)
+        except (Refusal, LinkError) as error:
+            log.info("why: %s", error)
+        else:
+            if not self.is_held:
+                self.show(WhyHeard(self.clock.now_s(), why))
+        finally:
+            self._asking_why = None
+
+    # ------------------------------------------------------------------ hands
+    async def _drive_while_held(self) -> None:
+        loop = asyncio.get_running_loop()
+        while True:
+            self._pressed.clear()
+            command = self._dead_man.due(loop.time())
+            if command is not None and self.is_held:
+                await self.do(command)
+            try:
+                async with asyncio.timeout_at(self._dead_man.next_s):
+                    await self._pressed.wait()
+            except TimeoutError:
+                continue
+
+    async def _jump(self) -> None:
+        await self.do(Jump())
+
+    async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
+        await work(self)
+        self.end("the work is done")
