@@ -90,6 +90,12 @@ class RunningMission:
         """The mission's run directory."""
         return Path(self.environment["XDG_RUNTIME_DIR"]) / "scout-backbone" / self.name
 
+    @property
+    def endpoint(self) -> str:
+        """Where its hub listens."""
+        with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
+            return run_files.find(self.name).endpoint
+
     @contextlib.asynccontextmanager
     async def bus(self, source: str = "ui_console/tester") -> AsyncIterator[ZenohBus]:
         """Open a bus to the mission."""
