@@ -24,10 +24,7 @@ from scout_model.dimensions import (
 )
 from scout_model.errors import InvalidWorld
 from scout_model.radio_link import FIRST_NETWORK_ID, LAST_NETWORK_ID
-from scout_model.targets import path_length_m
-
-SHAPES = ("pioneer", "person")
-LEGS = ("left_leg", "right_leg")
+from scout_model.targets import SHAPES, part_poses, path_length_m
 
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
@@ -196,16 +193,20 @@ def _add_scout(spec: Any, place: ScoutPlace) -> None:
 
 
 def _add_target(spec: Any, target: Target) -> None:
-    body = spec.worldbody.add_body(name=target.name, mocap=True)
+    # A mocap body must hang on the world, so each swinging leg of a person is a body of its own.
+    body, *legs = (
+        spec.worldbody.add_body(name=part.body, mocap=True, pos=part.position_m, quat=part.quaternion)
+        for part in part_poses(target, 0.0)
+    )
     if target.shape == "pioneer":
         _cylinder(body, f"{target.name}/hull", PIONEER_RADIUS_M, 0.03, 0.20, 0.20, _THINGS)
         _cylinder(body, f"{target.name}/deck", PIONEER_RADIUS_M * 0.9, 0.20, PIONEER_HEIGHT_M, 0.06, _THINGS)
         _cylinder(body, f"{target.name}/sonars", PIONEER_RADIUS_M * 1.005, 0.14, 0.17, 0.95, _MARKS)
         return
-    _add_person(spec, body, target.name)
+    _shape_person(body, legs, target.name)
 
 
-def _add_person(spec: Any, body: Any, name: str) -> None:
+def _shape_person(body: Any, legs: list[Any], name: str) -> None:
     head_m, shoulder_m = 0.11, PERSON_HEIGHT_M - 0.28
     body.add_geom(
         name=f"{name}/torso",
@@ -223,11 +224,9 @@ def _add_person(spec: Any, body: Any, name: str) -> None:
         rgba=_grey(0.80),
         group=_THINGS,
     )
-    # A mocap body must hang on the world, so each swinging leg is a body of its own, with its origin in the hip.
-    for leg in LEGS:
-        limb = spec.worldbody.add_body(name=f"{name}/{leg}", mocap=True)
+    for limb in legs:
         limb.add_geom(
-            name=f"{name}/{leg}",
+            name=limb.name,
             type=mujoco.mjtGeom.mjGEOM_CYLINDER,
             pos=[0.0, 0.0, -0.45 * PERSON_HIP_M],
             size=[0.075, 0.45 * PERSON_HIP_M, 0.0],
@@ -235,7 +234,7 @@ def _add_person(spec: Any, body: Any, name: str) -> None:
             group=_THINGS,
         )
         limb.add_geom(
-            name=f"{name}/{leg}/shoe",
+            name=f"{limb.name}/shoe",
             type=mujoco.mjtGeom.mjGEOM_BOX,
             pos=[0.06, 0.0, -0.95 * PERSON_HIP_M],
             size=[0.14, 0.05, 0.03],

@@ -49,6 +49,7 @@ PIONEER_RADIUS_M = 0.20  # chosen: a Pioneer is 38 to 45 cm wide and long
 PIONEER_HEIGHT_M = 0.24  # chosen: a Pioneer's top plate
 PERSON_HEIGHT_M = 1.75  # chosen: an adult
 PERSON_HIP_M = 0.88  # chosen: half the height
+PERSON_HIP_WIDTH_M = 0.20  # chosen: between the legs' middles
 PERSON_STRIDE_M = 1.4  # chosen: two steps of an adult
 PERSON_SWING_RAD = math.radians(25.0)  # chosen: hip angle that goes with this stride
 

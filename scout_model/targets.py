@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from scout_model.description import Target
+from scout_model.dimensions import PERSON_HIP_M, PERSON_HIP_WIDTH_M, PERSON_STRIDE_M, PERSON_SWING_RAD
+
+SHAPES = ("pioneer", "person")
+LEGS = ("left_leg", "right_leg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +28,21 @@ class TargetPose:
     y_m: float
     heading_rad: float
     walked_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class PartPose:
+    """A body in the model that belongs to a target.
+
+    Attributes:
+        body: Name: the target's, or ``<target>/left_leg`` and ``<target>/right_leg`` of a person.
+        position_m: Origin: on the floor, of a leg in the hip.
+        quaternion: Orientation, real part first.
+    """
+
+    body: str
+    position_m: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
 
 
 def path_length_m(path: list[tuple[float, float]]) -> float:
@@ -50,6 +69,30 @@ def where(target: Target, time_s: float) -> TargetPose:
     walked_m = min(length_m, lap_elapsed_s * target.speed_m_s)
     is_coming_back = target.there_and_back and lap % 2 == 1
     return _along(target.path[::-1] if is_coming_back else target.path, walked_m)
+
+
+def part_poses(target: Target, time_s: float) -> list[PartPose]:
+    """Return the poses of all bodies the target is made of at this world time, always in the same order."""
+    pose = where(target, time_s)
+    parts = [PartPose(target.name, (pose.x_m, pose.y_m, 0.0), _turned(pose.heading_rad, 0.0))]
+    if target.shape == "person":
+        swing_rad = PERSON_SWING_RAD * math.sin(2 * math.pi * pose.walked_m / PERSON_STRIDE_M)
+        for leg, side in zip(LEGS, (1, -1), strict=True):
+            across_m = side * PERSON_HIP_WIDTH_M / 2
+            hip_m = (
+                pose.x_m - across_m * math.sin(pose.heading_rad),
+                pose.y_m + across_m * math.cos(pose.heading_rad),
+                PERSON_HIP_M,
+            )
+            parts.append(PartPose(f"{target.name}/{leg}", hip_m, _turned(pose.heading_rad, side * swing_rad)))
+    return parts
+
+
+def _turned(heading_rad: float, pitch_rad: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a rotation by pitch about y, then by heading about z."""
+    c_heading, s_heading = math.cos(heading_rad / 2), math.sin(heading_rad / 2)
+    c_pitch, s_pitch = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    return c_heading * c_pitch, -s_heading * s_pitch, c_heading * s_pitch, s_heading * c_pitch
 
 
 def _along(path: list[tuple[float, float]], walked_m: float) -> TargetPose:

@@ -14,44 +14,26 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.composition import LEGS, compose
-from scout_model.description import Target, WorldDescription
-from scout_model.dimensions import (
-    FRAMES_PER_S,
-    PERSON_HIP_M,
-    PERSON_STRIDE_M,
-    PERSON_SWING_RAD,
-    STEP_S,
-    STEPS_PER_FRAME,
-)
+from scout_model.composition import compose
+from scout_model.description import WorldDescription
+from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import UnknownBody
 from scout_model.scout import Firmware, FirmwareStatistics, Spring
-from scout_model.targets import where
+from scout_model.targets import part_poses
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """What of MuJoCo's state a picture depends on."""
-
-_LEG_OFFSET_M = 0.10  # chosen: half the width of an adult's hips
 
 
 @dataclass(frozen=True, slots=True)
 class _Robot:
     firmware: Firmware
-    body: int
     left_wheel: int
     right_wheel: int
     kick: int
     winch: int
     left_wheel_velocity: int
     right_wheel_velocity: int
-
-
-@dataclass(frozen=True, slots=True)
-class _Walker:
-    target: Target
-    body: int
-    mocap: int
-    legs: tuple[int, ...]
 
 
 class World:
@@ -70,8 +52,13 @@ class World:
         self._step = 0
         self._robots = {place.name: self._robot(place.name) for place in description.scouts}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.scouts}
-        self._walkers = {target.name: self._walker(target) for target in description.targets}
-        self._place_walkers()
+        self._targets = {target.name: target for target in description.targets}
+        self._mocap = {
+            part.body: int(self._model.body(part.body).mocapid[0])
+            for target in description.targets
+            for part in part_poses(target, 0.0)
+        }
+        self._place_targets()
         mujoco.mj_forward(self._model, self._data)
 
     @property
@@ -109,7 +96,7 @@ class World:
         for _ in range(STEPS_PER_FRAME):
             mujoco.mj_step(self._model, self._data)
             self._step += 1
-            self._place_walkers()
+            self._place_targets()
         self._frame += 1
 
     def transmitting(self) -> dict[str, str]:
@@ -141,8 +128,8 @@ class World:
         """
         if body in self._robots:
             x_m, y_m, z_m = self._free_joint(body)[:3]
-        elif body in self._walkers:
-            x_m, y_m, z_m = self._data.mocap_pos[self._walkers[body].mocap]
+        elif body in self._targets:
+            x_m, y_m, z_m = self._data.mocap_pos[self._mocap[body]]
         else:
             raise UnknownBody(f"no Scout or target named {body!r}")
         return float(x_m), float(y_m), float(z_m)
@@ -183,7 +170,6 @@ class World:
         model = self._model
         return _Robot(
             firmware=Firmware(),
-            body=model.body(f"{name}/body").id,
             left_wheel=model.actuator(f"{name}/left_wheel").id,
             right_wheel=model.actuator(f"{name}/right_wheel").id,
             kick=model.actuator(f"{name}/kick").id,
@@ -191,18 +177,6 @@ class World:
             left_wheel_velocity=int(model.joint(f"{name}/left_wheel").dofadr[0]),
             right_wheel_velocity=int(model.joint(f"{name}/right_wheel").dofadr[0]),
         )
-
-    def _walker(self, target: Target) -> _Walker:
-        legs = [f"{target.name}/{leg}" for leg in LEGS] if target.shape == "person" else []
-        return _Walker(
-            target=target,
-            body=self._model.body(target.name).id,
-            mocap=self._mocap(target.name),
-            legs=tuple(self._mocap(leg) for leg in legs),
-        )
-
-    def _mocap(self, body: str) -> int:
-        return int(self._model.body(body).mocapid[0])
 
     def _free_joint(self, robot: str) -> NDArray[np.float64]:
         joint = int(self._model.joint(f"{robot}/free").qposadr[0])
@@ -212,29 +186,14 @@ class World:
     def _quaternion(self, body: str) -> NDArray[np.float64]:
         if body in self._robots:
             return self._free_joint(body)[3:]
-        quaternion: NDArray[np.float64] = self._data.mocap_quat[self._walkers[body].mocap]
+        quaternion: NDArray[np.float64] = self._data.mocap_quat[self._mocap[body]]
         return quaternion
 
-    def _place_walkers(self) -> None:
+    def _place_targets(self) -> None:
         time_s = self._step * STEP_S
         positions, quaternions = self._data.mocap_pos, self._data.mocap_quat
-        for walker in self._walkers.values():
-            pose = where(walker.target, time_s)
-            half_rad = pose.heading_rad / 2
-            positions[walker.mocap] = pose.x_m, pose.y_m, 0.0
-            quaternions[walker.mocap] = math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)
-            swing_rad = PERSON_SWING_RAD * math.sin(2 * math.pi * pose.walked_m / PERSON_STRIDE_M)
-            for leg, side in zip(walker.legs, (1, -1), strict=False):
-                positions[leg] = (
-                    pose.x_m - side * _LEG_OFFSET_M * math.sin(pose.heading_rad),
-                    pose.y_m + side * _LEG_OFFSET_M * math.cos(pose.heading_rad),
-                    PERSON_HIP_M,
-                )
-                quaternions[leg] = _heading_then_pitch(pose.heading_rad, side * swing_rad)
-
-
-def _heading_then_pitch(heading_rad: float, pitch_rad: float) -> tuple[float, float, float, float]:
-    """Return the quaternion of a rotation by pitch about y, then by heading about z."""
-    c_heading, s_heading = math.cos(heading_rad / 2), math.sin(heading_rad / 2)
-    c_pitch, s_pitch = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
-    return c_heading * c_pitch, -s_heading * s_pitch, c_heading * s_pitch, s_heading * c_pitch
+        for target in self._targets.values():
+            for part in part_poses(target, time_s):
+                mocap = self._mocap[part.body]
+                positions[mocap] = part.position_m
+                quaternions[mocap] = part.quaternion

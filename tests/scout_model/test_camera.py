@@ -1,0 +1,152 @@
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from scout_model.camera import Camera
+from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
+from scout_model.gl_probe import GlSupport, prepare, probe
+from scout_model.world import World
+
+Picture = NDArray[np.uint8]
+NORTH = math.pi / 2
+
+
+def room(*targets: Target, furniture: list[Furniture] | None = None) -> World:
+    """The room of the published experiments, with two Scouts watching the path at y = 3."""
+    places = [ScoutPlace("scout1", 1, 0.72, 1.764, NORTH), ScoutPlace("scout2", 2, 7.20, 0.527, NORTH)]
+    return World(WorldDescription(9.0, 6.0, 1, furniture or [], places, list(targets)))
+
+
+def changed(a: Picture, b: Picture) -> int:
+    """Pixels that differ clearly."""
+    return int((np.abs(a.astype(int) - b) > 40).sum())
+
+
+@pytest.fixture(scope="module")
+def gl() -> GlSupport:
+    return probe()
+
+
+def views(backend: str, folder: Path) -> dict[str, Picture]:
+    program, file = Path(__file__).with_name("camera_views.py"), folder / f"{backend}.npz"
+    subprocess.run([sys.executable, str(program), backend, str(file)], check=True, timeout=60)
+    with np.load(file) as pictures:
+        return {name: pictures[name] for name in pictures.files}
+
+
+def test_the_pioneer_is_seen_while_it_crosses_and_not_otherwise() -> None:
+    """Path y = 3 from x = 0 to 9 at 0.5 m/s: before Scout 1 at 1.4 s, before Scout 2 at 14.4 s."""
+    pioneer = Target("pioneer", "pioneer", [(0.0, 3.0), (9.0, 3.0)], 0.5)
+    world, seen = room(pioneer), {}
+    with Camera(world.mjcf, "paint") as camera:
+        for _ in range(450):
+            world.step_frame()
+            if world.frame in (43, 225, 432):
+                camera.show(world.state())
+                seen[world.frame] = {robot: camera.picture(robot) for robot in ("scout1", "scout2")}
+    between = seen[225]
+    assert changed(seen[43]["scout1"], between["scout1"]) > 4000
+    assert changed(seen[43]["scout2"], between["scout2"]) == 0
+    assert changed(seen[432]["scout2"], between["scout2"]) > 1000
+    assert changed(seen[432]["scout1"], between["scout1"]) == 0
+
+
+def test_a_thing_before_another_hides_it_and_never_the_other_way() -> None:
+    pioneer = Target("pioneer", "pioneer", [(0.72, 3.0), (0.72, 5.0)], 0.5, begin_s=100.0)
+    before = Furniture("board", 1.2, 2.4, 3.0, 0.1, 1.0)
+    behind = Furniture("board", 1.2, 3.6, 3.0, 0.1, 1.0)
+    pictures = []
+    for furniture, targets in (([before], [pioneer]), ([before], []), ([behind], [pioneer]), ([behind], [])):
+        with Camera(room(*targets, furniture=furniture).mjcf, "paint") as camera:
+            pictures.append(camera.picture("scout1"))
+    assert changed(pictures[0], pictures[1]) == 0
+    assert changed(pictures[2], pictures[3]) > 4000
+
+
+def test_a_person_is_seen_as_walking_legs() -> None:
+    world = room(Target("person", "person", [(5.0, 3.0), (9.0, 3.0)], 1.2))
+    with Camera(world.mjcf, "paint") as camera:
+        away = camera.picture("scout2")
+        for _ in range(55):
+            world.step_frame()
+        camera.show(world.state())
+        assert changed(camera.picture("scout2"), away) > 3000
+
+
+def test_a_standing_scene_gives_the_same_picture_again() -> None:
+    world = room()
+    with Camera(world.mjcf, "paint") as one, Camera(world.mjcf, "paint") as other:
+        assert np.array_equal(one.picture("scout1"), other.picture("scout1"))
+
+
+def test_turning_the_scout_turns_its_view() -> None:
+    places = [ScoutPlace("scout1", 1, 0.72, 1.764, NORTH + turn) for turn in (0.0, 0.1)]
+    pictures = []
+    for place in places:
+        with Camera(World(WorldDescription(9.0, 6.0, 1, scouts=[place])).mjcf, "paint") as camera:
+            pictures.append(camera.picture("scout1"))
+    assert changed(*pictures) > 1000
+
+
+def test_a_state_of_another_world_is_refused() -> None:
+    world = room()
+    with Camera(world.mjcf, "paint") as camera, pytest.raises(StateMismatch):
+        camera.show(world.state()[:-1])
+
+
+def test_a_robot_of_another_world_is_refused() -> None:
+    with Camera(room().mjcf, "paint") as camera, pytest.raises(UnknownBody):
+        camera.picture("scout9")
+
+
+def test_a_process_not_prepared_for_opengl_is_told_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    with pytest.raises(RenderingUnavailable, match="prepare"):
+        Camera(room().mjcf, "gl")
+    with pytest.raises(RenderingUnavailable, match="imported before"):
+        prepare("egl")
+
+
+def test_a_painting_process_needs_no_opengl(tmp_path: Path) -> None:
+    assert len(views("none", tmp_path)) == 5
+
+
+def test_rendered_and_painted_pictures_show_the_same(gl: GlSupport, tmp_path: Path) -> None:
+    if gl.backend == "none":
+        pytest.skip(f"no OpenGL here; install {gl.missing_packages}")
+    rendered, painted = views(gl.backend, tmp_path), views("none", tmp_path)
+    for name, picture in rendered.items():
+        distances = np.abs(picture.astype(int) - painted[name])
+        assert distances.mean() < 4.0, name
+        assert (distances > 40).mean() < 0.02, name
+    for pictures in (rendered, painted):
+        assert changed(pictures["pioneer_scout1"], pictures["empty_scout1"]) > 4000
+        assert changed(pictures["pioneer_scout2"], pictures["empty_scout2"]) > 1000
+
+
+def test_a_probe_says_who_renders_or_which_packages_are_missing(gl: GlSupport) -> None:
+    assert bool(gl.renderer) == (gl.backend != "none") == (not gl.missing_packages)
+    assert gl.camera_backend == ("paint" if gl.backend == "none" else "gl")
+    assert (gl.renderer or "libegl1") in gl.summary
+
+
+def test_a_machine_without_egl_drivers_is_recognized(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nowhere.json")
+    assert probe().backend != "egl"
+
+
+def test_a_driver_that_hangs_does_not_hang_the_probe() -> None:
+    support = probe(trial_time_s=0.001)
+    assert (support.backend, support.camera_backend) == ("none", "paint")
+    assert support.missing_packages == "libegl1 libopengl0 libgl1-mesa-dri"
+
+
+def test_probing_imports_no_mujoco() -> None:
+    program = "import sys; from scout_model.gl_probe import probe; probe(0.001); assert 'mujoco' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
