@@ -17,6 +17,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
+from backbone.component.messages import LifeState
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy, Schedule, Why
@@ -119,9 +120,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """True while commands pass."""
         return self._arc is not None and self._arc.granted is not None
 
+    @property
+    def is_ready(self) -> bool:
+        """True while verbs can be called."""
+        return self.state is LifeState.READY
+
     def take(self) -> None:
-        """Claim the robot, unless it is claimed."""
-        if self._keeping is not None:
+        """Claim the robot, unless it is claimed or just being given back."""
+        if self._keeping is not None or self._releasing:
             return
         wished = self.parameters
         self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
@@ -177,6 +183,10 @@ class Teleoperation(Observer[TeleoperationParameters]):
             return False
         self.show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values))
         return True
+
+    def begin_release(self) -> None:
+        """Give the robot back without waiting for it."""
+        self.start_task(self.give_back(), "release")
 
     async def give_back(self, reason: str = "released") -> None:
         """Give the robot back; afterwards the console watches until the next ``take``."""

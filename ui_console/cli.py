@@ -1,0 +1,251 @@
+"""``scout-console``: take over a robot, or watch."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Callable
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from backbone.cli import ExitCode, run, say
+
+if TYPE_CHECKING:
+    from backbone.bus.interface import Clock
+    from backbone.component.launch import Launch
+    from ui_console.observer import Observer
+
+SCREEN_KIND, SCRIPT_KIND = "capture", "video_drive"
+"""With a screen, pictures come to this machine; a script, or a person with a video monitor of their own,
+leaves the framegrabber to others."""
+
+SYNCHRONIZE_WITHIN_S = 2.0  # chosen: an RC manager that is up answers in milliseconds
+
+app = typer.Typer(
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    add_completion=True,
+    help="Consoles of a mission. Exit codes: 0 done, 1 unexpected, 2 usage or wrong script, 4 backbone not reached, "
+    "5 refused, 130 Ctrl-C.",
+)
+
+
+class Profile(StrEnum):
+    """How a console looks."""
+
+    TERMINAL = "terminal"  # picture, tables, keys
+    PENDANT = "pendant"  # keys and tables; the picture is on a video monitor
+    MONITOR = "monitor"  # tables only; drives nothing
+
+
+Mission = Annotated[str | None, typer.Option("--mission", help="Name of a mission that is up on this machine.")]
+Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")]
+
+
+@app.command()
+def attach(
+    robot: Annotated[str, typer.Argument(help="Robot to take over; none: any free one with a camera.")] = "",
+    priority: Annotated[int, typer.Option(help="Beside the mission's own; larger is higher.")] = 100,
+    profile: Annotated[Profile, typer.Option(help="How the console looks.")] = Profile.TERMINAL,
+    script: Annotated[str, typer.Option(help="Drive by the JSON lines of this file, '-' for standard input.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="JSON lines, no screen; implies --script -.")] = False,
+    within: Annotated[float, typer.Option(help="Mission seconds a script waits for the grant; 0: for ever.")] = 0.0,
+    minimum_runtime: Annotated[float, typer.Option(help="Shortest useful time beside equals, seconds.")] = 5.0,
+    kind: Annotated[str, typer.Option(help="Kind of ARC; default: capture, or video_drive without a picture.")] = "",
+    mission: Mission = None,
+    connect: Connect = None,
+) -> None:
+    """Take over a robot, drive it, give it back."""
+    script = script or ("-" if as_json else "")
+    if profile is Profile.MONITOR:
+        run(lambda: _watch(mission, connect, as_json=as_json))
+    shows_picture = not script and profile is Profile.TERMINAL
+    wished = {
+        "robot": robot,
+        "priority": priority,
+        "kind": kind or (SCREEN_KIND if shows_picture else SCRIPT_KIND),
+        "minimum_runtime_s": minimum_runtime,
+    }
+    if script:
+        run(lambda: _drive_by_script(mission, connect, wished, script, within))
+    _need_a_terminal("attach", "--script FILE or --json")
+    run(lambda: _drive_by_hand(mission, connect, wished))
+
+
+@app.command()
+def monitor(
+    as_json: Annotated[bool, typer.Option("--json", help="JSON lines instead of a screen.")] = False,
+    mission: Mission = None,
+    connect: Connect = None,
+) -> None:
+    """Watch who holds what, who waits why, and what happens; claim nothing."""
+    if not as_json:
+        _need_a_terminal("monitor", "--json")
+    run(lambda: _watch(mission, connect, as_json=as_json))
+
+
+def main() -> None:
+    """Run the command line."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)
+
+
+def _need_a_terminal(command: str, instead: str) -> None:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        say(f"{command} needs a terminal; without one use {instead}")
+        raise typer.Exit(ExitCode.USAGE)
+
+
+async def _drive_by_script(
+    mission: str | None, connect: str | None, wished: dict[str, Any], script: str, within_s: float
+) -> int:
+    from ui_console.script import WrongScript, read_script
+    from ui_console.scripted import ScriptDriver, feed_from
+    from ui_console.teleoperation import Teleoperation
+
+    try:
+        steps = None if script == "-" else read_script(await asyncio.to_thread(Path(script).read_text))
+    except (OSError, UnicodeDecodeError) as error:
+        say(f"{script}: {error}")
+        return ExitCode.USAGE
+    except WrongScript as wrong:
+        say(f"{script}: {wrong}")
+        return ExitCode.USAGE
+    launch, clock = await _launch(mission, connect, wished)
+    driver = ScriptDriver(_write_line, steps, within_s=within_s)
+    bus = await _open_bus(launch, clock)
+    console = Teleoperation(launch, bus, clock, show=driver.show, work=driver.drive, watches=False)
+    if script == "-":
+        feed_from(sys.stdin.fileno(), driver.feed)
+    interrupted = _end_on_signals(console)
+    await console.run()
+    return ExitCode.INTERRUPTED if interrupted() else driver.exit_code(console)
+
+
+async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[str, Any]) -> int:
+    from ui_console.teleoperation import Teleoperation
+    from ui_console.terminal.session import TerminalSession
+
+    launch, clock = await _launch(mission, connect, wished)
+    session = TerminalSession(launch.name)
+    see = session.see if wished["kind"] == SCREEN_KIND else None
+    console = Teleoperation(launch, await _open_bus(launch, clock), clock, show=session.show, see=see)
+    _end_on_signals(console)
+    await session.run(console)
+    if console.refusal is not None and console.given_back is None:
+        raise console.refusal
+    return ExitCode.DONE
+
+
+async def _watch(mission: str | None, connect: str | None, *, as_json: bool) -> int:
+    from backbone.component.component import NoParameters
+    from ui_console.console_model import event_json
+    from ui_console.observer import Observer
+
+    launch, clock = await _launch(mission, connect, {})
+    bus = await _open_bus(launch, clock)
+    if as_json:
+        console: Observer[NoParameters] = Observer(
+            launch, bus, clock, show=lambda event: _write_line(event_json(event))
+        )
+        interrupted = _end_on_signals(console)
+        await console.run()
+        return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+    from ui_console.terminal.session import TerminalSession
+
+    session = TerminalSession(launch.name)
+    console = Observer(launch, bus, clock, show=session.show)
+    _end_on_signals(console)
+    await session.run(console)
+    return ExitCode.DONE
+
+
+async def _launch(mission: str | None, connect: str | None, parameters: dict[str, Any]) -> tuple[Launch, Clock]:
+    """Return who this console is in the mission found, and that mission's clock."""
+    import socket
+
+    from backbone import run_files
+    from backbone.bus.clock import MissionClock
+    from backbone.component.launch import Launch
+    from backbone.naming import Subsystem
+
+    name = f"console-{os.getpid()}"
+    if connect is None:
+        found = run_files.find(mission)
+        mission, endpoint = found.mission, found.endpoint
+        clock, host = MissionClock(found.clock_origin_monotonic_s, found.clock_rate), found.host
+    elif mission is None:
+        raise typer.BadParameter("--connect needs --mission NAME")
+    else:
+        endpoint, host = connect, socket.gethostname()
+        clock = await _clock_elsewhere(mission, connect, name)
+    launch = Launch(
+        mission,
+        Subsystem.UI_CONSOLE,
+        name,
+        "console",
+        "ui_console.teleoperation:Teleoperation",
+        host,
+        endpoint,
+        clock.origin_monotonic_s,
+        clock.rate,
+        parameters,
+    )
+    return launch, clock
+
+
+async def _clock_elsewhere(mission: str, endpoint: str, name: str) -> Any:
+    """Return the clock of a mission on another machine, which shares no monotonic clock with this one."""
+    import time
+
+    from backbone.bus.clock import MissionClock
+    from backbone.bus.zenoh_bus import ZenohBus, client_config
+    from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+    from backbone.rc_manager.messages import AskSchedule, Schedule
+
+    bus = await ZenohBus.open_when_up(
+        mission, f"ui_console/{name}", MissionClock.started_now(), client_config(endpoint)
+    )
+    try:
+        schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=SYNCHRONIZE_WITHIN_S)
+    finally:
+        await bus.close()
+    return MissionClock(time.monotonic() - schedule.at_s)
+
+
+async def _open_bus(launch: Launch, clock: Clock) -> Any:
+    from backbone.bus.zenoh_bus import ZenohBus, client_config
+
+    return await ZenohBus.open_when_up(launch.mission, launch.address, clock, client_config(launch.endpoint))
+
+
+def _end_on_signals(console: Observer[Any]) -> Callable[[], bool]:
+    """Have the console end in good order on SIGINT and SIGTERM; return whether SIGINT came."""
+    came: list[signal.Signals] = []
+
+    def end(number: signal.Signals) -> None:
+        came.append(number)
+        console.end(number.name)
+
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, end, number)
+    return lambda: signal.SIGINT in came
+
+
+def _write_line(line: bytes) -> None:
+    """Write one line at once: whoever reads it may wait for it."""
+    sys.stdout.buffer.write(line + b"\n")
+    sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    main()
