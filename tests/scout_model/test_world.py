@@ -86,6 +86,20 @@ def test_it_drives_straight_at_the_speed_asked_for() -> None:
     assert world.wheel_speeds("scout1") == pytest.approx((speed_rad_s, speed_rad_s), rel=0.02)
 
 
+@pytest.mark.parametrize(("slope_deg", "least_m_s", "most_m_s"), [(20.0, 0.15, 0.2), (24.0, -1.0, 0.0)])
+def test_it_climbs_twenty_degrees_and_not_much_more(slope_deg: float, least_m_s: float, most_m_s: float) -> None:
+    """IROS 2001, section 2: up to a 20 degree slope. A leaning gravity is a slope as long as one likes."""
+    model = mujoco.MjModel.from_xml_string(World(EMPTY).mjcf)
+    data, slope_rad = mujoco.MjData(model), math.radians(slope_deg)
+    model.opt.gravity[:] = -9.81 * math.sin(slope_rad), 0.0, -9.81 * math.cos(slope_rad)
+    for wheel in ("left_wheel", "right_wheel"):
+        data.actuator(f"scout2/{wheel}").ctrl = 0.2 / dimensions.WHEEL_RADIUS_M
+    mujoco.mj_step(model, data, nstep=240)
+    begin_m = float(data.body("scout2/body").xpos[0])
+    mujoco.mj_step(model, data, nstep=240)
+    assert least_m_s < float(data.body("scout2/body").xpos[0]) - begin_m < most_m_s
+
+
 def test_it_turns_on_the_spot() -> None:
     world = World(EMPTY)
     rim_rad_s = 1.0 * dimensions.TRACK_M / 2 / dimensions.WHEEL_RADIUS_M
