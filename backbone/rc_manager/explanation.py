@@ -194,7 +194,7 @@ class Explanation:
         )
 
     def _waits(self, arc: ArcEntry, slot: Slot | None, now_s: float) -> tuple[list[str], str, str]:
-        age = f"since {_at(arc.active_since_s if not arc.turns else arc.since_s)} ({now_s - arc.since_s:.1f} s)"
+        age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
         past = [f"it lost its RCs last because {_reason(arc)}"] if arc.swapped_out else []
         down = [rc for rc in arc.uses if not self._table.rcs[rc].up]
         if down:

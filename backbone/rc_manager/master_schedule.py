@@ -97,8 +97,6 @@ class ArcEntry:
         afterwards: What becomes of it once free, while it is being revoked.
         retry_s: When it asks again after it could not open; None: only when told.
         turns: Grants so far.
-        active_since_s: When it began to want time.
-        last_served_s: End of its last whole slice; None: not served yet.
         swapped_out: Why it lost its RCs last; empty: never.
         swapped_out_by: Because of whom.
     """
@@ -122,8 +120,6 @@ class ArcEntry:
     afterwards: Afterwards = Afterwards.WAIT
     retry_s: float | None = None
     turns: int = 0
-    active_since_s: float = 0.0
-    last_served_s: float | None = None
     swapped_out: str = ""
     swapped_out_by: str = ""
 

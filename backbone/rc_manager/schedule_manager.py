@@ -228,7 +228,6 @@ class ScheduleManager:
         self._record(trace.revoke(self._now_s, arc.name, why, by), _because(why, by))
         if arc.served(self._now_s):
             arc.stamp = (self._now_s, self._next())
-            arc.last_served_s = self._now_s
         arc.swapped_out, arc.swapped_out_by = why, by
         arc.afterwards = Afterwards.WAIT
         self._enter(arc, RequestState.REVOKING)
@@ -352,28 +351,37 @@ class ScheduleManager:
         arc.stamp = (self._now_s, self._next())
         arc.pledge = None
         arc.retry_s = None
-        arc.active_since_s = self._now_s
         self._enter(arc, RequestState.WAITING)
         self._table.demand_changed()
 
     def _adopted(self, event: Adopted) -> None:
+        """Let an ARC run on that an earlier RC manager granted its RCs.
+
+        The trace has no word for it: it shows a grant now, for what is left of the slice.
+        """
         request, rcs = event.request, tuple(event.epochs)
         if request.arc in self._table.arcs or any(rc not in self._table.rcs for rc in rcs):
             return
-        arc = self._add(Requested(msgspec.structs.replace(request, idle=False), rcs))
+        rest_s = max(0.0, event.granted_s + request.minimum_runtime_s - self._now_s)
+        arc = self._add(Requested(msgspec.structs.replace(request, minimum_runtime_s=rest_s, idle=False), rcs))
         holders = [other for other in self._table.arcs.values() if other.holds]
-        if not self._table.usable(arc) or not self._table.fits(arc, holders):
-            return  # it waits like everybody; the RCs drop it when its lease ends
+        if self._table.usable(arc) and self._table.fits(arc, holders):
+            self._hold_on(arc, event)
+        arc.request = request
+        self._runtime_changed(arc.name, request.minimum_runtime_s, request.maximum_runtime_s)
+
+    def _hold_on(self, arc: ArcEntry, event: Adopted) -> None:
         arc.epochs = dict(event.epochs)
-        for rc, epoch in event.epochs.items():
-            self._table.rcs[rc].epoch = max(self._table.rcs[rc].epoch, epoch)
-            self._table.rcs[rc].granted_epoch = max(self._table.rcs[rc].granted_epoch, epoch)
+        for rc, epoch in arc.epochs.items():
+            entry = self._table.rcs[rc]
+            entry.epoch = max(entry.epoch, epoch)
+            entry.granted_epoch = max(entry.granted_epoch, epoch)
         why = "it held its RCs when this RC manager started"
         self._record(trace.connect(self._now_s, arc.name, arc.epochs), why)
         self._record(trace.grant(self._now_s, arc.name, arc.epochs), why)
         arc.turns = 1
         arc.began_s = arc.granted_s = event.granted_s
-        arc.end_s = event.granted_s + arc.minimum_s
+        arc.end_s = self._now_s + arc.minimum_s
         self._enter(arc, RequestState.RUNNING)
 
     def _wanted(self, name: str) -> None:
@@ -453,14 +461,13 @@ class ScheduleManager:
     def _note_nodes(self, request: SchedulingRequest) -> tuple[str, ...]:
         names = self._tree.place(request.path, console=request.console)
         self._renumber()
-        if not request.console:
-            self._introduce_nodes(names)
+        self._introduce_nodes(names)
         return names
 
     def _priority_changed(self, node: str, priority: int) -> None:
         self._tree.change(node, priority)
         self._renumber()
-        for names in [names for names in self._traced_nodes if names[-1] == node]:
+        for names in [*self._traced_nodes]:
             self._introduce_nodes(names)
 
     def _renumber(self) -> None:
@@ -469,12 +476,15 @@ class ScheduleManager:
         self._table.demand_changed()
 
     def _introduce_nodes(self, names: tuple[str, ...]) -> None:
-        for depth, (_, number) in enumerate(self._tree.path(names), start=1):
+        """Bring new nodes and new numbers on this way into the trace, parents first."""
+        for depth, (name, number) in enumerate(self._tree.path(names), start=1):
             way = names[:depth]
-            if self._traced_nodes.get(way) != number:
-                self._traced_nodes[way] = number
-                parent = _node_id(way[:-1]) if depth > 1 else None
-                self._record(trace.node(self._now_s, _node_id(way), parent, number))
+            told = self._traced_nodes.get(way)
+            self._traced_nodes[way] = number
+            if told == number or (told is None and name.startswith(CONSOLE)):
+                continue  # the request tells a console's first number
+            parent = _node_id(way[:-1]) if depth > 1 else None
+            self._record(trace.node(self._now_s, _node_id(way), parent, number), "its number among its siblings")
 
     # ------------------------------------------------------------------ RCs
 

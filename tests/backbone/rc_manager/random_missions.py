@@ -44,17 +44,18 @@ def random_mission(
     if not requests:
         return bench, []
     happens: list[tuple[float, Event]] = [(_time(rng, 8.0) if rng.random() < 0.5 else 0.0, r) for r in requests]
-    for _ in range(rng.choice([0, 0, 2, 6])):
-        happens.append((_time(rng), _whim(rng, rng.choice(requests))))
-    changing = {event.arc for _, event in happens if isinstance(event, RuntimeChanged)}
-    happens = [item for item in happens[: len(requests)]] + [
-        (time_s, event)
-        for time_s, event in happens[len(requests) :]
-        if not (isinstance(event, Requested) and event.request.arc in changing)  # it would shorten them again
+    whims = [(_time(rng), _whim(rng, rng.choice(requests))) for _ in range(rng.choice([0, 0, 2, 6]))]
+    # A repeated request would make shorter again what was made longer; the judge knows only the last length.
+    changing = {whim.arc for _, whim in whims if isinstance(whim, RuntimeChanged)}
+    happens += [
+        (time_s, whim) for time_s, whim in whims if not (isinstance(whim, Requested) and whim.request.arc in changing)
     ]
     if faults:
         for _ in range(rng.choice([0, 0, 0, 1, 2])):
             happens += _fault(rng, rng.choice(rcs))
+        for request in requests:
+            if rng.random() < 0.05:
+                bench.fails[request.request.arc] = rng.choice(["", *request.rcs])
     return bench, sorted(happens, key=lambda item: item[0])
 
 

