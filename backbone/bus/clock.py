@@ -85,6 +85,13 @@ class NothingLeftToHappen(BackboneError):
     """Every task waits for something that no timer will bring: a deadlock, found the moment it occurs."""
 
 
+class EndOfVirtualTime(BackboneError):
+    """Virtual time went on for longer than it can be told exactly."""
+
+
+LAST_VIRTUAL_S = 2.0**23  # 97 days; beyond, steps of a float are coarser than the loop's 1 ns and timers never come
+
+
 class _JumpingSelector(selectors.BaseSelector):
     """Selects without waiting; where it would have waited, the loop's time moves on instead."""
 
@@ -99,6 +106,8 @@ class _JumpingSelector(selectors.BaseSelector):
         if timeout is None:
             raise NothingLeftToHappen(f"all tasks wait for ever at t={self.now_s:.6f} s")
         self.now_s += timeout
+        if self.now_s > LAST_VIRTUAL_S:
+            raise EndOfVirtualTime(f"virtual time ends at t={LAST_VIRTUAL_S:g} s")
         return []
 
     def register(self, fileobj: Any, events: int, data: Any = None) -> selectors.SelectorKey:

@@ -182,7 +182,7 @@ class Component(Generic[P]):
             task.cancel()
         else:
             self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+            task.add_done_callback(self._task_ended)
         return task
 
     def report(self, feedback: str) -> None:
@@ -282,10 +282,12 @@ class Component(Generic[P]):
                 for task in self._tasks:
                     task.cancel()
         except* Exception as bugs:
-            self.fail(bugs.exceptions[0] if len(bugs.exceptions) == 1 else bugs)
+            self.fail(bugs.exceptions[0])
         finally:
             self._group = None
         if connected:
+            if self._state is LifeState.READY:
+                self._enter(LifeState.DRAINING)
             await self.drain()
 
     async def _serve_until_end(self) -> None:
@@ -297,6 +299,12 @@ class Component(Generic[P]):
         self._token = self.bus.declare_alive(self.address)
         await self._end.wait()
         self._enter(LifeState.DRAINING)
+
+    def _task_ended(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (bug := task.exception()) is not None:
+            self._group = None  # which ends its other tasks now, and must get no new ones meanwhile
+            self.fail(bug)
 
     async def _unless_ended(self, work: Coroutine[Any, Any, None], name: str) -> bool:
         """Do the work unless the component is told to end first; say whether it was done."""
