@@ -42,7 +42,7 @@ class Explanation:
     def __init__(self, table: MasterSchedule) -> None:
         self._table = table
 
-    # ------------------------------------------------------------------ views
+    # Views.
 
     def scheduled(self, arc: ArcEntry, now_s: float) -> Scheduled:
         """Return the place of one request."""
@@ -104,7 +104,7 @@ class Explanation:
             turns=arc.turns,
         )
 
-    # ------------------------------------------------------------------ why
+    # Why.
 
     def why(self, name: str, now_s: float) -> Why:
         """Return the reasons for an ARC, an owner or an RC.

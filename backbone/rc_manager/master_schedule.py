@@ -286,7 +286,8 @@ class MasterSchedule:
             group: Active ARCs.
             now_s: From when on.
             handed_over: Plan as if all RCs that are being freed were free already.
-            slack_s: By how much an ARC may overlap those before it; None: by the tolerance of this run.
+            slack_s: By how much an ARC may overlap those before it, but not by more than half its slice;
+                None: by the tolerance of this run.
         """
         forgiven_s = self._slack_s if slack_s is None else slack_s
         holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
@@ -330,7 +331,7 @@ class MasterSchedule:
 
     def _earliest_s(self, arc: ArcEntry, from_s: float, against: Sequence[Hold], forgiven_s: float) -> float:
         """Return the first time from which the ARC fits for its whole length; infinite if there is none."""
-        length_s = arc.length_s - forgiven_s
+        length_s = arc.length_s - min(forgiven_s, arc.minimum_s / 2)
         times = sorted({from_s, *(hold.end_s for hold in against if from_s < hold.end_s < math.inf)})
         return next(
             (time_s for time_s in times if self._fits_between(arc, time_s, time_s + length_s, against)), math.inf

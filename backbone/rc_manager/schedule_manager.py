@@ -121,7 +121,7 @@ class ScheduleManager:
         self._replaced_by: dict[str, Requested] = {}
         self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
 
-    # ------------------------------------------------------------------ events in, instructions out
+    # Events in, instructions out.
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
         """Take note of what happened and decide what follows from it.
@@ -181,7 +181,7 @@ class ScheduleManager:
             case _:
                 assert_never(event)
 
-    # ------------------------------------------------------------------ context switches
+    # Context switches.
 
     def _give(self, turn: Turn) -> None:
         """Connect the ARC whose turn it is, or first revoke who is in its way."""
@@ -283,7 +283,7 @@ class ScheduleManager:
         if successor is not None:
             self._requested(successor)
 
-    # ------------------------------------------------------------------ what ARCs want
+    # What ARCs want.
 
     def _requested(self, event: Requested) -> None:
         request = event.request
@@ -456,7 +456,7 @@ class ScheduleManager:
             if arc.state is RequestState.IDLE and arc.retry_s is not None and arc.retry_s <= self._now_s:
                 self._wanted(arc.name)
 
-    # ------------------------------------------------------------------ priorities
+    # Priorities.
 
     def _note_nodes(self, request: SchedulingRequest) -> tuple[str, ...]:
         names = self._tree.place(request.path, console=request.console)
@@ -486,7 +486,7 @@ class ScheduleManager:
             parent = _node_id(way[:-1]) if depth > 1 else None
             self._record(trace.node(self._now_s, _node_id(way), parent, number), "its number among its siblings")
 
-    # ------------------------------------------------------------------ RCs
+    # RCs.
 
     def _rc_known(self, event: RcKnown) -> None:
         known = self._table.rcs.get(event.rc)
@@ -567,7 +567,7 @@ class ScheduleManager:
         for holder in self._table.overloading(name):
             self._revoke(holder, "capacity", name)
 
-    # ------------------------------------------------------------------ views
+    # Views.
 
     def choose(self, request: SchedulingRequest) -> tuple[str, ...]:
         """Return the set of RCs this request should wait for; nothing changes.
@@ -654,7 +654,7 @@ class ScheduleManager:
         story = [line for line in self._story if not names or line.get("arc", line.get("id")) in names]
         raise AssertionError("\n".join([f"broken at {self._now_s}: {what}", *map(str, story)]))
 
-    # ------------------------------------------------------------------ bookkeeping
+    # Bookkeeping.
 
     def _known(self, arc: str) -> ArcEntry:
         if arc not in self._table.arcs:
