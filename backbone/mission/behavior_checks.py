@@ -9,21 +9,22 @@ from backbone.mission.report import Report, told_names
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
 
-TRIES_AT_MOST = 10_000  # chosen: 10 ms; sets that fit are found in the first few unless hardly anything fits
+TRIES_AT_MOST = 100_000  # chosen: a third of a second; a set that fits is found in the first few tries
 
 
 def check_behaviors(tables: Tables, report: Report) -> None:
     """Report what does not fit in the behavior tree."""
     of_one: dict[str, Element] = {}
+    behavior_types = [known for known in tables.types if tables.belongs_to(known, Subsystem.MISSION_CONTROL)]
     for behavior in tables.behaviors:
         kind, name = behavior.text("type"), behavior.text("name")
-        if is_known(behavior, "type", "component type", tables.types, report):
-            if tables.types[kind].text("subsystem") != Subsystem.MISSION_CONTROL:
-                report.fault(
-                    behavior.place_of("type"),
-                    f"type {kind} is no behavior",
-                    f"Behaviors are the types of subsystem mission_control: {told_names(_behavior_types(tables))}",
-                )
+        if kind in tables.types and kind not in behavior_types:
+            report.fault(
+                behavior.place_of("type"),
+                f"type {kind} is no behavior",
+                f"Behaviors are types of subsystem mission_control: {told_names(behavior_types) or 'there is none'}",
+            )
+        elif is_known(behavior, "type", "type of behavior", behavior_types, report):
             _check_multiplicity(behavior, "type", tables, of_one, report)
         if name and name == tables.root.text("name"):
             report.fault(
@@ -32,17 +33,15 @@ def check_behaviors(tables: Tables, report: Report) -> None:
                 "Choose another name",
             )
         check_parameters(behavior, TREE_PARAMETERS, report)
+    sets = _Sets(tables)
+    arc_kinds = [name for name in tables.types if tables.needs(name)]
     for behavior, arc in tables.claims():
         _check_runtime(behavior, arc, report)
-        if not is_known(arc, "kind", "kind of ARC", [name for name in tables.types if tables.needs(name)], report):
+        if not is_known(arc, "kind", "kind of ARC", arc_kinds, report):
             continue
         _check_multiplicity(arc, "kind", tables, of_one, report)
         if _wishes_fit(arc, tables, report):
-            _check_set(behavior, arc, tables, report)
-
-
-def _behavior_types(tables: Tables) -> list[str]:
-    return [name for name, kind in tables.types.items() if kind.text("subsystem") == Subsystem.MISSION_CONTROL]
+            _check_set(behavior, arc, tables, sets, report)
 
 
 def _check_multiplicity(
@@ -75,7 +74,7 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
     """Report wishes that nothing can fulfil; say whether there is none."""
     kind, needs = arc.text("kind"), tables.needs(arc.text("kind"))
     wishes = arc.all("wish")
-    check_unique(wishes, "type", "wish for a", report)
+    check_unique(wishes, "type", "wish for type", report)
     fits = True
     for wish in wishes:
         wanted, name, features = wish.text("type"), wish.text("name"), wish.words("features")
@@ -92,6 +91,10 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
         if name and not is_known(wish, "name", wanted, [resource.text("name") for resource in there], report):
             fits = False
             continue
+        if not name and not features:
+            report.fault(
+                wish.place, f"a wish for a {wanted} without name and features", "Say which one, or remove the wish"
+            )
         candidates = [tables.resources[name]] if name else there
         if there and not any(_has(resource, features) for resource in candidates):
             fits = False
@@ -113,7 +116,7 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
     return fits
 
 
-def _check_set(behavior: Element, arc: Element, tables: Tables, report: Report) -> None:
+def _check_set(behavior: Element, arc: Element, tables: Tables, sets: _Sets, report: Report) -> None:
     """Report a demand no sharable resource can serve, and resources that cannot be used together."""
     needs = [needed for needed in dict.fromkeys(tables.needs(arc.text("kind"))) if tables.resources_of(needed)]
     wishes = {wish.text("type"): wish for wish in arc.all("wish")}
@@ -125,23 +128,19 @@ def _check_set(behavior: Element, arc: Element, tables: Tables, report: Report) 
     if demand is None:
         return
     enough = {
-        needed: [
-            resource
-            for resource in candidates
-            if not resource.flag("sharable") or demand <= (resource.number("capacity") or 0.0)
-        ]
+        needed: [resource for resource in candidates if not resource.flag("sharable") or demand <= _capacity(resource)]
         for needed, candidates in roles.items()
     }
     tight = [needed for needed in needs if not enough[needed]]
     for needed in tight:
-        best = max((resource.number("capacity") or 0.0 for resource in roles[needed]), default=0.0)
+        best = max(_capacity(resource) for resource in roles[needed])
         report.fault(
             arc.place_of("period-s"),
             f"{behavior.text('name')} alone asks for {demand:.0%} of a {needed}; "
             f"{told_names([resource.text('name') for resource in roles[needed]])} can give {best:.0%}",
             "Write a longer period-s or a shorter packet-time-s, or raise the capacity",
         )
-    if not tight and not _some_set_fits(list(enough.values())):
+    if not tight and not sets.any_fits(list(enough.values())):
         report.fault(
             arc.place_of("kind"),
             f"no {told_names(needs)} that {behavior.text('name')} may have can be used together",
@@ -164,29 +163,42 @@ def _check_demand(behavior: Element, arc: Element, report: Report) -> float | No
     return packet_time_s / period_s
 
 
-def _some_set_fits(roles: list[list[Element]]) -> bool:
-    """Say whether one of each role can be used together; True if that is too much work to find out."""
-    tries = 0
+class _Sets:
+    """Looks for one resource of each role that can be used together, with so many tries for a whole file."""
 
-    def extend(chosen: list[Element]) -> bool:
-        nonlocal tries
+    def __init__(self, tables: Tables) -> None:
+        self._tables, self._tries_left = tables, TRIES_AT_MOST
+
+    def any_fits(self, roles: list[list[Element]]) -> bool:
+        """Say whether a set fits; True if that is too much work to find out, the dependency database will know."""
+        return self._extend([], roles)
+
+    def _extend(self, chosen: list[Element], roles: list[list[Element]]) -> bool:
         if len(chosen) == len(roles):
             return True
         for candidate in roles[len(chosen)]:
-            tries += 1
-            if tries > TRIES_AT_MOST:
+            if self._tries_left == 0:
                 return True
-            fits = all(_together(candidate, other) and _together(other, candidate) for other in chosen)
-            if fits and extend([*chosen, candidate]):
+            self._tries_left -= 1
+            fits = all(
+                _together(candidate, other, self._tables) and _together(other, candidate, self._tables)
+                for other in chosen
+            )
+            if fits and self._extend([*chosen, candidate], roles):
                 return True
         return False
 
-    return extend([])
 
-
-def _together(resource: Element, other: Element) -> bool:
+def _together(resource: Element, other: Element, tables: Tables) -> bool:
     named = [used.text("name") for used in resource.all("uses") if used.text("type") == other.text("type")]
+    if not all(tables.is_resource_of(name, other.text("type")) for name in named):
+        return True  # that there is none of this name is told already
     return not named or other.text("name") in named
+
+
+def _capacity(resource: Element) -> float:
+    capacity = resource.number("capacity")
+    return capacity if capacity is not None and 0 < capacity <= 1 else 1.0  # an illegal one is told already
 
 
 def _wanted(resource: Element, wish: Element | None) -> bool:

@@ -34,6 +34,7 @@ from backbone.mission.tables import (
 from backbone.mission.world_checks import check_world
 from backbone.naming import MAX_NAME_LENGTH, Subsystem, is_legal
 
+ARC = "behavior's ARC"  # its component is named <behavior>-<kind>
 LAUNCHER = "launcher"  # the component that 'up' is itself
 FIRST_NETWORK_ID, LAST_NETWORK_ID = 1, 254  # as the radio's packets carry it: one byte, without 0 and 255
 SET_BY_RESOURCE = ("driver", "sharable", "capacity", "links")  # Resource.rc_parameters
@@ -45,9 +46,10 @@ def check(root: Element, report: Report) -> None:
     _check_hosts(tables, report)
     _check_core(tables, report)
     _check_types(tables, report)
-    _check_resources(tables, report)
     check_world(tables, report)
-    check_behaviors(tables, report)
+    if tables.types:  # the schema asks for types; without any, every word about kinds would repeat that
+        _check_resources(tables, report)
+        check_behaviors(tables, report)
     _check_component_names(tables, report)
 
 
@@ -80,23 +82,24 @@ def _check_core(tables: Tables, report: Report) -> None:
         return
     first: dict[tuple[str, str], Element] = {}
     for service in core.all("service"):
-        name, host = service.text("type"), service.text("host")
+        name, where = service.text("type"), service.text("host")
         if is_known(service, "type", "core service", CORE_SERVICES, report):
-            is_known(service, "type", "component type", tables.types, report)
-            before = first.setdefault((name, host if name == CREATOR else ""), service)
+            if tables.types:
+                is_known(service, "type", "component type", tables.types, report)
+            before = first.setdefault((name, where if name == CREATOR else ""), service)
             if before is not service:
                 report.fault(
                     service.place,
-                    f"a second {name}{f' on {host}' if name == CREATOR else ''}; "
+                    f"a second {name}{f' on {where}' if name == CREATOR else ''}; "
                     f"the first is in line {before.place.line}",
                     "Remove one; creator runs once on each host, every other core service once in the mission",
                 )
         check_host(service, tables, report)
         main = _main_host(tables)
-        if name in CORE_SERVICES and name != CREATOR and host in tables.hosts and host != main:
+        if name in CORE_SERVICES and name != CREATOR and where in tables.hosts and where != main:
             report.fault(
                 service.place_of("host"),
-                f"{name} on host {host}: other hosts than the first run only their creator",
+                f"{name} on host {where}: other hosts than the first run only their creator",
                 f"Put it on {main}",
             )
     there = {name for name, _host in first}
@@ -149,7 +152,7 @@ def _check_core_type(component_type: Element, report: Report) -> None:
         )
     if name not in CORE_SERVICES:
         return
-    if not core:
+    if core is False:
         report.fault(component_type.place_of("core"), f"{name} is a core service", 'Add core="true"')
     if component_type.text("subsystem") != Subsystem.BACKBONE and component_type.text("subsystem") in set(Subsystem):
         report.fault(
@@ -165,7 +168,7 @@ def _check_core_type(component_type: Element, report: Report) -> None:
 
 def _check_needs(component_type: Element, tables: Tables, report: Report) -> None:
     needs = component_type.all("needs")
-    check_unique(needs, "type", "need of", report)
+    check_unique(needs, "type", "need of type", report)
     known = tables.resource_types()
     for needed in needs:
         is_known(needed, "type", "type of resource", known, report)
@@ -176,7 +179,7 @@ def _check_needs(component_type: Element, tables: Tables, report: Report) -> Non
                 f"no type of resource is named {told(used)}{report.hint(used, known)}",
                 f"There is: {told_names(known)}",
             )
-    if component_type.text("uses") and not tables.is_resource_type(component_type.text("name")):
+    if component_type.words("uses") and not tables.is_resource_type(component_type.text("name")):
         report.fault(
             component_type.place_of("uses"),
             f"type {component_type.text('name')} has no resources that could use others",
@@ -221,22 +224,31 @@ def _check_resources(tables: Tables, report: Report) -> None:
     resources = section(tables.root, "resources")
     of_one: dict[str, Element] = {}
     ids: dict[int, Element] = {}
+    for robot in tables.robots():
+        if NETWORK_ID not in parameters(robot):
+            report.fault(
+                robot.place,
+                f"{robot.text('type')} {robot.text('name')} has no network id",
+                f'Add <parameter name="{NETWORK_ID}" value="…"/>, from {FIRST_NETWORK_ID} to {LAST_NETWORK_ID}',
+            )
     for resource in resources:
         kind = resource.text("type")
-        if is_known(resource, "type", "component type", tables.types, report) and not tables.is_resource_type(kind):
+        if kind in tables.types and not tables.is_resource_type(kind):
             report.fault(
                 resource.place_of("type"),
                 f"type {kind} runs no hardware",
                 f"Types of resource are those of subsystem resource_pool without <needs>: "
-                f"{told_names(tables.resource_types())}",
+                f"{told_names(tables.resource_types()) or 'there is none'}",
             )
+        elif kind not in tables.types:
+            is_known(resource, "type", "type of resource", tables.resource_types(), report)
         check_host(resource, tables, report)
         check_parameters(resource, SET_BY_RESOURCE, report)
         _check_uses(resource, tables, report)
         _check_driver(resource, tables, report)
         _check_network_id(resource, ids, report)
         capacity = resource.number("capacity")
-        if capacity is not None and 0 < capacity < 1 and not resource.flag("sharable"):
+        if capacity is not None and 0 < capacity < 1 and resource.flag("sharable") is False:
             report.fault(
                 resource.place_of("capacity"),
                 f"capacity {capacity:g} of {resource.text('name')}, which is not sharable",
@@ -255,7 +267,7 @@ def _check_resources(tables: Tables, report: Report) -> None:
 
 def _check_uses(resource: Element, tables: Tables, report: Report) -> None:
     uses = resource.all("uses")
-    check_unique(uses, "name", "use of", report)
+    check_unique(uses, "name", "use of resource", report)
     for used in uses:
         kind = used.text("type")
         type_fits = is_known(used, "type", "type of resource", tables.resource_types(), report)
@@ -274,7 +286,7 @@ def _check_uses(resource: Element, tables: Tables, report: Report) -> None:
     used_kinds = {used.text("type") for used in uses}
     component_type = tables.types.get(resource.text("type"))
     for kind in [] if component_type is None else dict.fromkeys(component_type.words("uses")):
-        if kind not in used_kinds and is_legal(kind):
+        if kind not in used_kinds and tables.is_resource_type(kind):
             there = told_names([other.text("name") for other in tables.resources_of(kind)])
             report.fault(
                 resource.place,
@@ -332,29 +344,30 @@ def _check_component_names(tables: Tables, report: Report) -> None:
     first: dict[str, tuple[str, Place]] = {}
     for name, what, place in sorted(_components(tables), key=lambda component: component[2]):
         if not is_legal(name):
-            if len(name) > MAX_NAME_LENGTH and what.startswith("ARC"):
-                report.fault(place, f"the name of {what}, {name}, is too long", "Shorten the behavior's name")
+            if len(name) > MAX_NAME_LENGTH and what == ARC:
+                report.fault(place, f"the ARC's name, {name}, is too long", "Shorten the behavior's name")
             continue
         if name in reserved:
-            report.fault(place, f"{what} has the name {told(name)} of a core service", "Choose another name")
+            report.fault(place, f"the {what} has the name {told(name)} of a core service", "Choose another name")
             continue
-        before, line = first.setdefault(name, (what, place))
-        if line != place:
-            report.fault(
-                place,
-                f"{what} has the name {told(name)} of {before} in line {line.line}",
-                "Give each component of the mission its own name",
+        before, there = first.setdefault(name, (what, place))
+        if there != place:
+            told_twice = (
+                f"a second {what} {told(name)}; the first is in line {there.line}"
+                if what == before
+                else f"the {what} has the name {told(name)} of the {before} in line {there.line}"
             )
+            report.fault(place, told_twice, "Give each component of the mission its own name")
 
 
 def _components(tables: Tables) -> Iterator[tuple[str, str, Place]]:
+    """Yield name, what it is, and where it is named."""
     for resource in section(tables.root, "resources"):
-        yield resource.text("name"), f"resource {resource.text('name')}", resource.place_of("name")
+        yield resource.text("name"), "resource", resource.place_of("name")
     if tables.world is not None:
-        yield tables.world.text("name"), "the world", tables.world.place_of("name")
+        yield tables.world.text("name"), "world", tables.world.place_of("name")
     for behavior in tables.behaviors:
-        yield behavior.text("name"), f"behavior {behavior.text('name')}", behavior.place_of("name")
+        yield behavior.text("name"), "behavior", behavior.place_of("name")
     for behavior, arc in tables.claims():
         if arc.text("kind") in tables.types and is_legal(behavior.text("name")):
-            name = f"{behavior.text('name')}-{arc.text('kind')}"
-            yield name, f"ARC of behavior {behavior.text('name')}", arc.place_of("kind")
+            yield f"{behavior.text('name')}-{arc.text('kind')}", ARC, arc.place_of("kind")

@@ -23,7 +23,7 @@ from xml.parsers import expat
 from backbone.mission.report import Place, Report, told
 
 MAX_BYTES = 1024 * 1024  # chosen: a robot with its behavior is 600 bytes, so this is more than a thousand robots
-MAX_ELEMENTS = 50_000  # chosen: same; a robot with its behavior is 10 elements
+MAX_ELEMENTS = 20_000  # chosen: same; a robot with its behavior is 10 elements
 MAX_DEPTH = 32  # chosen: the behavior tree of RAM 2002 is 3 deep
 BEGINNING = Place(1, 1)
 
@@ -86,9 +86,9 @@ class Element:
         value = self.text(attribute).strip()
         return float(value) if _DECIMAL.fullmatch(value) else None
 
-    def flag(self, attribute: str) -> bool:
-        """Say whether the value is true."""
-        return self.text(attribute).strip() in ("true", "1")
+    def flag(self, attribute: str) -> bool | None:
+        """Return the value as true or false; None if it is neither."""
+        return {"true": True, "1": True, "false": False, "0": False}.get(self.text(attribute).strip())
 
 
 def read_bytes(path: Path, report: Report) -> bytes | None:
@@ -176,8 +176,11 @@ class _Parse:
             raise _Refused
 
     def _doctype(self, *_declared: object) -> None:
+        begin = self._data.rfind(b"<!DOCTYPE", 0, self._parser.CurrentByteIndex + 1)
         self._report.fault(
-            self._here(), "a document type declaration", "Remove <!DOCTYPE …>; mission files have no entities."
+            self._lines.place(begin),
+            "a document type declaration",
+            "Remove <!DOCTYPE …>; mission files have no entities.",
         )
         raise _Refused
 

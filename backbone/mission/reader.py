@@ -69,9 +69,9 @@ def _component_type(component_type: Element) -> ComponentType:
         class_path=component_type.text("class"),
         subsystem=Subsystem(component_type.text("subsystem")),
         multiplicity=Multiplicity(component_type.text("multiplicity")),
-        core=component_type.flag("core"),
+        core=bool(component_type.flag("core")),
         tags=component_type.words("tags"),
-        restart=component_type.flag("restart"),
+        restart=bool(component_type.flag("restart")),
         needs=[needed.text("type") for needed in component_type.all("needs")],
     )
 
@@ -85,7 +85,7 @@ def _resource(resource: Element, tables: Tables) -> Resource:
         name=resource.text("name"),
         type=resource.text("type"),
         host=resource.text("host"),
-        sharable=resource.flag("sharable"),
+        sharable=bool(resource.flag("sharable")),
         capacity=_number(resource, "capacity"),
         connect_s=_number(resource, "connect-s"),
         disconnect_s=_number(resource, "disconnect-s"),
@@ -144,7 +144,7 @@ def _world_content(world: Element, tables: Tables) -> dict[str, Any]:
                 "speed_m_s": _number(target, "speed-m-s"),
                 "begin_s": _number(target, "begin-s"),
                 "rest_s": _number(target, "rest-s"),
-                "there_and_back": target.flag("there-and-back"),
+                "there_and_back": bool(target.flag("there-and-back")),
             }
             for target in world.all("target")
         ],

@@ -101,6 +101,7 @@ def told_names(names: Collection[str]) -> str:
         >>> told_names(["radio", "grabber"])
         'radio, grabber'
     """
-    first = list(names)[:NAMES_TOLD_AT_MOST]
-    rest = len(names) - len(first)
+    each = list(dict.fromkeys(names))
+    first = each[:NAMES_TOLD_AT_MOST]
+    rest = len(each) - len(first)
     return ", ".join(first) + (f" and {rest} more" if rest else "")

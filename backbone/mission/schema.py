@@ -267,9 +267,9 @@ def _report_content(element: Element, text: str, report: Report) -> None:
     ]
     for tag in lacking:
         least = vocabulary()[element.tag].children[tag][0]
-        number = "" if least == 1 else f" {least} of"
+        lacks = "lacks" if least == 1 else f"has fewer than {least}"
         documentation = vocabulary()[tag].documentation
-        report.fault(element.place, f"<{element.tag}> lacks{number} <{tag}>", f"<{tag}>: {documentation}")
+        report.fault(element.place, f"<{element.tag}> {lacks} <{tag}>", f"<{tag}>: {documentation}")
     if not lacking:
         report.fault(element.place, text, "See docs/reference/mission-file.md.")
 

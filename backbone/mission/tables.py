@@ -28,6 +28,7 @@ class Tables:
         hosts: Machines.
         types: Component types.
         resources: Hardware.
+        by_type: Type → all resources of it, in the order of the file.
         world: The simulated world, if there is one.
         behaviors: Every node of the behavior tree, parents before their children.
     """
@@ -36,6 +37,7 @@ class Tables:
     hosts: dict[str, Element]
     types: dict[str, Element]
     resources: dict[str, Element]
+    by_type: dict[str, list[Element]]
     world: Element | None
     behaviors: list[Element]
 
@@ -48,6 +50,7 @@ class Tables:
             _by_name(section(root, "hosts")),
             _by_name(section(root, "types")),
             _by_name(section(root, "resources")),
+            _by_type(section(root, "resources")),
             root.first("world"),
             [] if behaviors is None else [element for element in behaviors if element.tag == "behavior"],
         )
@@ -57,13 +60,18 @@ class Tables:
         found = self.types.get(kind)
         return [] if found is None else [needed.text("type") for needed in found.all("needs")]
 
+    def belongs_to(self, name: str, subsystem: Subsystem) -> bool:
+        """Say whether this type is, or if its subsystem is illegal may be meant to be, of the subsystem."""
+        found = self.types.get(name)
+        return found is not None and (
+            found.text("subsystem") == subsystem or found.text("subsystem") not in set(Subsystem)
+        )
+
     def is_resource_type(self, name: str) -> bool:
         """Say whether this type runs a piece of hardware, so is no service, ARC, behavior or world."""
-        found = self.types.get(name)
         return (
-            found is not None
-            and found.text("subsystem") == Subsystem.RESOURCE_POOL
-            and not found.all("needs")
+            self.belongs_to(name, Subsystem.RESOURCE_POOL)
+            and not self.needs(name)
             and (self.world is None or name != self.world.text("type"))
         )
 
@@ -73,7 +81,20 @@ class Tables:
 
     def resources_of(self, kind: str) -> list[Element]:
         """Return the resources of a type, in the order of the file."""
-        return [resource for resource in self.resources.values() if resource.text("type") == kind]
+        return self.by_type.get(kind, [])
+
+    def is_resource_of(self, name: str, kind: str) -> bool:
+        """Say whether a resource of this name and type exists."""
+        return name in self.resources and self.resources[name].text("type") == kind
+
+    def robots(self) -> list[Element]:
+        """Return the resources that a radio tells apart: those of the types of which any has a network id."""
+        return [
+            resource
+            for same_type in self.by_type.values()
+            if any(NETWORK_ID in parameters(resource) for resource in same_type)
+            for resource in same_type
+        ]
 
     def claims(self) -> list[tuple[Element, Element]]:
         """Return every behavior that claims an ARC, with the ARC."""
@@ -163,6 +184,13 @@ def check_host(element: Element, tables: Tables, report: Report) -> None:
             f"host {element.text('host')} lacks {told_names(lacking)}, which type {element.text('type')} asks for",
             "Name a host with these tags, or add them to the host",
         )
+
+
+def _by_type(resources: list[Element]) -> dict[str, list[Element]]:
+    found: dict[str, list[Element]] = {}
+    for resource in resources:
+        found.setdefault(resource.text("type"), []).append(resource)
+    return found
 
 
 def _by_name(elements: list[Element]) -> dict[str, Element]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told
 from backbone.mission.tables import (
@@ -15,9 +13,10 @@ from backbone.mission.tables import (
     check_parameters,
     check_unique,
     is_known,
-    parameters,
 )
-from backbone.naming import Subsystem
+from backbone.naming import Subsystem, is_legal
+
+PAIRS_AT_MOST = 1_000_000  # chosen: half a second; a thousand robots among a thousand tables
 
 
 def check_world(tables: Tables, report: Report) -> None:
@@ -37,18 +36,16 @@ def check_world(tables: Tables, report: Report) -> None:
         for body in bodies:
             for place in body.all("point") if body.tag == "target" else [body]:
                 _check_inside(place, body, width_m, depth_m, report)
-    for scout, box in itertools.product(world.all("scout"), world.all("furniture")):
-        _check_not_in_box(scout, box, report)
+    _check_not_in_boxes(world.all("scout"), world.all("furniture"), report)
     for target in world.all("target"):
         _check_path(target, report)
 
 
 def _check_type(world: Element, tables: Tables, report: Report) -> None:
     name = world.text("type")
-    if not is_known(world, "type", "component type", tables.types, report):
+    if not tables.types or not is_known(world, "type", "component type", tables.types, report):
         return
-    component_type = tables.types[name]
-    if component_type.text("subsystem") != Subsystem.RESOURCE_POOL or component_type.all("needs"):
+    if not tables.belongs_to(name, Subsystem.RESOURCE_POOL) or tables.needs(name):
         report.fault(
             world.place_of("type"),
             f"type {name} plays no world",
@@ -63,7 +60,7 @@ def _check_type(world: Element, tables: Tables, report: Report) -> None:
 
 
 def _check_robots(world: Element, tables: Tables, report: Report) -> None:
-    robots = {name for name, resource in tables.resources.items() if NETWORK_ID in parameters(resource)}
+    robots = {robot.text("name"): robot for robot in tables.robots()}
     bodies = {scout.text("name") for scout in world.all("scout")}
     for scout in world.all("scout"):
         name = scout.text("name")
@@ -72,8 +69,8 @@ def _check_robots(world: Element, tables: Tables, report: Report) -> None:
         if name not in robots:
             report.fault(
                 scout.place_of("name"),
-                f"resource {name} has no network id, so no radio can reach this body",
-                f'Add <parameter name="{NETWORK_ID}" value="…"/> to the resource',
+                f"resource {name} has no network id, so it is no robot and has no body",
+                f'Name a robot, or add <parameter name="{NETWORK_ID}" value="…"/> to the resource',
             )
         elif tables.resources[name].text("driver") != SIMULATED:
             report.fault(
@@ -81,12 +78,12 @@ def _check_robots(world: Element, tables: Tables, report: Report) -> None:
                 f"resource {name} is real (driver {tables.resources[name].text('driver')}), but has a simulated body",
                 'Remove the body, or write driver="simulated"',
             )
-    for name in robots - bodies:
-        resource = tables.resources[name]
-        if resource.text("driver") == SIMULATED:
+    for name, robot in robots.items():
+        if robot.text("driver") == SIMULATED and name not in bodies and is_legal(name):
             report.fault(
-                resource.place_of("name"),
-                f"simulated robot {told(name)} has no body in the world{report.hint(name, sorted(bodies - robots))}",
+                robot.place_of("name"),
+                f"simulated robot {told(name)} has no body in the world"
+                f"{report.hint(name, sorted(bodies - tables.resources.keys()))}",
                 f'Add <scout name="{name}" x-m="…" y-m="…"/> to <world>',
             )
 
@@ -105,12 +102,24 @@ def _check_inside(place: Element, body: Element, width_m: float, depth_m: float,
         )
 
 
-def _check_not_in_box(scout: Element, box: Element, report: Report) -> None:
-    for attribute, extent in (("x-m", "width-m"), ("y-m", "depth-m")):
-        scout_m, box_m, extent_m = scout.number(attribute), box.number(attribute), box.number(extent)
-        if scout_m is None or box_m is None or extent_m is None or abs(scout_m - box_m) >= extent_m / 2:
-            return
-    report.fault(scout.place, f"scout {scout.text('name')} stands inside {box.text('name')}", "Move one of them")
+def _check_not_in_boxes(scouts: list[Element], boxes: list[Element], report: Report) -> None:
+    if len(scouts) * len(boxes) > PAIRS_AT_MOST:
+        return
+    extents = [(box, [box.number(name) for name in ("x-m", "y-m", "width-m", "depth-m")]) for box in boxes]
+    for scout in scouts:
+        x_m, y_m = scout.number("x-m"), scout.number("y-m")
+        for box, (box_x_m, box_y_m, width_m, depth_m) in extents:
+            if _is_within(x_m, box_x_m, width_m) and _is_within(y_m, box_y_m, depth_m):
+                report.fault(
+                    scout.place, f"scout {scout.text('name')} stands inside {box.text('name')}", "Move one of them"
+                )
+
+
+def _is_within(point_m: float | None, middle_m: float | None, extent_m: float | None) -> bool:
+    """Say whether a point is between the ends of an extent; never where one of them is missing."""
+    if point_m is None or middle_m is None or extent_m is None:
+        return False
+    return abs(point_m - middle_m) < extent_m / 2
 
 
 def _check_path(target: Element, report: Report) -> None:

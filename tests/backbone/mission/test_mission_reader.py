@@ -1,0 +1,331 @@
+"""A mission file is read whole or refused whole, with every fault at its place."""
+
+import math
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from backbone.mission.behavior_orders import behavior_orders
+from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
+from backbone.mission.model import MissionDescription
+from backbone.mission.reader import Fault, MissionInvalid, read_mission
+from backbone.naming import MAX_NAME_LENGTH
+from scout_model.description import WorldDescription
+
+HERE = Path(__file__).parent
+SMALL = HERE / "small.xml"
+BROKEN = sorted((HERE / "broken").glob("*.xml"))
+MISSION_XML = HERE.parents[2] / "mission.xml"
+
+
+def faults_of(path: Path | str) -> list[Fault]:
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission(path)
+    return list(caught.value.faults)
+
+
+def faults_in(tmp_path: Path, content: str | bytes) -> list[Fault]:
+    file = tmp_path / "m.xml"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return faults_of(file)
+
+
+def read_text(tmp_path: Path, content: str | bytes) -> MissionDescription:
+    file = tmp_path / "m.xml"
+    file.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_mission(file)
+
+
+def changed(*changes: tuple[str, str]) -> str:
+    text = SMALL.read_text()
+    for before, after in changes:
+        assert before in text, before
+        text = text.replace(before, after, 1)
+    return text
+
+
+def announced(path: Path) -> list[str]:
+    """Return the faults that the file's first comment announces, as ``line:column: message``."""
+    comment = path.read_text().partition("-->")[0]
+    return re.findall(r"^    (\d+:\d+: .*)$", comment, re.MULTILINE)
+
+
+# ---------------------------------------------------------------------- broken files
+@pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
+def test_every_fault_of_a_broken_file_is_told_with_its_place(path: Path) -> None:
+    assert [f"{fault.line}:{fault.column}: {fault.message}" for fault in faults_of(path)] == announced(path)
+
+
+@pytest.mark.parametrize("path", BROKEN, ids=lambda path: path.stem)
+def test_every_fault_has_a_remedy_and_the_faults_are_told_in_order(path: Path) -> None:
+    faults = faults_of(path)
+    assert all(fault.remedy and fault.file == str(path) for fault in faults)
+    assert [(fault.line, fault.column) for fault in faults] == sorted((fault.line, fault.column) for fault in faults)
+
+
+def test_there_are_enough_broken_files_and_each_announces_a_fault() -> None:
+    assert len(BROKEN) >= 25
+    assert all(announced(path) for path in BROKEN)
+
+
+def test_an_invalid_mission_tells_every_fault_one_a_line() -> None:
+    path = HERE / "broken" / "many-at-once.xml"
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == len(caught.value.faults) == 8
+    assert lines[1] == f"{path}:19:28: no host is named 'bse' (did you mean 'base'?) (There is: base)"
+
+
+# ---------------------------------------------------------------------- files that are no mission at all
+def test_a_file_that_is_not_there_is_a_fault(tmp_path: Path) -> None:
+    [fault] = faults_of(tmp_path / "nowhere.xml")
+    assert (fault.line, fault.column) == (1, 1)
+    assert "No such file" in fault.message
+
+
+def test_a_folder_and_an_empty_file_are_faults(tmp_path: Path) -> None:
+    assert "is no file" in faults_of(tmp_path)[0].message
+    assert "no element found" in faults_in(tmp_path, "")[0].message
+
+
+def test_a_device_that_never_ends_is_refused_unread() -> None:
+    assert "is no file" in faults_of("/dev/zero")[0].message
+
+
+def test_a_huge_file_is_refused_by_its_size(tmp_path: Path) -> None:
+    [fault] = faults_in(tmp_path, b"<mission>" + b" " * MAX_BYTES)
+    assert "is larger than" in fault.message
+
+
+def test_too_many_and_too_deep_elements_are_refused_where_they_begin(tmp_path: Path) -> None:
+    [many] = faults_in(tmp_path, "<mission>" + "<host/>" * (MAX_ELEMENTS + 1) + "</mission>")
+    assert "more than" in many.message
+    [deep] = faults_in(tmp_path, "<mission>" + "<a>" * MAX_DEPTH + "</a>" * MAX_DEPTH + "</mission>")
+    assert (deep.line, deep.column) == (1, len("<mission>") + len("<a>") * (MAX_DEPTH - 1) + 1)
+
+
+def test_bytes_that_are_no_utf_8_are_refused_where_they_stand(tmp_path: Path) -> None:
+    [fault] = faults_in(tmp_path, b"<!-- one -->\n<!-- \xff -->\n<mission/>")
+    assert (fault.line, fault.column) == (2, 6)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "iso-8859-1"])
+def test_other_encodings_are_refused(tmp_path: Path, encoding: str) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n{SMALL.read_text()}'
+    [fault] = faults_in(tmp_path, text.encode(encoding))
+    assert "UTF-8" in fault.remedy
+
+
+def test_a_byte_order_mark_is_no_fault(tmp_path: Path) -> None:
+    assert read_text(tmp_path, b"\xef\xbb\xbf" + SMALL.read_bytes()).name == "small"
+
+
+@given(st.text())
+@settings(max_examples=60, deadline=None)
+def test_no_text_makes_the_reader_fail_in_another_way(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    file = tmp_path_factory.mktemp("any") / "m.xml"
+    file.write_bytes(text.encode(errors="replace"))
+    with pytest.raises(MissionInvalid):
+        read_mission(file)
+
+
+@given(st.integers(0), st.integers(0, 60), st.text(max_size=12))
+@settings(max_examples=150, deadline=None)
+def test_a_piece_of_a_good_file_replaced_by_anything_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, where: int, length: int, instead: str
+) -> None:
+    good = SMALL.read_text()
+    start = where % len(good)
+    file = tmp_path_factory.getbasetemp() / "replaced.xml"
+    file.write_bytes((good[:start] + instead + good[start + length :]).encode(errors="replace"))
+    try:
+        read = read_mission(file)
+    except MissionInvalid:
+        return
+    assert isinstance(read, MissionDescription)
+
+
+# ---------------------------------------------------------------------- places
+def test_columns_count_characters_not_bytes(tmp_path: Path) -> None:
+    [fault] = faults_in(tmp_path, changed(('<host name="base"', '<!-- äöü€ --><host nam="base"'), ("<!-- A", "<!-- Ä")))
+    line = changed(('<host name="base"', '<!-- äöü€ --><host nam="base"')).splitlines()[fault.line - 1]
+    assert line[fault.column - 1 :].startswith("nam=")
+
+
+def test_an_attribute_is_found_though_another_value_looks_like_it(tmp_path: Path) -> None:
+    text = changed(('<parameter name="threshold" value="12"/>', "<parameter value=' name=\"x\" ' name='no name'/>"))
+    [fault] = faults_in(tmp_path, text)
+    assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("name='no name'")
+
+
+# ---------------------------------------------------------------------- what a good file says
+def test_core_services_come_in_the_papers_order_whatever_order_they_are_written_in(tmp_path: Path) -> None:
+    services = re.findall(r"    <service .*\n", SMALL.read_text())
+    description = read_text(tmp_path, changed(("".join(services), "".join(reversed(services)))))
+    assert [service.type for service in description.core] == [
+        "nameserver",
+        "component_database",
+        "placer",
+        "creator",
+        "dependency_database",
+        "rc_manager",
+    ]
+
+
+def test_sections_and_what_stands_in_them_may_come_in_any_order(tmp_path: Path) -> None:
+    text = SMALL.read_text()
+    sections = re.findall(r"^  <(\w+)>.*?^  </\1>\n", text, re.MULTILINE | re.DOTALL)
+    assert len(sections) == 6
+    hosts = re.search(r"  <hosts>.*</hosts>\n", text, re.DOTALL)
+    room = re.search(r"    <room .*\n", text)
+    assert hosts is not None
+    assert room is not None
+    moved = text.replace(hosts[0], "").replace("</mission>", hosts[0] + "</mission>")
+    moved = moved.replace(room[0], "").replace("  </world>", room[0] + "  </world>")
+    ordered, other = read_text(tmp_path, text), read_text(tmp_path, moved)
+    assert ordered.model_dump() == other.model_dump()
+
+
+def test_what_is_left_out_gets_its_default() -> None:
+    description = read_mission(SMALL)
+    [watch1, _watch2] = description.behaviors
+    assert watch1.arc is not None
+    assert (watch1.arc.period_s, watch1.arc.packet_time_s, watch1.arc.maximum_runtime_s) == (0.05, 0.002, 0.0)
+    grabber = next(resource for resource in description.resources if resource.name == "grabber")
+    assert (grabber.driver, grabber.capacity, grabber.sharable, grabber.host) == ("simulated", 1.0, False, "")
+    assert description.components[0].name == "world"
+
+
+def test_a_simulated_resource_is_told_its_world_a_real_one_is_not(tmp_path: Path) -> None:
+    real = changed(('name="video1" connect-s="0.3"', 'name="video1" driver="modulator"'))
+    played = {resource.name: resource.parameters for resource in read_text(tmp_path, real).resources}
+    assert played["scout1"] == {"world": "world", "network_id": 1}
+    assert played["video1"] == {}
+
+
+@pytest.mark.parametrize(
+    ("written", "value"),
+    [
+        ("15", 15),
+        ("-0.5", -0.5),
+        ("1e-3", 0.001),
+        ("true", True),
+        ("false", False),
+        ("True", "True"),
+        ("NaN", "NaN"),
+        ("null", "null"),
+        ("[1, 2]", "[1, 2]"),
+        ("/dev/video0", "/dev/video0"),
+        ("", ""),
+    ],
+)
+def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(tmp_path: Path, written: str, value: object) -> None:
+    description = read_text(tmp_path, changed(('name="threshold" value="12"', f'name="threshold" value="{written}"')))
+    read = description.behaviors[0].parameters["threshold"]
+    assert (read, type(read)) == (value, type(value))
+
+
+def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
+    lidar = '<type name="lidar" class="backbone.component.component:Component" subsystem="resource_pool"/>\n  </types>'
+    description = read_text(
+        tmp_path,
+        changed(
+            ("  </types>", lidar),
+            ('<needs type="scout"/>', '<needs type="scout"/><needs type="lidar"/>'),
+            (
+                "  </resources>",
+                '<resource type="lidar" name="lidar1" driver="sick" features="long-range"/></resources>',
+            ),
+            ('minimum-runtime-s="5"/>', 'minimum-runtime-s="5"><wish type="lidar" features="long-range"/></arc>'),
+        ),
+    )
+    assert description.resources[-1].features == ["long-range"]
+    assert next(kind.needs for kind in description.types if kind.name == "drive") == ["scout", "lidar", "command_radio"]
+    assert description.behaviors[1].arc is not None
+    assert description.behaviors[1].arc.features == {"lidar": ("long-range",)}
+
+
+def test_a_creator_on_another_host_is_fine(tmp_path: Path) -> None:
+    description = read_text(
+        tmp_path,
+        changed(
+            ("  </hosts>", '    <host name="attic" address="robot-attic.example.org"/>\n  </hosts>'),
+            ("<core>", '<core><service type="creator" host="attic"/>'),
+        ),
+    )
+    assert [service.host for service in description.core if service.type == "creator"] == ["base", "attic"]
+
+
+def test_classes_on_other_machines_are_not_looked_for_here(tmp_path: Path) -> None:
+    text = changed(
+        ("  </hosts>", '    <host name="attic" address="192.0.2.7"/>\n  </hosts>'),
+        ("<core>", '<core><service type="creator" host="attic"/>'),
+        ('name="watch" class="backbone.component.component:Component"', 'name="watch" class="only_there.watch:Watch"'),
+    )
+    assert read_text(tmp_path, text).types[-1].class_path == "only_there.watch:Watch"
+
+
+def test_an_arc_whose_name_would_be_too_long_is_refused(tmp_path: Path) -> None:
+    long = "w" * (MAX_NAME_LENGTH - len("-drive") + 1)
+    [fault] = faults_in(tmp_path, changed(('name="watch2"', f'name="{long}"')))
+    assert "too long" in fault.message
+
+
+# ---------------------------------------------------------------------- the mission at the top of the project
+
+
+def test_the_projects_mission_is_that_of_iros_2001_figure_2() -> None:
+    """IROS 2001, figure 2: two behaviors and a console share three Scouts, one radio and one video frequency."""
+    mission = read_mission(MISSION_XML)
+    assert (mission.name, mission.priority) == ("iros2001", 10)
+    by_kind: dict[str, list[str]] = {}
+    for resource in mission.resources:
+        by_kind.setdefault(resource.type, []).append(resource.name)
+    assert by_kind == {
+        "command_radio": ["radio"],
+        "video_frequency": ["video1"],
+        "framegrabber": ["grabber"],
+        "scout": ["scout1", "scout2", "scout3"],
+    }
+    [surveillance] = mission.behaviors
+    assert surveillance.priority == 5
+    assert [(child.name, child.priority) for child in surveillance.children] == [
+        ("watch-scout1", 1),
+        ("watch-scout2", 1),
+    ]
+    arcs = [child.arc for child in surveillance.children]
+    assert [arc and (arc.kind, arc.minimum_runtime_s, arc.wish) for arc in arcs] == [
+        ("capture", 5.0, {"scout": "scout1"}),
+        ("capture", 5.0, {"scout": "scout2"}),
+    ]
+    assert [order.name for order in behavior_orders(mission)] == ["surveillance"]
+
+
+def test_the_projects_world_is_one_the_scout_model_understands() -> None:
+    [world] = read_mission(MISSION_XML).components
+    assert (world.type, world.name, world.host) == ("simulated_world", "world", "base")
+    described = msgspec.convert(world.parameters["world"], WorldDescription)
+    assert msgspec.json.decode(msgspec.json.encode(described)) == world.parameters["world"]
+    assert [(scout.name, scout.network_id) for scout in described.scouts] == [
+        ("scout1", 1),
+        ("scout2", 2),
+        ("scout3", 3),
+    ]
+    assert described.scouts[0].heading_rad == pytest.approx(math.pi / 2)
+    assert described.targets[0].path == [(0.0, 3.0), (9.0, 3.0)]
+
+
+def test_the_projects_target_rests_where_no_watching_scout_sees_it() -> None:
+    [world] = read_mission(MISSION_XML).components
+    described = msgspec.convert(world.parameters["world"], WorldDescription)
+    half_view_rad, radius_m = math.radians(20.0), 0.2
+    for scout in described.scouts[:2]:
+        for x_m, y_m in described.targets[0].path:
+            distance_m = math.hypot(x_m - scout.x_m, y_m - scout.y_m)
+            off_rad = abs(math.atan2(y_m - scout.y_m, x_m - scout.x_m) - scout.heading_rad)
+            assert off_rad - math.asin(radius_m / distance_m) > half_view_rad
