@@ -439,6 +439,8 @@ class ScheduleManager:
         maximum_s = max(minimum_s, maximum_s)
         if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
             return
+        if not 0 < minimum_s <= maximum_s < math.inf:
+            return  # no slice can be planned for such times; the old ones hold on
         arc.minimum_s, arc.maximum_s = minimum_s, maximum_s
         self._record(trace.runtime(self._now_s, name, minimum_s, maximum_s), "from the next slice on")
 

@@ -171,6 +171,15 @@ def test_other_run_times_hold_from_the_next_slice_on():
     assert bench.runs("a") == [(0, 5), (10, 16)]
 
 
+@pytest.mark.parametrize("run_s", [0.0, -1.0, float("nan"), float("inf")])
+def test_run_times_that_make_no_sense_change_nothing(run_s):
+    bench = Bench(manager(), unit("v"))
+    bench.tell(ask("a", "v"))
+    lines = len(bench.trace)
+    bench.tell(RuntimeChanged("a", run_s, run_s))
+    assert len(bench.trace) == lines
+
+
 def test_asking_again_for_the_same_changes_nothing():
     bench = Bench(manager(), unit("v"))
     bench.tell(ask("a", "v"))
