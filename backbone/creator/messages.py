@@ -21,6 +21,8 @@ class RestartPolicy(Message, frozen=True):
         back_off_most_s: Longest pause.
         limit: Restarts within the window after which the creator gives up.
         window_s: Length of the window, seconds of the machine.
+        after_good_end: True: also when it ended in good order (exit code 0) without its creator's order. Right for
+            services that must always be there; wrong for components that may end themselves.
     """
 
     restart: bool = True
@@ -28,6 +30,7 @@ class RestartPolicy(Message, frozen=True):
     back_off_most_s: float = 2.0
     limit: int = 5
     window_s: float = 30.0
+    after_good_end: bool = False
 
 
 class Spawn(Message, frozen=True):
@@ -176,6 +179,20 @@ class NotHere(Refusal):
 
     code = "creator.not_here"
     remedy = "Ask the placer where it runs."
+
+
+class AlreadyHere(Refusal):
+    """A component of this name runs, starts or ends under this creator, by another order."""
+
+    code = "creator.already_here"
+    remedy = "Choose another name, or end the component that has it first."
+
+
+class NotThePlacer(Refusal):
+    """Processes are started and ended by the placer alone, so that its picture stays true."""
+
+    code = "creator.not_the_placer"
+    remedy = "Ask the placer to start or stop the component."
 
 
 CreatorQuestion = Spawn | EndProcess | ListProcesses

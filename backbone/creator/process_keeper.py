@@ -1,0 +1,373 @@
+"""Keeps processes: joins supervision, which decides, with a zygote, which forks, and a bus, which tells readiness.
+
+Used by creators for what the placer orders and by the launcher for the core services.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any, Protocol, assert_never
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.component.messages import Stop, Stopping
+from backbone.creator.messages import (
+    EndProcess,
+    NotHere,
+    ProcessEnded,
+    ProcessFell,
+    ProcessState,
+    RestartPolicy,
+    Spawn,
+    StartFailed,
+)
+from backbone.creator.supervision import (
+    AskToStop,
+    Fork,
+    Instruction,
+    Phase,
+    ReportEnded,
+    ReportFell,
+    ReportLeft,
+    ReportReady,
+    ReportStartFailed,
+    Signal,
+    Supervision,
+    WakeAt,
+)
+from backbone.creator.zygote import NoProcess
+from backbone.creator.zygote_process import log_path
+from backbone.errors import BackboneError
+from backbone.naming import component_of
+
+log = logging.getLogger(__name__)
+
+LAST_LINES = 20
+_LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
+HUB_READY_S = 20.0  # chosen: like Spawn.ready_within_s
+OVERLAP_S = 0.3  # chosen: ten times what a component that obeys takes; who takes longer holds nobody up
+_DEFAULTS = EndProcess("")
+
+
+class Forks(Protocol):
+    """What a keeper needs of a zygote; see ``Zygote``."""
+
+    on_exit: Callable[[int, int], None]
+    on_lost: Callable[[], None]
+
+    async def fork(self, launch: Launch) -> int:
+        """Have the component running and return its pid, or raise ``NoProcess``."""
+
+    def kill(self, pid: int, number: signal.Signals) -> None:
+        """Send the signal to everything that belongs to the component."""
+
+    async def close(self) -> None:
+        """End everything it forked, and itself."""
+
+
+class ProcessKeeper:
+    """Starts, watches, restarts and ends processes. Use it inside one event loop.
+
+    Args:
+        zygote: Forks the processes; the keeper takes over its ``on_exit``, and leaves its closing to the caller.
+        clock: For back-off and deadlines, which are in seconds of the machine; None: the machine's own.
+
+    Attributes:
+        on_fell: Called when a process ended unexpectedly.
+        on_changed: Called after every change of ``processes()``.
+        on_bug: Called with what must not happen.
+    """
+
+    def __init__(self, zygote: Forks, clock: Clock | None = None) -> None:
+        self.on_fell: Callable[[ProcessFell], None] = _ignore
+        self.on_changed: Callable[[], None] = lambda: None
+        self.on_bug: Callable[[BaseException], None] = _report_to_loop
+        self._zygote, self._clock = zygote, clock or MissionClock.started_now()
+        self._bus: Bus | None = None
+        self._supervision = Supervision()
+        self._kept: dict[str, _Kept] = {}
+        self._failures: dict[str, StartFailed] = {}
+        self._starting: dict[str, list[asyncio.Future[int]]] = {}
+        self._ending: dict[str, list[asyncio.Future[ProcessEnded]]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._alarm: asyncio.Task[None] | None = None
+        self._is_closing = False
+        zygote.on_exit = lambda pid, returncode: self._do(self._supervision.exited(pid, returncode, self._now_s()))
+
+    def use(self, bus: Bus) -> None:
+        """Hear of readiness, and ask processes to stop, over this bus from now on."""
+        self._bus = bus
+        bus.watch_alive("*/*", self._token_changed)
+
+    # Start
+    async def start(
+        self, launch: Launch, policy: RestartPolicy, ready_within_s: float, order: Spawn | None = None
+    ) -> int:
+        """Have the component running and return its pid when it is ready.
+
+        Args:
+            policy: What to do when it ends unexpectedly later.
+            ready_within_s: Seconds of the machine until its liveliness token must stand, at every start.
+            order: What ``processes()`` shows as the order; None: one made of the other arguments.
+
+        Raises:
+            StartFailed: It never became ready; nothing of it is left.
+            AlreadyHere: One of this name runs, starts or ends here.
+        """
+        self._begin(launch, order or _as_spawn(launch, policy, ready_within_s), is_hub=False)
+        return await self._readiness(launch.name)
+
+    async def start_hub(self, launch: Launch, policy: RestartPolicy) -> int:
+        """Order the process that carries the bus and return its pid; its readiness shows once ``use`` was called.
+
+        Raises:
+            StartFailed: There is no process.
+            AlreadyHere: One of this name runs, starts or ends here.
+        """
+        forked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        self._begin(launch, _as_spawn(launch, policy, HUB_READY_S), is_hub=True, forked=forked)
+        return await forked
+
+    async def wait_ready(self, name: str, within_s: float) -> int:
+        """Return the pid of a started component as soon as it is ready, at once if it is.
+
+        Raises:
+            StartFailed: It ended, or was not ready within that many seconds of the machine.
+            NotHere: Nothing of this name was started.
+        """
+        one = self._supervision.find(name)
+        if one is None:
+            raise self._failures.get(name) or NotHere(f"no {name} here", name=name)
+        if one.end is not None or one.phase is Phase.GIVEN_UP:
+            raise self._start_failed(name, f"is {one.phase}; {one.last_end}")
+        if one.phase is Phase.READY:
+            return one.pid
+        try:
+            async with asyncio.timeout(within_s):
+                return await self._readiness(name)
+        except TimeoutError:
+            raise self._start_failed(name, f"was not ready within {within_s:g} s") from None
+
+    # End
+    async def end(
+        self, name: str, reason: str = "", ask_s: float = _DEFAULTS.ask_s, term_s: float = _DEFAULTS.term_s
+    ) -> ProcessEnded:
+        """End the component's whole process tree: ask, then SIGTERM, then SIGKILL; return when nothing of it is left.
+
+        Args:
+            reason: For the component's record.
+            ask_s: Seconds of the machine it has after being asked.
+            term_s: Seconds it has after SIGTERM.
+
+        Raises:
+            NotHere: Nothing of this name is here.
+        """
+        instructions = self._supervision.end_ordered(name, ask_s, term_s, self._now_s())
+        self._kept[name].end_reason = reason
+        ended: asyncio.Future[ProcessEnded] = asyncio.get_running_loop().create_future()
+        self._ending.setdefault(name, []).append(ended)
+        self._do(instructions)
+        return await ended
+
+    async def close(self) -> list[ProcessEnded]:
+        """End everything, the last started first, and return how each ended. Nothing can be started afterwards.
+
+        Who was started before another is asked only after the other has ended, or has had a moment to.
+        """
+        self._is_closing = True
+        ends = []
+        for name in reversed([one.name for one in self._supervision]):
+            if self._supervision.find(name) is not None:
+                ends.append(asyncio.create_task(self.end(name, "everything ends"), name=f"end {name}"))
+                await asyncio.wait(ends[-1:], timeout=OVERLAP_S)
+        ended = await asyncio.gather(*ends)
+        tasks = list(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        return ended
+
+    # Picture
+    def order(self, name: str) -> Spawn | None:
+        """Return the order of what is kept under this name, None if nothing is."""
+        kept = self._kept.get(name)
+        return kept.order if kept else None
+
+    def processes(self) -> list[ProcessState]:
+        """Return what is kept here, in the order of start."""
+        return [
+            ProcessState(self._kept[one.name].order, one.pid, one.restarts, one.phase is Phase.GIVEN_UP, one.last_end)
+            for one in self._supervision
+        ]
+
+    # Events
+    def _begin(
+        self,
+        launch: Launch,
+        order: Spawn,
+        *,
+        is_hub: bool,
+        forked: asyncio.Future[int] | None = None,
+    ) -> None:
+        name = launch.name
+        if self._is_closing:
+            raise StartFailed(f"{name}: everything here is being ended", name=name)
+        instructions = self._supervision.start_ordered(
+            name, order.policy, order.ready_within_s, self._now_s(), asked_by_signal=is_hub
+        )
+        self._kept[name] = _Kept(launch, order)
+        self._failures.pop(name, None)
+        self._do(instructions, forked)
+
+    async def _readiness(self, name: str) -> int:
+        ready: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        self._starting.setdefault(name, []).append(ready)
+        return await ready
+
+    def _token_changed(self, address: str, stands: bool) -> None:
+        name = component_of(address)
+        kept = self._kept.get(name)
+        if stands and kept is not None and kept.launch.address == address:
+            self._do(self._supervision.ready(name))
+
+    async def _fork(self, launch: Launch, forked: asyncio.Future[int] | None) -> None:
+        name = launch.name
+        try:
+            pid = await self._zygote.fork(launch)
+        except NoProcess as error:
+            self._do(self._supervision.fork_failed(name, str(error), self._now_s()))
+            if forked is not None and not forked.done():
+                forked.set_exception(self._failures[name])
+            return
+        if forked is not None and not forked.done():
+            forked.set_result(pid)
+        self._do(self._supervision.forked(name, pid, self._now_s()))
+
+    async def _ask_to_stop(self, kept: _Kept, within_s: float) -> None:
+        try:
+            if self._bus is None:
+                raise NoProcess("there is no bus to ask on")
+            await self._bus.ask(kept.launch.address, Stop(kept.end_reason), Stopping, within_s=within_s)
+        except BackboneError as error:
+            log.info("%s could not be asked to stop: %s", kept.launch.name, error)
+            self._do(self._supervision.ask_failed(kept.launch.name, self._now_s()))
+
+    async def _ring(self, at_s: float) -> None:
+        await self._clock.sleep_until_s(at_s * self._clock.rate)
+        self._do(self._supervision.woken(self._now_s()))
+
+    # Instructions
+    def _do(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
+        for instruction in instructions:
+            match instruction:
+                case Fork(name=name):
+                    self._task(self._fork(self._kept[name].launch, forked), f"fork {name}")
+                case AskToStop(name=name, within_s=within_s):
+                    self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
+                case Signal(name=name, pid=pid, number=number):
+                    log.info("%s to %s, pid %d", number.name, name, pid)
+                    self._zygote.kill(pid, number)
+                case ReportReady(name=name, pid=pid):
+                    _settle(self._starting.pop(name, []), pid)
+                case ReportStartFailed(name=name, how=how):
+                    failure = self._failures[name] = self._start_failed(name, how)
+                    _settle(self._starting.pop(name, []), failure)
+                case ReportEnded(name=name, by=by, exit_code=exit_code):
+                    _settle(self._starting.pop(name, []), self._start_failed(name, "was ended"))
+                    _settle(self._ending.pop(name, []), ProcessEnded(name, by, exit_code))
+                case ReportLeft(name=name):
+                    log.info("%s ended by itself in good order", name)
+                    _settle(self._starting.pop(name, []), self._start_failed(name, "ended by itself"))
+                case ReportFell(name=name, how=how, restart_in_s=restart_in_s):
+                    if restart_in_s < 0:
+                        _settle(self._starting.pop(name, []), self._start_failed(name, f"{how}; given up"))
+                    self.on_fell(ProcessFell(name, how, restart_in_s, self._last_lines(name)))
+                case WakeAt(at_s=at_s):
+                    self._set_alarm(at_s)
+                case _:
+                    assert_never(instruction)
+        if any(not isinstance(each, WakeAt | AskToStop | Signal) for each in instructions):
+            self._kept = {one.name: self._kept[one.name] for one in self._supervision}
+            self.on_changed()
+
+    def _set_alarm(self, at_s: float) -> None:
+        if self._alarm is not None and self._alarm is not asyncio.current_task():
+            self._alarm.cancel()
+        self._alarm = self._task(self._ring(at_s), "supervision's alarm")
+
+    def _task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+        task = asyncio.create_task(work, name=name)
+        self._tasks.add(task)
+        task.add_done_callback(self._task_done)
+        return task
+
+    def _task_done(self, task: asyncio.Task[None]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (bug := task.exception()) is not None:
+            self.on_bug(bug)
+
+    def _now_s(self) -> float:
+        return self._clock.now_s() / self._clock.rate
+
+    def _start_failed(self, name: str, how: str) -> StartFailed:
+        return StartFailed("\n".join([f"{name}: {how}", *self._last_lines(name)]), name=name, how=how)
+
+    def _last_lines(self, name: str) -> list[str]:
+        kept = self._kept.get(name)
+        return last_lines(kept.launch.run_directory, name) if kept is not None and kept.launch.run_directory else []
+
+
+@dataclass
+class _Kept:
+    """What the keeper remembers of a name while it is supervised."""
+
+    launch: Launch
+    order: Spawn
+    end_reason: str = ""
+
+
+def last_lines(run_directory: str, name: str) -> list[str]:
+    """Return the end of a component's log, at most ``LAST_LINES`` lines; empty if there is none."""
+    try:
+        with log_path(run_directory, name).open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - _LAST_BYTES))
+            return file.read().decode(errors="replace").splitlines()[-LAST_LINES:]
+    except FileNotFoundError:
+        return []
+
+
+def _as_spawn(launch: Launch, policy: RestartPolicy, ready_within_s: float) -> Spawn:
+    return Spawn(
+        launch.subsystem,
+        launch.name,
+        launch.type,
+        launch.class_path,
+        launch.parameters,
+        launch.requester,
+        policy,
+        ready_within_s,
+    )
+
+
+def _settle(waiting: list[asyncio.Future[Any]], outcome: object) -> None:
+    for future in waiting:
+        if future.done():  # whoever waited was cancelled
+            continue
+        if isinstance(outcome, BaseException):
+            future.set_exception(outcome)
+        else:
+            future.set_result(outcome)
+
+
+def _ignore(_fell: ProcessFell) -> None:
+    """Tell nobody."""
+
+
+def _report_to_loop(bug: BaseException) -> None:
+    asyncio.get_running_loop().call_exception_handler({"message": "bug in a process keeper", "exception": bug})

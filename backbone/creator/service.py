@@ -1,0 +1,170 @@
+"""The creator: starts, watches, restarts and ends processes on its host, for the placer.
+
+Its own death, by whatever signal, ends everything it started (see ``zygote_process``), so a creator
+that comes up always begins with nothing running and never fights over names with its predecessor.
+
+Source: S000, "creator"; RAM 2002, "Backbone".
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import msgspec
+import psutil
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.creator.messages import (
+    AlreadyHere,
+    CreatorQuestion,
+    EndProcess,
+    HostLoad,
+    ListProcesses,
+    NotThePlacer,
+    Processes,
+    ProcessFell,
+    Spawn,
+    Spawned,
+)
+from backbone.creator.process_keeper import Forks, ProcessKeeper
+from backbone.creator.zygote import Zygote
+from backbone.keys import Conversation
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.wire import Envelope, Message, UnknownMessage
+
+LOAD_EACH_S = 1.0  # HostLoad: "once a second", of the machine
+
+
+class CreatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of a creator.
+
+    Attributes:
+        tags: What this host has, for the placer's choice.
+        preload: Modules its zygote imports at its start, so that components need not.
+    """
+
+    tags: list[str] = []
+    preload: list[str] = []
+
+
+class Creator(Component[CreatorParameters]):
+    """Runs the placer's components on this host."""
+
+    parameters_type = CreatorParameters
+    accepts = CreatorQuestion
+
+    _forked: ClassVar[dict[str, Zygote]] = {}
+    """The zygote ``before_bus`` forked, until the creator of that address takes it over."""
+
+    @classmethod
+    def before_bus(cls, launch: Launch) -> None:
+        """Fork the zygote while this process still may."""
+        preload = launch.parameters.get("preload", [])
+        if isinstance(preload, list):  # anything else is refused when the parameters are checked
+            cls._forked[launch.address] = Zygote.fork_now(preload=[str(module) for module in preload])
+
+    _zygote: Forks
+    _keeper: ProcessKeeper
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock, zygote: Forks | None = None) -> None:
+        super().__init__(launch, bus, clock)
+        self._given = zygote or self._forked.pop(launch.address, None)
+        self._load = (0.0, 0.0)
+        self._spawned = self._ended = self._fell = 0
+
+    async def connect(self) -> None:
+        """Watch for readiness; get a zygote if this process could not fork one."""
+        self._zygote = self._given or await Zygote.spawn_fresh(preload=self.parameters.preload)
+        self._zygote.on_lost = lambda: self.tell(self.name, "lost its zygote and with it everything it ran")
+        self._keeper = ProcessKeeper(self._zygote, self.clock)
+        self._keeper.on_fell = self._component_fell
+        self._keeper.on_changed = self._publish_load
+        self._keeper.on_bug = self.fail
+        self._keeper.use(self.bus)
+        self._measure()
+
+    async def serve(self) -> None:
+        """Publish the host's load."""
+        while True:
+            self._measure()
+            self._publish_load()
+            await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer ``Spawn`` and ``EndProcess`` for the placer, ``ListProcesses`` for everybody."""
+        question: Message = asked.body
+        match question:
+            case Spawn():
+                self._refuse_strangers(asked)
+                return await self._spawn(question)
+            case EndProcess(name=name, reason=reason, ask_s=ask_s, term_s=term_s):
+                self._refuse_strangers(asked)
+                ended = await self._keeper.end(name, reason, ask_s, term_s)
+                self._ended += 1
+                self.tell(name, f"was ended by {ended.by}: {reason}")
+                return ended
+            case ListProcesses():
+                return Processes(self.launch.host, self.parameters.tags, self._keeper.processes())
+            case other:
+                raise UnknownMessage(f"{type(other).__name__} is not answered here")
+
+    async def drain(self) -> None:
+        """End all it runs, the last started first, then the zygote."""
+        await self._keeper.close()
+        await self._zygote.close()
+
+    def parameters_changed(self) -> None:
+        """Tell the placer of new tags at once."""
+        self._publish_load()
+
+    def statistics(self) -> dict[str, float]:
+        """Return what it did since its start."""
+        return {
+            "components": float(self._count()),
+            "spawned": float(self._spawned),
+            "ended": float(self._ended),
+            "fell": float(self._fell),
+        }
+
+    async def _spawn(self, order: Spawn) -> Spawned:
+        launch = msgspec.structs.replace(
+            self.launch,
+            subsystem=order.subsystem,
+            name=order.name,
+            type=order.type,
+            class_path=order.class_path,
+            parameters=order.parameters,
+            requester=order.requester,
+        )
+        try:
+            pid = await self._keeper.start(launch, order.policy, order.ready_within_s, order)
+        except AlreadyHere:
+            if self._keeper.order(order.name) != order:
+                raise
+            pid = await self._keeper.wait_ready(order.name, order.ready_within_s)  # the same order, asked again
+        self._spawned += 1
+        self.tell(order.name, f"is ready, pid {pid}, ordered by {order.requester or PLACER}")
+        return Spawned(launch.address, pid)
+
+    def _refuse_strangers(self, asked: Envelope[Any]) -> None:
+        if asked.source != PLACER:
+            raise NotThePlacer(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
+
+    def _component_fell(self, fell: ProcessFell) -> None:
+        self._fell += 1
+        then = f"starts again in {fell.restart_in_s:g} s" if fell.restart_in_s >= 0 else "is given up"
+        self.tell(fell.name, f"fell, {fell.how}; {then}")
+        self.bus.publish(self.address, Conversation.EVENTS, fell)
+
+    def _measure(self) -> None:
+        self._load = (psutil.cpu_percent() / 100.0, psutil.virtual_memory().percent / 100.0)
+
+    def _publish_load(self) -> None:
+        cpu, memory = self._load
+        load = HostLoad(self.launch.host, self.parameters.tags, cpu, memory, psutil.cpu_count() or 1, self._count())
+        self.bus.publish(self.address, Conversation.TELEMETRY, load)
+
+    def _count(self) -> int:
+        return sum(not process.given_up for process in self._keeper.processes())

@@ -1,0 +1,281 @@
+"""A process's handle on its zygote: order components, hear of their ends, send them signals.
+
+There are two ways to get one. ``fork_now`` copies the present process, which must not have opened a
+bus yet; it takes about a millisecond and is a creator's way (``Component.before_bus``). ``spawn_fresh``
+starts an interpreter and is the launcher's. A zygote that was killed is replaced, at the next order, by
+a fresh one; everything it had forked died with it and is told as killed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Callable, Iterable
+
+import msgspec
+
+from backbone.component.launch import Launch
+from backbone.creator import process_table
+from backbone.creator.zygote_process import (
+    LENGTH,
+    ZYGOTE_GRACE_S,
+    Answer,
+    Exited,
+    Fork,
+    Forked,
+    ForkFailed,
+    Kill,
+    ZygoteSettings,
+    frame,
+    log_path,
+    serve,
+)
+from backbone.errors import BackboneError
+
+log = logging.getLogger(__name__)
+
+FORK_TRIES = 2  # chosen: a zygote killed while it forks is replaced once; twice in a row is no accident
+_FRESH = "from backbone.creator.zygote_process import main; main()"
+_answer_decoder = msgspec.msgpack.Decoder(Answer)
+
+
+class NoProcess(BackboneError):
+    """No process could be had: the system refused one, or the zygote was killed again and again."""
+
+
+class Zygote:
+    """A zygote that serves this process. Use it inside one event loop.
+
+    Attributes:
+        on_exit: Called with pid and returncode (a signal's number is negative) when nothing is left of a
+            component; never before ``fork`` returned its pid.
+        on_lost: Called when the zygote itself died unexpectedly, before the ends of its components are told.
+    """
+
+    def __init__(self, body: _Body, settings: ZygoteSettings) -> None:
+        self.on_exit: Callable[[int, int], None] = lambda _pid, _returncode: None
+        self.on_lost: Callable[[], None] = lambda: None
+        self._settings = settings
+        self._body = body
+        self._live: set[int] = set()
+        self._is_closing = False
+        self._renewing = asyncio.Lock()
+        self._reading: asyncio.Task[None] | None = None
+
+    @classmethod
+    def fork_now(cls, *, preload: Iterable[str] = ()) -> Zygote:
+        """Return a zygote forked from this process as it is.
+
+        Not: after any bus was open in this process, or while other threads run in it.
+
+        Args:
+            preload: Modules the zygote imports before the first order.
+        """
+        settings = ZygoteSettings(os.getpid(), "", tuple(preload))
+        ours, its = socket.socketpair()
+        pid = os.fork()
+        if pid == 0:
+            ours.close()
+            serve(its, settings)
+        its.close()
+        return cls(_Body(pid, ours, lambda: os.waitpid(pid, 0)), settings)
+
+    @classmethod
+    async def spawn_fresh(cls, *, run_directory: str = "", preload: Iterable[str] = ()) -> Zygote:
+        """Return a zygote in an interpreter of its own, which may still be importing.
+
+        Args:
+            run_directory: Folder the zygote removes at its end, also when this process is killed; empty: none.
+            preload: Modules the zygote imports before the first order.
+        """
+        settings = ZygoteSettings(os.getpid(), run_directory, tuple(preload), tuple(sys.path))
+        return cls(_spawn(settings), settings)
+
+    @property
+    def pid(self) -> int:
+        """The zygote's process."""
+        return self._body.pid
+
+    async def fork(self, launch: Launch) -> int:
+        """Have the component running and return its pid.
+
+        Raises:
+            NoProcess: There is none, and there will be none by this order.
+        """
+        for _ in range(FORK_TRIES):
+            body = await self._living_body()
+            answered: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+            body.pending.append(answered)
+            body.send(Fork(launch))
+            try:
+                return await answered
+            except _Lost:
+                continue
+        raise NoProcess(f"the zygote was killed {FORK_TRIES} times while it forked {launch.name}")
+
+    def kill(self, pid: int, number: signal.Signals) -> None:
+        """Send the signal to everything that belongs to the component; nothing if it has ended."""
+        self._body.send(Kill(pid, number))
+
+    async def close(self) -> None:
+        """End the zygote and everything it forked; when this returns, nothing of it is left. Idempotent."""
+        self._is_closing = True
+        async with self._renewing:
+            self._body.hang_up()
+            if self._reading is not None:
+                await self._reading
+            await self._body.wait_gone()
+
+    async def _living_body(self) -> _Body:
+        async with self._renewing:
+            if self._is_closing:
+                raise NoProcess("the zygote is being closed")
+            if self._reading is not None and self._reading.done():
+                await self._reading
+                log.warning("a fresh zygote replaces the one that was lost")
+                self._body, self._reading = _spawn(_fresh(self._settings)), None
+            if self._reading is None:
+                self._reading = asyncio.create_task(self._read(self._body), name="zygote answers")
+            return self._body
+
+    async def _read(self, body: _Body) -> None:
+        """Pass on what the zygote tells until it ends."""
+        reader = await body.connect()
+        while (answer := await _receive(reader)) is not None:
+            match answer:
+                case Forked(pid=pid):
+                    self._live.add(pid)
+                    _settle(body.pending.popleft(), pid)
+                case ForkFailed(why=why):
+                    _settle(body.pending.popleft(), NoProcess(why))
+                case Exited(pid=pid, returncode=returncode):
+                    self._live.discard(pid)
+                    self._tell_exit(pid, returncode)
+        if not self._is_closing:
+            log.error("zygote %d is lost", body.pid)
+            self.on_lost()
+        await self._end_rest()
+        await body.wait_gone()
+        while body.pending:
+            _settle(body.pending.popleft(), _Lost())
+
+    async def _end_rest(self) -> None:
+        """See to it that what a zygote left is gone, and tell of it.
+
+        The components die with their zygote; what they started themselves is swept here.
+        """
+        lost, self._live = sorted(self._live), set()
+        process_table.send(lost, signal.SIGKILL)
+        await process_table.wait_gone(lost)
+        for pid in lost:
+            table = process_table.read_table()
+            zygotes = process_table.zygotes_of(table, pid)
+            try:
+                async with asyncio.timeout(ZYGOTE_GRACE_S):
+                    await process_table.wait_gone(zygotes)
+            except TimeoutError:
+                process_table.send(zygotes, signal.SIGKILL)
+            while left := process_table.remains(process_table.read_table(), pid):
+                process_table.send(left, signal.SIGKILL)
+                await process_table.wait_gone(left)
+            self._tell_exit(pid, -signal.SIGKILL)
+
+    def _tell_exit(self, pid: int, returncode: int) -> None:
+        # Later, because whoever awaits ``fork`` learns the pid only in the next round of the loop.
+        asyncio.get_running_loop().call_soon(lambda: self.on_exit(pid, returncode))
+
+
+class _Lost(Exception):
+    """The zygote died before it answered."""
+
+
+class _Body:
+    """One zygote process and the channel to it."""
+
+    def __init__(self, pid: int, channel: socket.socket, reap: Callable[[], object]) -> None:
+        self.pid, self._reap = pid, reap
+        self.pending: deque[asyncio.Future[int]] = deque()
+        self._channel = channel
+        self._unsent = bytearray()
+        self._writer: asyncio.StreamWriter | None = None
+        self._is_reaped = False
+
+    async def connect(self) -> asyncio.StreamReader:
+        """Send what was said so far and return where the answers come."""
+        reader, self._writer = await asyncio.open_unix_connection(sock=self._channel)
+        self._writer.write(bytes(self._unsent))
+        self._unsent.clear()
+        return reader
+
+    def send(self, order: Fork | Kill) -> None:
+        if self._writer is None:
+            self._unsent += frame(order)
+        elif not self._writer.is_closing():
+            self._writer.write(frame(order))
+
+    def hang_up(self) -> None:
+        """Tell the zygote to end; its last answers can still be read."""
+        if self._writer is None:
+            self._channel.close()
+        elif self._writer.can_write_eof() and not self._writer.is_closing():
+            self._writer.write_eof()
+
+    async def wait_gone(self) -> None:
+        """Return when the zygote has ended and was reaped."""
+        if not self._is_reaped:
+            await process_table.wait_gone([self.pid])
+            self._is_reaped = True
+            self._reap()
+        if self._writer is not None:
+            self._writer.close()
+
+
+async def _receive(reader: asyncio.StreamReader) -> Answer | None:
+    """Return the next answer; None after the last."""
+    try:
+        length: int = LENGTH.unpack(await reader.readexactly(LENGTH.size))[0]
+        answer: Answer = _answer_decoder.decode(await reader.readexactly(length))
+    except (asyncio.IncompleteReadError, ConnectionError):
+        return None
+    return answer
+
+
+def _spawn(settings: ZygoteSettings) -> _Body:
+    ours, its = socket.socketpair()
+    with its:
+        output = None
+        if settings.run_directory:
+            path = log_path(settings.run_directory, "zygote")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            output = path.open("ab")
+        process = subprocess.Popen(  # noqa: S603  our own interpreter, our own program
+            [sys.executable, "-c", _FRESH, str(its.fileno()), msgspec.json.encode(settings).decode()],
+            pass_fds=[its.fileno()],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            start_new_session=True,
+        )
+        if output is not None:
+            output.close()
+    return _Body(process.pid, ours, process.wait)
+
+
+def _fresh(settings: ZygoteSettings) -> ZygoteSettings:
+    """Return the settings for a fresh interpreter in place of whatever kind of zygote there was."""
+    return msgspec.structs.replace(settings, import_path=tuple(sys.path))
+
+
+def _settle(answered: asyncio.Future[int], outcome: int | Exception) -> None:
+    if answered.done():  # whoever ordered it was cancelled
+        return
+    if isinstance(outcome, Exception):
+        answered.set_exception(outcome)
+    else:
+        answered.set_result(outcome)

@@ -1,0 +1,362 @@
+"""The zygote: a process that has imported what components need and forks one component per order.
+
+It never opens a bus, because a process that once did cannot fork components (the bus's threads are
+gone in the child), and it has one thread and no event loop, because a child inherits what they held.
+
+What holds, whatever is killed:
+
+* A component dies with its zygote (the kernel's parent-death signal).
+* The end of a component is told only when nothing of it is left: its session is swept, and a zygote
+  it had of its own (a creator's) has ended its children first.
+* When the zygote's parent is gone, by whatever cause, everything the zygote forked is told to end,
+  then killed, descendants included, and the mission's folder goes too. Then the zygote ends.
+"""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import logging
+import os
+import selectors
+import shutil
+import signal
+import socket
+import struct
+import sys
+import time
+import traceback
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn, assert_never
+
+import msgspec
+
+from backbone.component.launch import Launch
+from backbone.component.process import EXIT_BUG, run_process
+from backbone.creator import process_table
+from backbone.wire import Message
+
+log = logging.getLogger(__name__)
+
+GRACE_S = 0.8  # chosen: two zygotes, one below the other, end everything within 2 s, the promise is 3 s
+ZYGOTE_GRACE_S = 1.2  # chosen: a zygote below this one needs GRACE_S and a moment to reap
+LENGTH = struct.Struct("!I")
+_LEFT_TO_THE_PARENT = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
+"""Whoever sends these to all processes of a terminal or service sends them to the parent too, and that ends us."""
+
+
+class Fork(Message, frozen=True):
+    """Become this component. Answered by ``Forked`` or ``ForkFailed``, in the order of asking."""
+
+    launch: Launch
+
+
+class Kill(Message, frozen=True):
+    """Send the signal to everything that belongs to the component."""
+
+    pid: int
+    number: int
+
+
+class Forked(Message, frozen=True):
+    """It runs under this pid."""
+
+    pid: int
+
+
+class ForkFailed(Message, frozen=True):
+    """The system did not give another process."""
+
+    why: str
+
+
+class Exited(Message, frozen=True):
+    """Nothing is left of the component.
+
+    Attributes:
+        pid: Its process.
+        returncode: Exit code, or the number of the signal that killed it, negative.
+    """
+
+    pid: int
+    returncode: int
+
+
+class ZygoteSettings(msgspec.Struct, frozen=True):
+    """What a zygote is told at its start.
+
+    Attributes:
+        parent: Pid of the process it serves.
+        run_directory: Folder it removes at its end; empty: none.
+        preload: Modules imported before the first order.
+        import_path: ``sys.path`` of the components.
+    """
+
+    parent: int
+    run_directory: str = ""
+    preload: tuple[str, ...] = ()
+    import_path: tuple[str, ...] = ()
+
+
+Order = Fork | Kill
+Answer = Forked | ForkFailed | Exited
+
+_order_decoder = msgspec.msgpack.Decoder(Order)
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def frame(message: Message) -> bytes:
+    """Return the message with its length in front."""
+    body = _encode(message)
+    return LENGTH.pack(len(body)) + body
+
+
+def serve(channel: socket.socket, settings: ZygoteSettings) -> NoReturn:
+    """Be the zygote of ``settings.parent``, which holds the other end of the channel, then end the process."""
+    code = EXIT_BUG
+    try:
+        _ZygoteProcess(channel, settings).run()
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)  # no cleaning up of what was inherited from the parent
+
+
+def main() -> NoReturn:
+    """Be the zygote in a fresh interpreter: arguments are the channel's descriptor and the settings."""
+    settings = msgspec.json.decode(sys.argv[2], type=ZygoteSettings)
+    serve(socket.socket(fileno=int(sys.argv[1])), settings)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sweep:
+    """A component that has ended and of which something may be left.
+
+    Attributes:
+        zygotes_until_s: Until when zygotes it had may end by themselves; None: they were killed.
+    """
+
+    returncode: int
+    zygotes_until_s: float | None
+
+
+class _ZygoteProcess:
+    def __init__(self, channel: socket.socket, settings: ZygoteSettings) -> None:
+        self._channel, self._settings, self._own_pid = channel, settings, os.getpid()
+        self._received = bytearray()
+        self._live: set[int] = set()
+        self._sweeps: dict[int, _Sweep] = {}
+        self._is_told_to_end = False
+        self._signals, self._signals_in = socket.socketpair()
+        self._selector = selectors.DefaultSelector()
+
+    def run(self) -> None:
+        self._prepare()
+        while not self._is_told_to_end:
+            ends_s = [sweep.zygotes_until_s for sweep in self._sweeps.values() if sweep.zygotes_until_s is not None]
+            until_s = min(ends_s, default=None)
+            for key, _ in self._selector.select(None if until_s is None else max(0.0, until_s - time.monotonic())):
+                if key.fileobj is self._channel:
+                    self._read_orders()
+                else:
+                    self._signals.recv(1 << 12)
+            self._reap()
+            self._sweep()
+        self._end_all()
+
+    def _prepare(self) -> None:
+        if os.getsid(0) != self._own_pid:
+            os.setsid()  # Ctrl-C at a terminal is for the launcher; it tells us
+        process_table.adopt_orphans()
+        process_table.set_title(process_table.zygote_title(self._settings.parent))
+        self._signals.setblocking(False)
+        self._signals_in.setblocking(False)
+        signal.set_wakeup_fd(self._signals_in.fileno(), warn_on_full_buffer=False)
+        signal.signal(signal.SIGCHLD, _only_wake)
+        for number in _LEFT_TO_THE_PARENT:
+            signal.signal(number, signal.SIG_IGN)
+        if self._settings.import_path:
+            sys.path[:] = self._settings.import_path
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a second thread must not be there at a fork
+        for module in self._settings.preload:
+            try:
+                importlib.import_module(module)
+            except ImportError as error:  # the component that needs it will say so itself
+                log.warning("not preloaded: %s", error)
+        gc.collect()
+        gc.freeze()  # the collector would write into pages the components share
+        self._channel.setblocking(False)
+        self._selector.register(self._channel, selectors.EVENT_READ)
+        self._selector.register(self._signals, selectors.EVENT_READ)
+
+    # Orders
+    def _read_orders(self) -> None:
+        try:
+            received = self._channel.recv(1 << 16)
+        except BlockingIOError:
+            return
+        except ConnectionResetError:
+            received = b""
+        if not received:
+            self._is_told_to_end = True
+            return
+        self._received += received
+        while len(self._received) >= LENGTH.size:
+            end = LENGTH.size + LENGTH.unpack_from(self._received)[0]
+            if len(self._received) < end:
+                return
+            order = _order_decoder.decode(memoryview(self._received)[LENGTH.size : end].tobytes())
+            del self._received[:end]
+            self._carry_out(order)
+
+    def _carry_out(self, order: Order) -> None:
+        match order:
+            case Fork(launch=launch):
+                self._tell(self._fork(launch))
+            case Kill(pid=pid, number=number):
+                if pid in self._live:  # else it was reaped, and the pid may be another's by now
+                    process_table.send(process_table.tree(process_table.read_table(), pid), signal.Signals(number))
+            case _:
+                assert_never(order)
+
+    def _tell(self, answer: Answer) -> None:
+        self._channel.setblocking(True)
+        try:
+            self._channel.sendall(frame(answer))
+        except (BrokenPipeError, ConnectionResetError):
+            self._is_told_to_end = True
+        finally:
+            self._channel.setblocking(False)
+
+    def _fork(self, launch: Launch) -> Answer:
+        try:
+            pid = os.fork()
+        except OSError as error:
+            return ForkFailed(str(error))
+        if pid == 0:
+            self._become(launch)
+        self._live.add(pid)
+        return Forked(pid)
+
+    def _become(self, launch: Launch) -> NoReturn:
+        code = EXIT_BUG
+        try:
+            os.setsid()
+            process_table.die_with_parent()
+            if os.getppid() != self._own_pid:  # it died before it could be tied to our life
+                os._exit(EXIT_BUG)
+            signal.set_wakeup_fd(-1)
+            for number in (signal.SIGCHLD, *_LEFT_TO_THE_PARENT):
+                signal.signal(number, signal.SIG_DFL)
+            self._selector.close()
+            for inherited in (self._channel, self._signals, self._signals_in):
+                inherited.close()
+            os.environ[process_table.MARK] = str(os.getpid())
+            process_table.set_title(launch.name)
+            _redirect(launch)
+            code = run_process(launch)
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            with suppress(OSError):  # a full disk must not keep the process from ending
+                sys.stdout.flush()
+                sys.stderr.flush()
+            os._exit(code)  # an ordinary exit would wait for threads of a bus that was not closed
+
+    # Ends
+    def _reap(self) -> bool:
+        """Take note of every child that ended; say whether there are children left."""
+        while True:
+            try:
+                pid, status = os.waitpid(-1, os.WNOHANG)
+            except ChildProcessError:
+                return False
+            if pid == 0:
+                return True
+            if pid in self._live:
+                self._live.remove(pid)
+                returncode = os.waitstatus_to_exitcode(status)
+                self._sweeps[pid] = _Sweep(returncode, time.monotonic() + ZYGOTE_GRACE_S)
+
+    def _sweep(self) -> None:
+        """Kill what dead components left, and tell of the end of those of which nothing is left.
+
+        Whatever is left is our child, or becomes it when its own parent ends, so each end wakes us.
+        """
+        if not self._sweeps:
+            return
+        table, now_s = process_table.read_table(), time.monotonic()
+        for pid, sweep in list(self._sweeps.items()):
+            left = process_table.remains(table, pid, self._own_pid)
+            zygotes = process_table.zygotes_of(table, pid)
+            if sweep.zygotes_until_s is not None and now_s >= sweep.zygotes_until_s:
+                left |= zygotes
+                self._sweeps[pid] = _Sweep(sweep.returncode, None)
+            process_table.send(left, signal.SIGKILL)
+            if not left | zygotes:
+                del self._sweeps[pid]
+                self._tell(Exited(pid, sweep.returncode))
+
+    def _end_all(self) -> None:
+        """End everything that descends from this process: SIGTERM, a moment, SIGKILL."""
+        removed = self._hide_run_directory()
+        self._selector.unregister(self._channel)  # its end would be reported for ever
+        now_s = time.monotonic()
+        kill_at_s, kill_zygotes_at_s = now_s + GRACE_S, now_s + GRACE_S + ZYGOTE_GRACE_S
+        table = process_table.read_table()
+        process_table.send({one for pid in self._live for one in process_table.tree(table, pid)}, signal.SIGTERM)
+        while self._reap():
+            now_s = time.monotonic()
+            if now_s < kill_at_s:
+                wait_s: float | None = kill_at_s - now_s
+            else:
+                table = process_table.read_table()
+                victims = process_table.descendants(table, self._own_pid)
+                if now_s >= kill_zygotes_at_s:
+                    victims |= {pid for pid, process in table.items() if process.parent == self._own_pid}
+                process_table.send(victims, signal.SIGKILL)
+                wait_s = kill_zygotes_at_s - now_s if now_s < kill_zygotes_at_s else None
+            if self._selector.select(wait_s):
+                self._signals.recv(1 << 12)
+        if removed is not None:
+            shutil.rmtree(removed, ignore_errors=True)
+
+    def _hide_run_directory(self) -> Path | None:
+        """Move the folder away, so that the same mission can come up anew while this one's rest is ended."""
+        if not self._settings.run_directory:
+            return None
+        directory = Path(self._settings.run_directory)
+        hidden = directory.with_name(f".{directory.name}.ended-{self._own_pid}")
+        try:
+            directory.rename(hidden)
+        except FileNotFoundError:
+            return None
+        return hidden
+
+
+def _only_wake(_number: int, _frame: object) -> None:
+    """Let the wakeup descriptor do the work; a handler must exist for it to be written."""
+
+
+def _redirect(launch: Launch) -> None:
+    """Connect standard input to nothing, output and errors to the component's log if the mission has a folder."""
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    if launch.run_directory:
+        path = log_path(launch.run_directory, launch.name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        os.dup2(file, 1)
+        os.dup2(file, 2)
+        os.close(file)
+
+
+def log_path(run_directory: str, name: str) -> Path:
+    """Return where a component's output goes."""
+    return Path(run_directory) / "log" / f"{name}.log"

@@ -1,0 +1,59 @@
+"""Small components for tests of creators: real processes that do next to nothing, or something bad."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+from backbone.component.component import Component, NoParameters
+
+
+class Quiet(Component[NoParameters]):
+    """Is ready and waits."""
+
+
+class Parent(Component[NoParameters]):
+    """Has children: a program, a program in a session of its own, and a plain fork."""
+
+    async def connect(self) -> None:
+        sleep = [sys.executable, "-c", "import signal, time; signal.signal(15, signal.SIG_IGN); time.sleep(600)"]
+        subprocess.Popen(sleep)
+        subprocess.Popen(sleep, start_new_session=True)
+        if os.fork() == 0:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+            time.sleep(600)
+            os._exit(0)
+
+
+class Stubborn(Component[NoParameters]):
+    """Hangs as soon as it is told to drain, and ignores SIGTERM."""
+
+    async def drain(self) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        time.sleep(600)
+
+
+class Late(Component[NoParameters]):
+    """Never becomes ready."""
+
+    async def connect(self) -> None:
+        print("waits for what never comes", flush=True)
+        await self.clock.sleep_s(600.0)
+
+
+class Broken(Component[NoParameters]):
+    """Ends by a bug before it is ready."""
+
+    async def connect(self) -> None:
+        raise RuntimeError("the bug of the sample")
+
+
+class Leaver(Component[NoParameters]):
+    """Ends itself in good order a moment after it is ready."""
+
+    async def serve(self) -> None:
+        await self.clock.sleep_s(0.1)
+        self.end("its work is done")
