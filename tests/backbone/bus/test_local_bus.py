@@ -1,0 +1,115 @@
+"""What only the bus inside one process promises: the same objects, the same order, virtual deadlines."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import pytest
+
+from backbone.bus.clock import NothingLeftToHappen, VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalNetwork
+from backbone.errors import NoResponder, ReplyTimeout
+from backbone.keys import Conversation
+from backbone.wire import Envelope, Message
+
+
+class Picture(Message, frozen=True):
+    pixels: bytes
+
+
+def test_objects_are_handed_over_not_copied() -> None:
+    async def main() -> None:
+        network = LocalNetwork()
+        source, listener = (network.join(f"backbone/{name}", VirtualClock()) for name in ("source", "listener"))
+        heard: list[Message] = []
+
+        async def answer(asked: Envelope[Any]) -> Message:
+            return asked.body
+
+        source.serve("backbone/source", Picture, answer)
+        listener.subscribe("backbone/source", Conversation.FRAMES, Picture, lambda e: heard.append(e.body))
+        picture = Picture(bytes(10))
+        source.publish("backbone/source", Conversation.FRAMES, picture)
+        assert await listener.ask("backbone/source", picture, Picture, within_s=1.0) is picture
+        assert heard == [picture]
+        assert heard[0] is picture
+
+    run_virtual(main())
+
+
+def test_latest_hands_over_one_of_a_burst() -> None:
+    async def main() -> None:
+        bus = LocalNetwork().join("backbone/source", VirtualClock())
+        heard: list[bytes] = []
+        bus.subscribe(
+            "*/*", Conversation.FRAMES, Picture, lambda envelope: heard.append(envelope.body.pixels), latest=True
+        )
+        for number in range(50):
+            bus.publish("backbone/source", Conversation.FRAMES, Picture(bytes([number])))
+        await VirtualClock().sleep_s(0.0)
+        assert heard == [bytes([49])]
+
+    run_virtual(main())
+
+
+def test_a_question_takes_no_virtual_time() -> None:
+    async def main() -> None:
+        bus = LocalNetwork().join("backbone/source", VirtualClock())
+
+        async def answer(asked: Envelope[Any]) -> Message:
+            return asked.body
+
+        bus.serve("backbone/source", Picture, answer)
+        await bus.ask("backbone/source", Picture(b""), Picture, within_s=1.0)
+        assert VirtualClock().now_s() == 0.0
+
+    run_virtual(main())
+
+
+def test_a_deadline_is_exact_in_virtual_time() -> None:
+    async def main() -> None:
+        bus = LocalNetwork().join("backbone/source", VirtualClock())
+
+        async def never(asked: Envelope[Any]) -> Message:
+            await asyncio.Event().wait()
+            return asked.body
+
+        bus.serve("backbone/source", Picture, never)
+        with pytest.raises(ReplyTimeout):
+            await bus.ask("backbone/source", Picture(b""), Picture, within_s=86_400.0)
+        assert VirtualClock().now_s() == 86_400.0
+        await bus.close()
+
+    run_virtual(main())
+
+
+def test_an_asker_of_a_server_taken_back_before_its_bus_closed_is_not_left_waiting() -> None:
+    async def main() -> None:
+        network = LocalNetwork()
+        server, asker = (network.join(f"backbone/{name}", VirtualClock()) for name in ("server", "asker"))
+
+        async def never(asked: Envelope[Any]) -> Message:
+            await asyncio.Event().wait()
+            return asked.body
+
+        serving = server.serve("backbone/server", Picture, never)
+        asking = asyncio.create_task(asker.ask("backbone/server", Picture(b""), Picture, within_s=60.0))
+        await VirtualClock().sleep_s(0.1)
+        serving.close()
+        await server.close()
+        with pytest.raises(NoResponder):
+            await asking
+        assert VirtualClock().now_s() == pytest.approx(0.1)
+
+    run_virtual(main())
+
+
+def test_two_components_that_wait_for_each_other_are_found_at_once() -> None:
+    async def main() -> None:
+        network = LocalNetwork()
+        network.join("backbone/a", VirtualClock())
+        await asyncio.Event().wait()
+
+    with pytest.raises(NothingLeftToHappen):
+        run_virtual(main())
