@@ -308,6 +308,9 @@ class Component(Generic[P]):
 
     async def _unless_ended(self, work: Coroutine[Any, Any, None], name: str) -> bool:
         """Do the work unless the component is told to end first; say whether it was done."""
+        if self._end.is_set():
+            work.close()
+            return False
         working = asyncio.create_task(work, name=f"{self.name}:{name}")
         ending = asyncio.create_task(self._end.wait(), name=f"{self.name}:end")
         try:
