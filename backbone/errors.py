@@ -97,3 +97,10 @@ class ReplyTimeout(LinkError):
 
 class HubUnreachable(LinkError):
     """The mission's hub could not be reached."""
+
+
+class OutcomeUnknown(Refusal):
+    """The one asked had to ask another, who did not answer: what was wanted may or may not have happened."""
+
+    code = "link.unknown"
+    remedy = "Ask how things are before you ask again."

@@ -189,20 +189,25 @@ class SwitchTransmitter(Message, frozen=True):
 
 
 class LoadPacket(Message, frozen=True):
-    """Send this packet at the ARC's rate from now on, until replaced. Asked by robot RCs.
+    """Send this packet. Asked by robot RCs under the radio's grant to their ARC.
 
     Attributes:
         arc: The ARC that holds robot and radio.
         epoch: Of the radio RC's connection.
         network_id: Of the robot.
         payload: Bytes of the robot's own protocol.
-        at_once: Also send it ahead of its turn, and answer only when it is on the air.
+        safe_payload: What is sent last of all to this robot when the ARC is disconnected.
+        robot_epoch: Of the robot RC's connection, for the audit.
+        at_once: True: once, ahead of its turn, answered when it is on the air.
+            False: at the ARC's rate from now on, until replaced.
     """
 
     arc: str
     epoch: int
     network_id: int
     payload: bytes
+    safe_payload: bytes
+    robot_epoch: int
     at_once: bool = False
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
 from backbone.bus.interface import Answer, BusStatistics, Clock, Listener, current_cause
-from backbone.errors import NoResponder, Refusal
+from backbone.errors import LinkError, NoResponder, OutcomeUnknown, Refusal
 from backbone.wire import WIRE_VERSION, Envelope, Message, Refused
 
 T = TypeVar("T")
@@ -89,6 +89,9 @@ class Speaker(ABC):
         current_cause.set(question.id)
         try:
             body = await answer(question)
+        except LinkError as error:
+            self.refused += 1
+            body = Refused.of(OutcomeUnknown(f"{self._source} got no answer itself: {error}"))
         except Refusal as refusal:
             self.refused += 1
             body = Refused.of(refusal)

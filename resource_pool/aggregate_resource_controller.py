@@ -1,0 +1,368 @@
+"""Aggregate resource controller: several RCs that are worth something only together, as one thing.
+
+An ARC asks the RC manager for its set, lets commands of its one owner through while it holds the set,
+and tells the owner when that begins and ends. It watches its owner: when that is gone or hangs, it
+gives everything back. Nobody has to say goodbye.
+
+Source: RAM 2002, "Resource Pool" and "The RC Scheduler".
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.asking import ask_until_answered
+from backbone.component.companion import Companion
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
+from backbone.dependency_database.messages import FindRcs, RcSets
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import (
+    BEAT_EVERY_S,
+    AskRequest,
+    Beat,
+    ChangeRuntime,
+    CloseGate,
+    CurrentRequest,
+    Done,
+    Extend,
+    GateClosed,
+    GateOpen,
+    OpenGate,
+    PathNode,
+    RcUse,
+    Scheduled,
+    SchedulingRequest,
+    SetIdle,
+    UnknownRequest,
+    Usage,
+    Withdraw,
+)
+from backbone.wire import Envelope, Message
+from resource_pool.gate import Gate
+from resource_pool.messages import (
+    Accepted,
+    Applied,
+    ArcQuestion,
+    ArcState,
+    AskArc,
+    AskBeat,
+    CommandScout,
+    Drive,
+    Halt,
+    Jump,
+    NoSuchAction,
+    Noted,
+    NotYours,
+    Release,
+    Resumed,
+    Suspended,
+    Suspending,
+    SwappedOut,
+    WantIdle,
+    WantLonger,
+    WantRuntime,
+)
+
+log = logging.getLogger(__name__)
+
+RC_REPLY_S = 0.8  # chosen: a robot RC itself gives the radio half a second
+OWNER_GONE_S = 0.5  # chosen: a robot is given back within a second of its console's death; a new hub is found sooner
+OWNER_BEAT_S = 0.9  # chosen: less than the RC manager waits for a beat (1 s) with one to spare
+NOTICE_S = 1.0  # chosen: an owner that needs longer to take note is noticed by its beat
+REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first have RCs started
+ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; later it has overlooked this one
+
+
+class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is asked for, and by whom; see ``arc_client.claim_parameters``.
+
+    Attributes:
+        owner: Address of the decision process.
+        path: Names and priorities from the mission's root, or of the console alone.
+        console: True for consoles.
+        minimum_runtime_s: Shortest useful time, seconds.
+        maximum_runtime_s: End of extensions; 0: the minimum.
+        wish: Kind of RC → name.
+        features: Kind of RC → features.
+        usage: Period, packet time, deadline, jitter (seconds) and kind of what is sent on the radio.
+        idle: True: no time is wanted yet.
+    """
+
+    owner: str
+    path: list[tuple[str, int]]
+    minimum_runtime_s: float
+    maximum_runtime_s: float = 0.0
+    console: bool = False
+    wish: dict[str, str] = {}
+    features: dict[str, list[str]] = {}
+    usage: tuple[float, float, float, float, str] = (0.05, 0.002, 0.0, 0.0, "drive")
+    idle: bool = False
+
+
+class AggregateResourceController(Component[ArcParameters]):
+    """Base of every ARC; derive, set ``roles``, override ``prepare``."""
+
+    parameters_type = ArcParameters
+    accepts = OpenGate | CloseGate | AskRequest | ArcQuestion
+    roles: ClassVar[Sequence[str]] = ()
+    """Kinds of RC it needs, one of each."""
+    sharable_roles: ClassVar[frozenset[str]] = frozenset({"command_radio"})
+    """Those of them it uses by streams instead of exclusively."""
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._owner = self.parameters.owner
+        self._gate = Gate(self.name)
+        self._request: SchedulingRequest | None = None
+        self._sets: list[dict[str, str]] = []
+        self._rcs: dict[str, str] = {}
+        self._asked = asyncio.Event()
+        self._owner_hangs = False
+        self._commands = self._refused = 0
+
+    # ------------------------------------------------------------------ hooks
+    async def prepare(self, epochs: Mapping[str, int]) -> None:
+        """Bring the connected RCs into the state the owner expects.
+
+        When: all are connected, before they settle and before the gate opens. What: switch on, tune.
+        Raise a ``Refusal`` or ``LinkError`` if one of them cannot: the set is given back.
+        """
+
+    # ------------------------------------------------------------------ for derived classes
+    def rc(self, role: str) -> str:
+        """Return the name of the RC chosen for this role.
+
+        Raises:
+            NoSuchAction: This kind of ARC has no such role.
+        """
+        if role not in self.roles:
+            raise NoSuchAction(f"{self.launch.type} has no {role}", role=role)
+        return self._rcs[role]
+
+    async def tell_rc(self, role: str, command: Message) -> Applied:
+        """Command one of the RCs and return what it applied."""
+        at = address(Subsystem.RESOURCE_POOL, self.rc(role))
+        return await self.bus.ask(at, command, Applied, within_s=RC_REPLY_S)
+
+    # ------------------------------------------------------------------ life
+    async def connect(self) -> None:
+        """Find the sets of RCs that would do.
+
+        Raises:
+            NoSuchHardware: None would.
+        """
+        given = self.parameters
+        question = FindRcs(list(self.roles), given.wish, given.features)
+        found = await ask_until_answered(
+            self.bus, self.clock, DEPENDENCY_DATABASE, question, RcSets, each_s=2.0, within_s=10.0
+        )
+        self._sets = found.sets
+        self._request = self._make_request()
+
+    async def serve(self) -> None:
+        """Ask for run time, then watch owner and RC manager until told to stop."""
+        self.start_task(self._watch_owner(), "watch owner")
+        self.start_task(self._beat(), "beat")
+        await self._send_request()
+        self.start_task(self._watch_rc_manager(), "watch RC manager")
+
+    async def drain(self) -> None:
+        """Give everything back."""
+        self._gate.close("self", "", -1.0)
+        if self._request is not None:
+            try:
+                await self.bus.ask(RC_MANAGER, Withdraw(self.name, "self"), Done, within_s=RC_REPLY_S)
+            except (LinkError, Refusal) as error:  # its RCs come free by this ARC's death or by lease
+                log.info("not withdrawn: %s", error)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Obey the RC manager about the gate, and the owner about everything else."""
+        match asked.body:
+            case OpenGate() as order:
+                return await self._open(order)
+            case CloseGate() as order:
+                return await self._close(order)
+            case AskRequest():
+                return self._current_request()
+            case AskArc():
+                return self._arc_state()
+            case _ if asked.source != self._owner:
+                raise NotYours(f"{self.name} belongs to {self._owner}, not to {asked.source}", owner=self._owner)
+            case Drive() | Halt() | Jump() as command:
+                return await self._command(command)
+            case WantIdle(idle=idle):
+                await self._tell_rc_manager(SetIdle(self.name, idle))
+            case WantRuntime(minimum_runtime_s=least, maximum_runtime_s=most):
+                await self._tell_rc_manager(ChangeRuntime(self.name, least, most))
+            case WantLonger(until_s=until_s):
+                await self._tell_rc_manager(Extend(self.name, until_s))
+            case Release(reason=reason):
+                self.end(f"released by {self._owner}: {reason}")
+        return Accepted()
+
+    def statistics(self) -> dict[str, float]:
+        """Count commands passed on, and refused because nothing was held."""
+        return {"commands": self._commands, "refused_swapped_out": self._refused}
+
+    # ------------------------------------------------------------------ asking for run time
+    def _make_request(self) -> SchedulingRequest:
+        given = self.parameters
+        period_s, packet_time_s, deadline_s, jitter_s, kind = given.usage
+        stream = Usage(period_s, packet_time_s, deadline_s, jitter_s, kind)
+
+        def use(role: str) -> RcUse:
+            return RcUse([stream]) if role in self.sharable_roles else RcUse()
+
+        return SchedulingRequest(
+            arc=self.name,
+            owner=self._owner,
+            path=[PathNode(name, priority) for name, priority in given.path],
+            console=given.console,
+            alternatives=[{rc: use(role) for role, rc in rcs.items()} for rcs in self._sets],
+            minimum_runtime_s=given.minimum_runtime_s,
+            maximum_runtime_s=given.maximum_runtime_s,
+            idle=given.idle,
+        )
+
+    async def _send_request(self) -> None:
+        """Ask the RC manager for run time; end if it says that the request can never be served."""
+        request = self._request
+        assert request is not None  # noqa: S101  made in connect
+        try:
+            scheduled = await ask_until_answered(
+                self.bus,
+                self.clock,
+                RC_MANAGER,
+                request,
+                Scheduled,
+                each_s=REQUEST_EACH_S,
+                within_s=REQUEST_WITHIN_S,
+            )
+        except (Refusal, LinkError) as error:
+            self.tell(self.name, f"cannot be scheduled: {error}")
+            await self._notify(Suspended(self.name, f"cannot be scheduled: {error}", "rc_manager", -1.0))
+            self.end(f"cannot be scheduled: {error}")
+            return
+        self._choose(scheduled.rcs)
+        self.story.note(self.name, f"{scheduled.state}, position {scheduled.position}, behind {scheduled.blockers}")
+
+    def _choose(self, rcs: list[str]) -> None:
+        self._rcs = next(by_role for by_role in self._sets if set(by_role.values()) == set(rcs))
+
+    async def _tell_rc_manager(self, wish: Message) -> None:
+        await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
+
+    def _current_request(self) -> CurrentRequest:
+        if self._request is None:
+            raise UnknownRequest(f"{self.name} does not ask for anything yet")
+        self._asked.set()
+        return CurrentRequest(
+            self._request,
+            list(self._rcs.values()),
+            dict(self._gate.epochs) if self._gate.is_open else {},
+            self._gate.granted_s,
+        )
+
+    # ------------------------------------------------------------------ the gate
+    async def _open(self, order: OpenGate) -> GateOpen:
+        self._gate.prepare(order.epochs)
+        if not self._rcs:
+            self._choose(list(order.epochs))
+        prepared_s = self.clock.now_s()
+        await self.prepare(order.epochs)
+        await self.clock.sleep_until_s(prepared_s + order.settle_s)
+        if not self._gate.open(order.epochs, self.clock.now_s()):
+            raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
+        self.report(f"granted: {', '.join(self._rcs.values())}")
+        self.start_task(self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s)), "resumed")
+        return GateOpen()
+
+    async def _close(self, order: CloseGate) -> GateClosed:
+        if order.deadline_s > 0 and self._gate.is_open:
+            notice = Suspending(self.name, order.reason, order.by, order.deadline_s)
+            await self._notify(notice, order.deadline_s / self.clock.rate)
+        was_open = self._gate.is_open
+        self._gate.close(order.reason, order.by, order.expected_s)
+        self.report(f"swapped out: {order.reason}{f' by {order.by}' if order.by else ''}")
+        if was_open:
+            self.start_task(self._notify(Suspended(self.name, order.reason, order.by, order.expected_s)), "suspended")
+        return GateClosed()
+
+    async def _command(self, command: Drive | Halt | Jump) -> Applied:
+        try:
+            epoch = self._gate.epoch_of(self.rc("scout"))
+        except SwappedOut:
+            self._refused += 1
+            raise
+        self._commands += 1
+        return await self.tell_rc("scout", CommandScout(self.name, epoch, command))
+
+    def _arc_state(self) -> ArcState:
+        gate = self._gate
+        return ArcState(
+            arc=self.name,
+            kind=self.launch.type,
+            owner=self._owner,
+            rcs=self._rcs,
+            granted=gate.is_open,
+            epochs=dict(gate.epochs) if gate.is_open else {},
+            reason=gate.reason,
+            by=gate.by,
+            expected_start_s=gate.expected_s,
+        )
+
+    async def _notify(self, notice: Resumed | Suspending | Suspended, within_s: float = NOTICE_S) -> None:
+        """Tell the owner; it may be slow, hang or be gone, which others find out."""
+        try:
+            await self.bus.ask(self._owner, notice, Noted, within_s=within_s)
+        except (Refusal, LinkError) as error:
+            self.story.note(self._owner, f"did not take note of {type(notice).__name__}: {error}")
+
+    # ------------------------------------------------------------------ watching
+    async def _watch_owner(self) -> None:
+        owner = Companion(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
+        try:
+            await owner.wait_gone()
+        finally:
+            owner.close()
+        self.end(f"its owner {self._owner} is gone")
+
+    async def _beat(self) -> None:
+        """Tell the RC manager that this ARC and its owner live, for as long as both do."""
+        while True:
+            try:
+                await self.bus.ask(self._owner, AskBeat(), Noted, within_s=OWNER_BEAT_S)
+            except Refusal as refusal:
+                self.end(f"its owner does not know it: {refusal.detail}")
+            except LinkError as error:
+                self.story.note(self._owner, f"does not answer: {error}")
+            else:
+                self.bus.publish(self.address, Conversation.BEAT, Beat(self.name))
+            await self.clock.sleep_s(BEAT_EVERY_S * self.clock.rate)
+
+    async def _watch_rc_manager(self) -> None:
+        """Ask anew if a restarted RC manager has not asked for the request by itself."""
+        manager = Companion(self.bus, RC_MANAGER)
+        try:
+            await manager.wait_there()
+            while True:
+                self._asked.clear()
+                await manager.wait_risen(manager.times_risen + 1)
+                try:
+                    async with asyncio.timeout(ASKED_AGAIN_S):
+                        await self._asked.wait()
+                except TimeoutError:
+                    await self._send_request()
+        finally:
+            manager.close()

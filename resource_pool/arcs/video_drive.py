@@ -1,0 +1,23 @@
+"""ARC kind 2: drive a robot that broadcasts video, to be viewed on a monitor.
+
+Source: RAM 2002, "Examples of ARCs and RCs".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from resource_pool.aggregate_resource_controller import AggregateResourceController
+from resource_pool.messages import CommandScout, SwitchTransmitter
+
+
+class VideoDriveArc(AggregateResourceController):
+    """A robot, room on its command radio, and a video frequency on which it transmits while it is held."""
+
+    roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency")
+
+    async def prepare(self, epochs: Mapping[str, int]) -> None:
+        """Switch the robot's transmitter on; when the set is given back the radio switches it off."""
+        switch = SwitchTransmitter(True, self.rc("video_frequency"))
+        await self.tell_rc("scout", CommandScout(self.name, epochs[self.rc("scout")], switch))

@@ -1,0 +1,137 @@
+"""What an RC expects of its hardware. A driver knows one device; it knows no ARC, no epoch, no bus of ours.
+
+The simulated drivers, a radio on a serial port and a grabber behind V4L2 all fit these protocols. A
+mission names a driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from backbone.bus.interface import Bus, Clock
+from backbone.errors import Refusal
+
+
+class UnknownDriver(Refusal):
+    """No driver of this name exists for this kind of resource."""
+
+    code = "driver.unknown"
+    remedy = "Name a built-in driver, or a class as package.module:Class."
+
+
+@dataclass(frozen=True)
+class DriverSite:
+    """Where a driver is built in: what it may use.
+
+    Attributes:
+        resource: Name of the resource.
+        bus: For drivers whose hardware is reached over it (the simulated ones).
+        clock: The mission's time.
+        parameters: The RC's parameters.
+        tell: Says one line to the people who watch the mission.
+    """
+
+    resource: str
+    bus: Bus
+    clock: Clock
+    parameters: Any
+    tell: Callable[[str], None]
+
+
+class RadioDriver(Protocol):
+    """A transmitter of command packets."""
+
+    async def open(self) -> None:
+        """Get hold of the device. When: once, before readiness. Raise ``HardwareFault`` if it is not there."""
+
+    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
+        """Return when the packet is on the air. Not: queue it. ``arc`` and ``robot_epoch`` are for audits only."""
+
+    async def close(self) -> None:
+        """Let go of the device. When: once, last."""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a grabber took.
+
+    Attributes:
+        captured_s: Mission time.
+        pixels: Grey levels 0 to 255 as bytes, row by row from the top.
+        width_px: Columns.
+        height_px: Rows.
+        transmitters: How many transmitters were heard on the frequency; -1 where the hardware cannot tell.
+        robot: The one that was heard, if exactly one and the hardware can tell; else empty.
+    """
+
+    captured_s: float
+    pixels: memoryview
+    width_px: int
+    height_px: int
+    transmitters: int = -1
+    robot: str = ""
+
+
+class FramegrabberDriver(Protocol):
+    """A receiver with a digitizer behind it."""
+
+    async def open(self) -> None:
+        """Get hold of the device and whatever is slow to get; see ``RadioDriver.open``."""
+
+    def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
+        """Receive this frequency from now on; hand each picture over in the event loop. Replaces an earlier tuning."""
+
+    def stop(self) -> None:
+        """Hand nothing over any more. When: at the end of each hold. Calling it twice is allowed."""
+
+    async def close(self) -> None:
+        """Let go of the device. When: once, last."""
+
+
+class RobotProtocol(Protocol):
+    """How commands to one kind of robot are spelt in packets."""
+
+    def clip_wheel_speed(self, speed_rad_s: float) -> float:
+        """Return the speed the robot really takes, rad/s."""
+
+    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
+        """Return the packet for these wheel speeds."""
+
+    def halt(self) -> bytes:
+        """Return the packet that stops the wheels."""
+
+    def jump(self) -> bytes:
+        """Return the packet for a jump."""
+
+    def transmitter(self, on: bool, frequency: str) -> bytes:
+        """Return the packet that turns the video transmitter on at this frequency, or off."""
+
+    def safe(self) -> bytes:
+        """Return the packet after which the robot neither moves nor transmits."""
+
+
+BUILT_IN: Mapping[str, Mapping[str, str]] = {
+    "radio": {"simulated": "resource_pool.drivers.simulated:SimulatedRadio"},
+    "robot": {"simulated": "resource_pool.drivers.simulated:SimulatedScoutProtocol"},
+    "framegrabber": {"simulated": "resource_pool.drivers.simulated_video:SimulatedFramegrabber"},
+}
+
+
+def build_driver(kind: str, name: str, site: DriverSite) -> Any:
+    """Return the driver of this name, not yet open. Its module is imported only here, in the RC that needs it.
+
+    Raises:
+        UnknownDriver: There is none.
+    """
+    path = BUILT_IN[kind].get(name, name)
+    module_name, colon, class_name = path.partition(":")
+    if not colon:
+        raise UnknownDriver(f"{site.resource}: no {kind} driver {name!r}; built in: {', '.join(BUILT_IN[kind])}")
+    try:
+        driver_class = getattr(importlib.import_module(module_name), class_name)
+    except (ImportError, AttributeError) as error:
+        raise UnknownDriver(f"{site.resource}: {path}: {error}") from error
+    return driver_class(site)

@@ -1,0 +1,85 @@
+"""Drivers of simulated hardware that need neither renderer nor arrays: the radio, and the Scout's protocol."""
+
+from __future__ import annotations
+
+from backbone.component.asking import ask_until_answered
+from backbone.errors import LinkError
+from backbone.naming import Subsystem, address
+from resource_pool.drivers.interface import DriverSite
+from resource_pool.messages import AskWorld, HardwareFault, PacketHeard, RadioPacket, WorldModel
+from scout_model import radio_link
+from scout_model.scout import clip_wheel_speed
+
+WORLD_REPLY_S = 0.4  # chosen: less than the RCs give the radio
+WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
+
+
+async def meet_world(site: DriverSite) -> WorldModel:
+    """Return the world's model as soon as the world answers.
+
+    Raises:
+        HardwareFault: It did not within ``WORLD_START_S``.
+    """
+    try:
+        return await ask_until_answered(
+            site.bus, site.clock, world_of(site), AskWorld(), WorldModel, each_s=2.0, within_s=WORLD_START_S
+        )
+    except LinkError as error:
+        raise HardwareFault(f"{site.resource}: no simulated world {site.parameters.world!r}: {error}") from error
+
+
+def world_of(site: DriverSite) -> str:
+    """Return the address of the world that plays this hardware."""
+    return address(Subsystem.RESOURCE_POOL, site.parameters.world)
+
+
+class SimulatedRadio:
+    """A radio whose packets the simulated world hears."""
+
+    def __init__(self, site: DriverSite) -> None:
+        self._site, self._world = site, world_of(site)
+
+    async def open(self) -> None:
+        """Wait for nothing: packets into a world that is not there are lost, as on the air."""
+
+    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
+        """Return when the world has heard the packet, or lose it if there is no world."""
+        packet = RadioPacket(self._site.resource, network_id, payload, arc, robot_epoch)
+        try:
+            await self._site.bus.ask(self._world, packet, PacketHeard, within_s=WORLD_REPLY_S)
+        except LinkError:
+            return
+
+    async def close(self) -> None:
+        """Nothing is held."""
+
+
+class SimulatedScoutProtocol:
+    """Packets as the simulated Scout's firmware reads them."""
+
+    def __init__(self, site: DriverSite) -> None:
+        self._site = site
+
+    def clip_wheel_speed(self, speed_rad_s: float) -> float:
+        """Return the speed the motor can do, rad/s."""
+        return clip_wheel_speed(speed_rad_s)
+
+    def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
+        """Return the packet for these wheel speeds."""
+        return radio_link.encode_drive(left_rad_s, right_rad_s)
+
+    def halt(self) -> bytes:
+        """Return the packet that stops the wheels."""
+        return radio_link.encode_halt()
+
+    def jump(self) -> bytes:
+        """Return the packet for a jump."""
+        return radio_link.encode_jump()
+
+    def transmitter(self, on: bool, frequency: str) -> bytes:
+        """Return the packet that turns the transmitter on or off."""
+        return radio_link.encode_transmitter_on(frequency) if on else radio_link.encode_transmitter_off()
+
+    def safe(self) -> bytes:
+        """Return the packet after which the Scout neither moves nor transmits."""
+        return radio_link.encode_safe()

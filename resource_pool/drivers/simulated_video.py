@@ -1,0 +1,122 @@
+"""Driver of the simulated receiver and framegrabber: draws what is received, where it is received.
+
+Nothing is drawn but the robots that transmit on the tuned frequency, and only while it is tuned. Drawing
+runs in one thread of its own, which also owns the renderer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from backbone.bus.interface import Subscription
+from backbone.keys import Conversation
+from backbone.wire import Envelope
+from resource_pool.drivers.interface import DriverSite, Picture
+from resource_pool.drivers.simulated import meet_world, world_of
+from resource_pool.messages import WorldState
+from scout_model.gl_probe import GlSupport, prepare, probe
+
+RECEIVER_SEED = 1  # chosen: the noise of a run repeats
+
+
+class SimulatedFramegrabber:
+    """A receiver in the simulated world."""
+
+    def __init__(self, site: DriverSite) -> None:
+        self._site = site
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="camera")
+        self._studio: _Studio | None = None
+        self._world: Subscription | None = None
+        self._frequency = ""
+        self._deliver: Callable[[Picture], None] | None = None
+        self._drawing: asyncio.Task[None] | None = None
+        self._next_s = 0.0
+        self._pause_s = 1.0 / site.parameters.frame_rate_hz
+
+    async def open(self) -> None:
+        """Fetch the world's model and open the renderer, or the painter where there is no OpenGL."""
+        run = asyncio.get_running_loop().run_in_executor
+        choosing = run(None, _choose, self._site.parameters.camera)
+        world = await meet_world(self._site)
+        support, backend = await choosing
+        self._studio = await run(self._thread, _Studio, world.mjcf, support, backend)
+        if support is not None and support.missing_packages:
+            self._site.tell(support.summary)
+        self._world = self._site.bus.subscribe(
+            world_of(self._site), Conversation.TELEMETRY, WorldState, self._world_moved, latest=True
+        )
+
+    def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
+        """Receive this frequency from now on; see ``FramegrabberDriver.tune``."""
+        self._frequency, self._deliver, self._next_s = frequency, deliver, 0.0
+
+    def stop(self) -> None:
+        """Hand nothing over any more; see ``FramegrabberDriver.stop``."""
+        self._frequency, self._deliver = "", None
+
+    async def close(self) -> None:
+        """Stop drawing and close the renderer."""
+        self.stop()
+        if self._world is not None:
+            self._world.close()
+        if self._drawing is not None:
+            await asyncio.gather(self._drawing, return_exceptions=True)
+        if self._studio is not None:
+            await asyncio.get_running_loop().run_in_executor(self._thread, self._studio.close)
+        self._thread.shutdown()
+
+    def _world_moved(self, envelope: Envelope[Any]) -> None:
+        state: WorldState = envelope.body
+        busy = self._drawing is not None and not self._drawing.done()
+        if self._deliver is None or busy or state.at_s < self._next_s:
+            return
+        self._next_s = max(self._next_s + self._pause_s, state.at_s)
+        self._drawing = asyncio.create_task(self._take(state, self._frequency, self._deliver), name="take picture")
+
+    async def _take(self, state: WorldState, frequency: str, deliver: Callable[[Picture], None]) -> None:
+        assert self._studio is not None  # noqa: S101  open before the first state can arrive
+        loop = asyncio.get_running_loop()
+        picture = await loop.run_in_executor(self._thread, self._studio.take, state, frequency)
+        if self._deliver is deliver:
+            deliver(picture)
+
+
+class _Studio:
+    """Cameras of all robots and one receiver a frequency; lives in the drawing thread."""
+
+    def __init__(self, mjcf: str, support: GlSupport | None, backend: str) -> None:
+        prepare(support.backend if support is not None and backend == "gl" else "none")
+        self._camera = importlib.import_module("scout_model.camera").Camera(mjcf, backend)
+        self._receiver_class = importlib.import_module("scout_model.video_link").Receiver
+        self._receivers: dict[str, Any] = {}
+
+    def take(self, state: WorldState, frequency: str) -> Picture:
+        """Return what the receiver of this frequency gives for this state of the world."""
+        receiver = self._receivers.get(frequency)
+        if receiver is None:
+            receiver = self._receivers[frequency] = self._receiver_class(RECEIVER_SEED, frequency)
+        heard = sorted(robot for robot, on in state.transmitting.items() if on == frequency)
+        if heard:
+            self._camera.show(np.frombuffer(state.state, np.float64))
+        reception = receiver.receive([self._camera.picture(robot) for robot in heard], state.frame)
+        pixels = np.ascontiguousarray(reception.picture)
+        height_px, width_px = pixels.shape
+        robot = heard[0] if len(heard) == 1 else ""
+        return Picture(state.at_s, pixels.reshape(-1).data, width_px, height_px, reception.transmitters, robot)
+
+    def close(self) -> None:
+        self._camera.close()
+
+
+def _choose(wanted: str) -> tuple[GlSupport | None, str]:
+    """Return what OpenGL there is, if anybody must know, and which camera to use."""
+    if wanted == "paint":
+        return None, "paint"
+    support = probe()
+    return support, support.camera_backend

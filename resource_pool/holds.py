@@ -1,0 +1,122 @@
+"""Who holds an RC: epochs only grow, a unit RC has one holder, a hold lasts as long as its lease.
+
+Rules of this file: pure; time is an argument; no bus. The RC's loop reports and obeys.
+
+Source: RAM 2002, "The RC Scheduler"; fencing by epoch after ARCHITECTURE's rules 2 and 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from backbone.rc_manager.messages import Held, RcUse, StaleEpoch
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """One ARC's connection to the RC.
+
+    Attributes:
+        arc: The ARC.
+        epoch: Of this connection.
+        since_s: Mission time of the connection.
+        lease_until_s: Mission time at which it ends unless renewed.
+        use: How the ARC uses the RC.
+        companions: The other RCs of the set with their epochs.
+        rank: Place among the holders by user priority, 0 first.
+    """
+
+    arc: str
+    epoch: int
+    since_s: float
+    lease_until_s: float
+    use: RcUse = field(default_factory=RcUse)
+    companions: Mapping[str, int] = field(default_factory=dict)
+    rank: int = 0
+
+
+class HoldTable:
+    """The holds of one RC.
+
+    Args:
+        rc: Its name, for refusals.
+        sharable: True if several ARCs may hold it.
+        last_epoch: Epochs up to this one are over.
+    """
+
+    def __init__(self, rc: str, *, sharable: bool, last_epoch: int) -> None:
+        self._rc, self._sharable, self._last_epoch = rc, sharable, last_epoch
+        self._holds: dict[str, Hold] = {}
+
+    @property
+    def last_epoch(self) -> int:
+        """Largest epoch seen."""
+        return self._last_epoch
+
+    def holds(self) -> list[Hold]:
+        """Return all holds, those of higher user priority first."""
+        return sorted(self._holds.values(), key=lambda hold: (hold.rank, hold.arc))
+
+    def connect(self, hold: Hold) -> None:
+        """Let the ARC hold the RC.
+
+        Raises:
+            StaleEpoch: The epoch is not larger than every one before.
+            Held: Another ARC holds this unit RC.
+        """
+        if hold.epoch <= self._last_epoch:
+            raise StaleEpoch(
+                f"{self._rc}: epoch {hold.epoch} of {hold.arc} is not after {self._last_epoch}",
+                epoch=hold.epoch,
+                last_epoch=self._last_epoch,
+            )
+        others = [other for other in self._holds if other != hold.arc]
+        if others and not self._sharable:
+            raise Held(f"{self._rc} is held by {others[0]}", holder=others[0])
+        self._last_epoch = hold.epoch
+        self._holds[hold.arc] = hold
+
+    def disconnect(self, arc: str, epoch: int) -> Hold | None:
+        """End the ARC's hold if it is of this epoch or an older one; return what was ended."""
+        self._last_epoch = max(self._last_epoch, epoch)
+        hold = self._holds.get(arc)
+        if hold is None or hold.epoch > epoch:
+            return None
+        return self._holds.pop(arc)
+
+    def admit(self, arc: str, epoch: int) -> Hold:
+        """Return the hold under which this command may be carried out.
+
+        Raises:
+            StaleEpoch: The ARC does not hold the RC under this epoch.
+        """
+        hold = self._holds.get(arc)
+        if hold is None or hold.epoch != epoch:
+            present = f"epoch {hold.epoch}" if hold else "no connection"
+            raise StaleEpoch(
+                f"{self._rc}: {arc} commands under epoch {epoch}, it has {present}",
+                epoch=epoch,
+                last_epoch=self._last_epoch,
+            )
+        return hold
+
+    def renew(self, arc: str, epoch: int, until_s: float) -> bool:
+        """Let the hold of this epoch last until then at least; return whether there is one."""
+        hold = self._holds.get(arc)
+        if hold is None or hold.epoch != epoch:
+            return False
+        if until_s > hold.lease_until_s:
+            self._holds[arc] = Hold(arc, epoch, hold.since_s, until_s, hold.use, hold.companions, hold.rank)
+        return True
+
+    def expire(self, now_s: float) -> list[Hold]:
+        """End and return the holds whose lease is over."""
+        over = [hold for hold in self._holds.values() if hold.lease_until_s <= now_s]
+        for hold in over:
+            del self._holds[hold.arc]
+        return over
+
+    def next_expiry_s(self) -> float | None:
+        """Return when the next lease is over unless renewed; None if nobody holds the RC."""
+        return min((hold.lease_until_s for hold in self._holds.values()), default=None)

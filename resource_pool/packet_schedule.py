@@ -1,0 +1,133 @@
+"""Which packet the radio sends next: periodic streams of several ARCs on one channel.
+
+Rules of this file:
+
+* A packet once begun is sent (non-preemptive).
+* First the ARC of higher user priority, then the shorter period, then the name.
+* Each stream has a constant interval; a release not served before the next one is an overrun and lost.
+* An ARC's packets reach only the robots it loaded packets for; several of its robots take turns.
+
+Pure; times are mission seconds.
+
+Source: RAM 2002, "Sharable Resources"; IROS 2001, section 4.3 (rate monotonic below user priority).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from backbone.rc_manager.messages import Usage
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """Bytes for one robot.
+
+    Attributes:
+        arc: On whose behalf.
+        network_id: Of the robot.
+        payload: Bytes of the robot's protocol.
+        safe_payload: What is to be sent to it last of all.
+        robot_epoch: Of the robot RC's connection.
+    """
+
+    arc: str
+    network_id: int
+    payload: bytes
+    safe_payload: bytes
+    robot_epoch: int
+
+
+@dataclass(slots=True)
+class _Stream:
+    usage: Usage
+    next_release_s: float
+    overruns: int = 0
+    sent: int = 0
+
+
+@dataclass(slots=True)
+class _Sender:
+    """One ARC on the radio."""
+
+    rank: int
+    streams: list[_Stream]
+    packets: dict[int, Packet] = field(default_factory=dict)
+    touched: dict[int, Packet] = field(default_factory=dict)
+    turn: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """One packet and how long it occupies the air, seconds."""
+
+    packet: Packet
+    air_time_s: float
+
+
+class PacketSchedule:
+    """The streams of one radio."""
+
+    def __init__(self) -> None:
+        self._senders: dict[str, _Sender] = {}
+
+    def connect(self, arc: str, streams: list[Usage], rank: int, now_s: float) -> None:
+        """Give the ARC its streams; their first releases are now."""
+        self._senders[arc] = _Sender(rank, [_Stream(usage, now_s) for usage in streams])
+
+    def disconnect(self, arc: str) -> list[Packet]:
+        """Forget the ARC and all it loaded; return for each of its robots the packet that must be sent last."""
+        sender = self._senders.pop(arc, None)
+        if sender is None:
+            return []
+        return [
+            Packet(p.arc, p.network_id, p.safe_payload, p.safe_payload, p.robot_epoch) for p in sender.touched.values()
+        ]
+
+    def touch(self, packet: Packet) -> None:
+        """Note that the ARC speaks to this robot, so that its safe packet is owed."""
+        self._senders[packet.arc].touched[packet.network_id] = packet
+
+    def load(self, packet: Packet) -> None:
+        """Send this packet at the ARC's rate from now on."""
+        self.touch(packet)
+        self._senders[packet.arc].packets[packet.network_id] = packet
+
+    def air_time_s(self, arc: str) -> float:
+        """Return how long one of the ARC's packets occupies the air."""
+        return max((stream.usage.packet_time_s for stream in self._senders[arc].streams), default=0.0)
+
+    def next_due_s(self) -> float | None:
+        """Return the earliest release of a stream that has something to send; None if there is none."""
+        releases = [s.next_release_s for sender in self._senders.values() if sender.packets for s in sender.streams]
+        return min(releases, default=None)
+
+    def take(self, now_s: float) -> Sending | None:
+        """Return the packet whose turn it is, counted as sent; None if none is due."""
+        due = [
+            (sender.rank, stream.usage.period_s, arc, number)
+            for arc, sender in self._senders.items()
+            if sender.packets
+            for number, stream in enumerate(sender.streams)
+            if stream.next_release_s <= now_s
+        ]
+        if not due:
+            return None
+        _, _, arc, number = min(due)
+        sender = self._senders[arc]
+        stream = sender.streams[number]
+        missed = int((now_s - stream.next_release_s) / stream.usage.period_s)
+        stream.overruns += missed
+        stream.next_release_s += (missed + 1) * stream.usage.period_s
+        stream.sent += 1
+        robots = sorted(sender.packets)
+        packet = sender.packets[robots[sender.turn % len(robots)]]
+        sender.turn += 1
+        return Sending(packet, stream.usage.packet_time_s)
+
+    def counts(self) -> dict[str, tuple[int, int]]:
+        """Return packets sent and overruns of each ARC now connected."""
+        return {
+            arc: (sum(s.sent for s in sender.streams), sum(s.overruns for s in sender.streams))
+            for arc, sender in self._senders.items()
+        }

@@ -1,0 +1,113 @@
+"""RC of a framegrabber behind a tuned receiver: pictures of one frequency, for the ARC that holds it.
+
+Pictures go out under the ARC's address and carry the connection's epoch; whoever listens drops those
+of another epoch. A picture is delivered only if exactly one robot was heard, where the hardware can tell.
+
+Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.wire import Envelope, Message
+from resource_pool.drivers.interface import FramegrabberDriver, Picture, build_driver
+from resource_pool.holds import Hold
+from resource_pool.messages import Applied, Frame, Tune
+from resource_pool.resource_controller import RcParameters, ResourceController
+
+
+class FramegrabberParameters(RcParameters, frozen=True, kw_only=True):
+    """A framegrabber's own.
+
+    Attributes:
+        frame_rate_hz: Pictures a second, 1 to 30.
+        camera: For the simulated driver: ``auto``, ``gl`` or ``paint``.
+    """
+
+    frame_rate_hz: float = 15.0
+    camera: str = "auto"
+
+
+class WrongFrequency(Refusal):
+    """The receiver of this framegrabber does not receive that frequency."""
+
+    code = "framegrabber.frequency"
+    remedy = "Tune to one of the frequencies the mission file links the framegrabber to."
+
+
+class Framegrabber(ResourceController[FramegrabberParameters]):
+    """Delivers pictures of its frequency to the ARC that holds it."""
+
+    parameters_type = FramegrabberParameters
+    commands = Tune
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        site = self.driver_site()
+        self._driver: FramegrabberDriver = build_driver("framegrabber", self.parameters.driver, site)
+        self._delivered = self._garbled = self._silent = 0
+
+    async def connect(self) -> None:
+        """Open the device, so that the first grant is as quick as the others."""
+        await super().connect()
+        await self._driver.open()
+
+    async def drain(self) -> None:
+        """Stop and close the device."""
+        await super().drain()
+        await self._driver.close()
+
+    async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
+        """Deliver nothing any more."""
+        self._driver.stop()
+
+    async def command(self, asked: Envelope[Any]) -> Message:
+        """Tune and begin to deliver."""
+        order: Tune = asked.body
+        hold = self.admit(order.arc, order.epoch)
+        known = self.parameters.links.get("video_frequency", [])
+        if order.frequency not in known:
+            raise WrongFrequency(f"{self.name} receives {', '.join(known) or 'nothing'}, not {order.frequency}")
+        numbers = iter(range(1, 1 << 62))
+
+        def deliver(picture: Picture) -> None:
+            self._deliver(hold, picture, numbers)
+
+        self._driver.tune(order.frequency, deliver)
+        return Applied(self.name, hold.epoch, self.clock.now_s(), "tune")
+
+    def statistics(self) -> dict[str, float]:
+        """Count pictures delivered, and those dropped because nobody or several were heard."""
+        return {
+            **super().statistics(),
+            "frames_delivered": self._delivered,
+            "frames_garbled": self._garbled,
+            "frames_silent": self._silent,
+        }
+
+    def _deliver(self, hold: Hold, picture: Picture, numbers: Any) -> None:
+        if picture.transmitters == 0:
+            self._silent += 1
+            return
+        if picture.transmitters > 1:
+            self._garbled += 1
+            return
+        self._delivered += 1
+        frame = Frame(
+            rc=self.name,
+            arc=hold.arc,
+            epoch=hold.epoch,
+            robot=picture.robot,
+            number=next(numbers),
+            captured_s=picture.captured_s,
+            width_px=picture.width_px,
+            height_px=picture.height_px,
+            pixels=picture.pixels,
+        )
+        self.bus.publish(address(Subsystem.RESOURCE_POOL, hold.arc), Conversation.FRAMES, frame)

@@ -1,0 +1,145 @@
+"""RC of a Scout: wheel speeds, jump, video transmitter; reached through a command radio.
+
+Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissance".
+"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.errors import LinkError, Refusal
+from backbone.naming import Subsystem, address
+from backbone.wire import Envelope, Message
+from resource_pool.drivers.interface import RobotProtocol, build_driver
+from resource_pool.holds import Hold
+from resource_pool.messages import (
+    COMMAND_TIMEOUT_S,
+    Applied,
+    CommandScout,
+    Drive,
+    Halt,
+    Jump,
+    LoadPacket,
+    PacketLoaded,
+    SwitchTransmitter,
+)
+from resource_pool.resource_controller import RcParameters, ResourceController
+
+RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet is not there
+
+
+class ScoutParameters(RcParameters, frozen=True, kw_only=True):
+    """A Scout's own.
+
+    Attributes:
+        network_id: Its address on the command radio, 1 to 254.
+        protocol: Name of the driver that spells its packets; empty: that of ``driver``.
+    """
+
+    network_id: int
+    protocol: str = ""
+
+
+class NoRadio(Refusal):
+    """The ARC holds the robot without the radio it is reached through."""
+
+    code = "scout.no_radio"
+    remedy = "Claim a kind of ARC whose set includes the robot's command radio."
+
+
+class Scout(ResourceController[ScoutParameters]):
+    """Turns commands into packets of the Scout's protocol and has the radio send them at the ARC's rate."""
+
+    parameters_type = ScoutParameters
+    commands = CommandScout
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        name = self.parameters.protocol or self.parameters.driver
+        site = self.driver_site()
+        self._protocol: RobotProtocol = build_driver("robot", name, site)
+        self._radio = (self.parameters.links.get("command_radio") or [""])[0]
+        self._halt_at_s: float | None = None
+        self._driven = asyncio.Event()
+        self._holder: Hold | None = None
+        self._timeouts = 0
+
+    async def serve(self) -> None:
+        """Stop the wheels when commands stay away, and end the hold when its lease is over."""
+        async with asyncio.TaskGroup() as both:
+            both.create_task(super().serve())
+            both.create_task(self._halt_when_silent())
+
+    async def connected(self, hold: Hold) -> None:
+        """Remember under which grant the robot may be commanded."""
+        self._holder = hold
+
+    async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
+        """Command nothing any more; the radio sends the safe packet when it is disconnected."""
+        self._holder, self._halt_at_s = None, None
+
+    async def command(self, asked: Envelope[Any]) -> Message:
+        """Drive, halt, jump, or switch the transmitter."""
+        order: CommandScout = asked.body
+        hold = self.admit(order.arc, order.epoch)
+        match order.command:
+            case Drive(left_rad_s=left, right_rad_s=right):
+                left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
+                await self._load(hold, self._protocol.drive(left, right))
+                self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
+                self._driven.set()
+                return self._applied(hold, "drive", {"left_rad_s": left, "right_rad_s": right})
+            case Halt():
+                await self._load(hold, self._protocol.halt())
+                self._halt_at_s = None
+                return self._applied(hold, "halt", {})
+            case Jump():
+                await self._load(hold, self._protocol.jump(), at_once=True)
+                return self._applied(hold, "jump", {})
+            case SwitchTransmitter(on=on, frequency=frequency):
+                await self._load(hold, self._protocol.transmitter(on, frequency), at_once=True)
+                await self._load(hold, self._protocol.halt())  # repeated, so that the robot hears it is not forgotten
+                return self._applied(hold, "transmitter", {"on": float(on)})
+
+    def statistics(self) -> dict[str, float]:
+        """Count also the halts because commands stayed away."""
+        return {**super().statistics(), "command_timeouts": self._timeouts}
+
+    async def _load(self, hold: Hold, payload: bytes, *, at_once: bool = False) -> None:
+        epoch = hold.companions.get(self._radio)
+        if epoch is None:
+            raise NoRadio(f"{hold.arc} holds {self.name} without {self._radio or 'a radio'}")
+        order = LoadPacket(
+            hold.arc, epoch, self.parameters.network_id, payload, self._protocol.safe(), hold.epoch, at_once
+        )
+        radio = address(Subsystem.RESOURCE_POOL, self._radio)
+        await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)
+
+    def _applied(self, hold: Hold, command: str, values: dict[str, float]) -> Applied:
+        return Applied(self.name, hold.epoch, self.clock.now_s(), command, values)
+
+    async def _halt_when_silent(self) -> None:
+        """Dead-man: a drive command that is not repeated ends after ``COMMAND_TIMEOUT_S``."""
+        while True:
+            self._driven.clear()
+            if self._halt_at_s is None:
+                await self._driven.wait()
+                continue
+            await self.clock.sleep_until_s(self._halt_at_s)
+            hold = self._holder
+            if hold is None or not self._silent_too_long():
+                continue
+            self._halt_at_s = None
+            self._timeouts += 1
+            self.story.note(hold.arc, "sent no command for too long: wheels stopped")
+            try:
+                await self._load(hold, self._protocol.halt())
+            except (Refusal, LinkError) as error:  # swapped out, or no radio: its safe packet or the robot itself halts
+                self.story.note(hold.arc, f"halt not sent: {error}")
+
+    def _silent_too_long(self) -> bool:
+        """Say whether, after the sleep, still no command has come."""
+        return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s

@@ -1,0 +1,114 @@
+"""The simulated world, played as hardware: radio packets in, the state of every body out.
+
+It steps physics and keeps the mission's pace; if it is late it catches up, it never skips a step.
+Pictures are drawn elsewhere, from the state it publishes once a frame.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.errors import Refusal
+from backbone.keys import Conversation
+from backbone.wire import Envelope, Message
+from resource_pool.messages import (
+    AskPose,
+    AskWorld,
+    ClockTick,
+    PacketHeard,
+    Pose,
+    RadioPacket,
+    WorldModel,
+    WorldState,
+)
+from scout_model.description import WorldDescription
+from scout_model.dimensions import FRAMES_PER_S
+from scout_model.errors import UnknownBody
+from scout_model.world import World
+
+
+class WorldParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the world is made of."""
+
+    world: WorldDescription
+
+
+class NoSuchBody(Refusal):
+    """The world has no body of this name."""
+
+    code = "world.unknown_body"
+    remedy = "Use the name of a scout, target or piece of furniture of the mission file."
+
+
+class SimulatedWorld(Component[WorldParameters]):
+    """Plays robots and room for the simulated drivers, and audits what it hears."""
+
+    parameters_type = WorldParameters
+    accepts = RadioPacket | AskWorld | AskPose
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._world = World(self.parameters.world)
+        self._epochs: dict[int, int] = {}
+        self._packets = self._stale = self._late_frames = 0
+        self._jammed_frames = 0
+
+    async def serve(self) -> None:
+        """Step one frame after the other, each at its time, and publish what came of it."""
+        first_s = self.clock.now_s()
+        frame = 0
+        while True:
+            frame += 1
+            due_s = first_s + frame / FRAMES_PER_S
+            self._late_frames += self.clock.now_s() > due_s + 1.0 / FRAMES_PER_S
+            await self.clock.sleep_until_s(due_s)
+            self._world.step_frame()
+            self._publish(frame, due_s)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Hear a packet, or tell what the world is and where a body stands."""
+        match asked.body:
+            case RadioPacket() as packet:
+                return self._hear(packet)
+            case AskWorld():
+                robots = {scout.name: scout.network_id for scout in self.parameters.world.scouts}
+                return WorldModel(self._world.mjcf, robots)
+            case AskPose(body=body):
+                try:
+                    x_m, y_m, heading_rad = self._world.pose(body)
+                except UnknownBody as error:
+                    raise NoSuchBody(str(error)) from error
+                return Pose(body, self.clock.now_s(), x_m, y_m, heading_rad)
+        return await super().answer(asked)
+
+    def statistics(self) -> dict[str, float]:
+        """Count packets, and what must never be: packets of an epoch that is over, frames with a jammed frequency."""
+        return {
+            "packets": self._packets,
+            "stale_packets": self._stale,
+            "jammed_frames": self._jammed_frames,
+            "late_frames": self._late_frames,
+            "frames": self._world.frame,
+        }
+
+    def _hear(self, packet: RadioPacket) -> PacketHeard:
+        self._packets += 1
+        if packet.epoch < self._epochs.get(packet.network_id, 0):
+            self._stale += 1
+            self.story.note(packet.arc, f"sent robot {packet.network_id} a packet of the past epoch {packet.epoch}")
+        self._epochs[packet.network_id] = max(packet.epoch, self._epochs.get(packet.network_id, 0))
+        self._world.hear(packet.network_id, packet.payload)
+        return PacketHeard(self.clock.now_s())
+
+    def _publish(self, frame: int, at_s: float) -> None:
+        transmitting = self._world.transmitting()
+        if len(set(transmitting.values())) < len(transmitting):
+            self._jammed_frames += 1
+        state = WorldState(frame, at_s, self._world.state().tobytes(), transmitting)
+        self.bus.publish(self.address, Conversation.TELEMETRY, state)
+        self.bus.publish(self.address, Conversation.CLOCK, ClockTick(frame, at_s, self.clock.rate))
