@@ -206,7 +206,7 @@ class Component(Generic[P]):
         """End because of a bug; ``run`` raises it."""
         if self._bug is None:
             self._bug = bug
-            self.feedback = f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
+            self.feedback = _complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
             log.error("%s failed", self.address, exc_info=bug)
         self._end.set()
@@ -266,7 +266,9 @@ class Component(Generic[P]):
             await self._live()
         except Exception as bug:
             self.fail(bug)
-        self._enter(LifeState.FAILED if self._bug else LifeState.STOPPED)
+        if self._bug is not None:
+            self.feedback = _complaint(self._bug)  # whatever draining reported
+        self._enter(LifeState.FAILED if self._bug is not None else LifeState.STOPPED)
         if self._token is not None:
             self._token.close()
 
@@ -362,6 +364,10 @@ class Component(Generic[P]):
             raise
         self.story.note(name, f"{user} set {name} from {old[name]!r} to {value!r}")
         return Parameters(msgspec.to_builtins(self.parameters))
+
+
+def _complaint(bug: BaseException) -> str:
+    return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
 
 
 def _convert(values: dict[str, Any], kind: type[msgspec.Struct]) -> msgspec.Struct:
