@@ -190,10 +190,6 @@ class Slot(NamedTuple):
         """End of its minimum run time."""
         return self.start_s + self.arc.length_s
 
-    def starts(self, now_s: float) -> bool:
-        """Say whether its time has come."""
-        return self.start_s <= now_s + INSTANT_S
-
 
 class Turn(NamedTuple):
     """An ARC whose time has come, and the holders that must go first (none: it connects)."""
@@ -354,31 +350,26 @@ class MasterSchedule:
 
     def _due_in(self, group: Sequence[ArcEntry], now_s: float) -> Turn | None:
         slots = self.plan(group, now_s)
-        if not any(slot.starts(now_s) for slot in slots):
+        starting = _starting(slots, now_s)
+        if not starting:
             return None
-        certain = {slot.arc for slot in self._certain_plan(group, now_s) if slot.starts(now_s)}
+        # A slice is ended only for who fits without forgiveness, however early the hand-overs under way may end:
+        # else it might be ended for a gap that closes meanwhile.
+        exact = _starting(self.plan(group, now_s, slack_s=0.0), now_s)
+        certain = _starting(self.plan(group, now_s, slack_s=0.0, handed_over=True), now_s)
         pending: list[ArcEntry] = []
-        for slot in slots:
-            arc = slot.arc
-            if arc.state is not RequestState.WAITING or self._must_let_higher_go_first(arc, group):
+        for arc in [slot.arc for slot in slots if slot.arc.state is RequestState.WAITING]:
+            if self._must_let_higher_go_first(arc, group):
                 continue
-            if slot.starts(now_s):
+            if arc in starting or (arc in exact and arc in certain):
                 in_the_way = self._in_the_way(arc, pending, group, now_s)
                 if in_the_way and arc in certain:
                     return Turn(arc, in_the_way)
-                if not in_the_way and self.fits(arc, [holder for holder in group if holder.holds]):
+                if not in_the_way and arc in starting and self.fits(arc, [h for h in group if h.holds]):
                     return Turn(arc, [])
             if arc in certain:
                 pending.append(arc)
         return None
-
-    def _certain_plan(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
-        """Return the plan for the case that all hand-overs end at once, in which no overlap is forgiven.
-
-        Only who starts now by this plan, too, displaces anybody: else a slice might be ended for a gap
-        that closes meanwhile.
-        """
-        return self.plan(group, now_s, handed_over=True, slack_s=0.0)
 
     def _in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
@@ -444,6 +435,10 @@ class MasterSchedule:
 def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
     """Return the holds that overlap this span."""
     return [hold for hold in holds if hold.start_s < end_s - INSTANT_S and hold.end_s > start_s + INSTANT_S]
+
+
+def _starting(slots: Iterable[Slot], now_s: float) -> set[ArcEntry]:
+    return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
 
 
 def _share_rc(a: ArcEntry, b: ArcEntry) -> bool:
