@@ -1,0 +1,69 @@
+"""What the programs in bench/ share: a hub and helpers in processes of their own, percentiles, one JSON line."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+END_WITHIN_S = 5.0  # chosen: a helper whose input is closed ends in milliseconds
+
+
+def percentile(values: Sequence[float], share: float) -> float:
+    """Return the value under which this share (0 to 1) of the values lies.
+
+    Example:
+        >>> percentile([4.0, 1.0, 3.0, 2.0], 0.5)
+        3.0
+    """
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))]
+
+
+def summary(values_s: Sequence[float]) -> dict[str, float]:
+    """Return p50, p99 and best of durations in seconds, as microseconds."""
+    return {
+        "p50_us": round(percentile(values_s, 0.5) * 1e6, 1),
+        "p99_us": round(percentile(values_s, 0.99) * 1e6, 1),
+        "best_us": round(min(values_s) * 1e6, 1),
+    }
+
+
+def report(claim: str, **measured: Any) -> None:
+    """Print one JSON line: the claim, what was measured, and how busy the machine was."""
+    machine = {"cpus": os.cpu_count(), "load": round(os.getloadavg()[0], 2)}
+    print(json.dumps({"bench": claim, **measured, **machine}))
+
+
+def free_endpoint() -> str:
+    """Return an endpoint on the loopback interface that nobody uses."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@contextmanager
+def helper(program: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """Run ``python program arguments…`` until the block ends; it ends when its standard input closes."""
+    process = subprocess.Popen([sys.executable, program, *arguments], stdin=subprocess.PIPE)
+    try:
+        yield process
+    finally:
+        if process.stdin is not None:
+            process.stdin.close()
+        try:
+            process.wait(END_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+            raise
+
+
+def wait_for_end_of_input() -> None:
+    """Return when the process that started this helper closes its input, or dies."""
+    sys.stdin.buffer.read()
