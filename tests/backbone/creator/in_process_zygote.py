@@ -1,0 +1,101 @@
+"""A zygote's twin for virtual time: components run as tasks of one loop, and die as told."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable
+from typing import Any
+
+from backbone.bus.clock import VirtualClock
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.component import Component, NoParameters
+from backbone.component.launch import Launch
+from backbone.component.process import EXIT_BUG, EXIT_REFUSED, load_class
+from backbone.creator.zygote import NoProcess
+from backbone.errors import Refusal
+
+
+class InProcessZygote:
+    """Runs each component as a task; its pid is a number that only grows.
+
+    Attributes:
+        lives: Components that run, by pid.
+        forked: Names in the order in which they were forked.
+        refuses: Why there is no further process; empty: there is one.
+    """
+
+    def __init__(self, network: LocalNetwork) -> None:
+        self.on_exit: Callable[[int, int], None] = lambda _pid, _returncode: None
+        self.on_lost: Callable[[], None] = lambda: None
+        self.lives: dict[int, Component[Any]] = {}
+        self.forked: list[str] = []
+        self.refuses = ""
+        self._network, self._next_pid = network, 1000
+        self._tasks: dict[int, asyncio.Task[None]] = {}
+
+    async def fork(self, launch: Launch) -> int:
+        if self.refuses:
+            raise NoProcess(self.refuses)
+        await asyncio.sleep(0)
+        clock = VirtualClock()
+        self._next_pid += 1
+        pid, kind = self._next_pid, load_class(launch.class_path)
+        self.forked.append(launch.name)
+        self.lives[pid] = component = kind(launch, self._network.join(launch.address, clock), clock)
+        self._tasks[pid] = task = asyncio.create_task(component.run(), name=launch.name)
+        task.add_done_callback(lambda done: self._ended(pid, done))
+        return pid
+
+    def kill(self, pid: int, number: signal.Signals) -> None:
+        if pid not in self.lives:
+            return
+        if number is signal.SIGKILL:
+            self._tasks[pid].cancel()
+        else:
+            self.lives[pid].end(number.name)
+
+    async def close(self) -> None:
+        for pid in list(self.lives):
+            self.kill(pid, signal.SIGKILL)
+        await asyncio.gather(*self._tasks.values(), return_exceptions=True)
+
+    def _ended(self, pid: int, done: asyncio.Task[None]) -> None:
+        del self.lives[pid], self._tasks[pid]
+        bug = None if done.cancelled() else done.exception()
+        code = EXIT_REFUSED if isinstance(bug, Refusal) else EXIT_BUG
+        returncode = -signal.SIGKILL if done.cancelled() else code if bug else 0
+        self.on_exit(pid, int(returncode))
+
+
+class Quiet(Component[NoParameters]):
+    """Is ready and waits."""
+
+
+class Stubborn(Component[NoParameters]):
+    """Takes an hour to drain."""
+
+    async def drain(self) -> None:
+        await self.clock.sleep_s(3600.0)
+
+
+class Late(Component[NoParameters]):
+    """Needs ten seconds until it is ready, and cannot be hurried."""
+
+    async def connect(self) -> None:
+        await self.clock.sleep_s(10.0)
+
+
+class Leaver(Component[NoParameters]):
+    """Ends itself in good order after a second."""
+
+    async def serve(self) -> None:
+        await self.clock.sleep_s(1.0)
+        self.end("its work is done")
+
+
+class Broken(Component[NoParameters]):
+    """Ends by a bug before it is ready."""
+
+    async def connect(self) -> None:
+        raise RuntimeError("the bug of the sample")

@@ -1,0 +1,221 @@
+"""The creator's conversations, on virtual time."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import pytest
+from in_process_zygote import InProcessZygote
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import Bus
+from backbone.component.launch import Launch
+from backbone.component.messages import ComponentState, SetParameter
+from backbone.component.messages import Parameters as ParametersAnswer
+from backbone.creator.messages import (
+    AlreadyHere,
+    EndedBy,
+    EndProcess,
+    HostLoad,
+    ListProcesses,
+    NotHere,
+    NotThePlacer,
+    ProcessEnded,
+    Processes,
+    ProcessFell,
+    RestartPolicy,
+    Spawn,
+    Spawned,
+    StartFailed,
+)
+from backbone.creator.service import Creator
+from backbone.keys import Conversation
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Resolve, Resolved
+from backbone.naming import Subsystem
+from backbone.placer.messages import ADDRESS as PLACER
+
+CREATOR = "backbone/creator-lab"
+
+
+@dataclass
+class Host:
+    """A host with a creator, seen by the placer and by a stranger."""
+
+    zygote: InProcessZygote
+    placer: Bus
+    stranger: Bus
+    loads: list[HostLoad] = field(default_factory=list)
+    fell: list[ProcessFell] = field(default_factory=list)
+
+    async def spawn(self, spawn: Spawn) -> Spawned:
+        return await self.placer.ask(CREATOR, spawn, Spawned, within_s=30.0)
+
+    async def end(self, name: str) -> ProcessEnded:
+        return await self.placer.ask(CREATOR, EndProcess(name, "over"), ProcessEnded, within_s=5.0)
+
+    async def processes(self) -> Processes:
+        return await self.stranger.ask(CREATOR, ListProcesses(), Processes, within_s=1.0)
+
+
+def order(kind: str, name: str, **more: Any) -> Spawn:
+    policy = RestartPolicy(back_off_s=0.1, limit=1)
+    given = {"policy": policy, "ready_within_s": 5.0, "requester": "ui_console/operator", **more}
+    return Spawn(Subsystem.RESOURCE_POOL, name, kind.lower(), f"in_process_zygote:{kind}", **given)
+
+
+@pytest.fixture
+def on_host(local_mission: Callable, beside: Callable) -> Callable[[Callable[[Host], Awaitable[None]]], None]:
+    @asynccontextmanager
+    async def host() -> AsyncIterator[Host]:
+        async with local_mission() as network:
+            clock = VirtualClock()
+            launch = Launch(
+                "local",
+                Subsystem.BACKBONE,
+                "creator-lab",
+                "creator",
+                "backbone.creator.service:Creator",
+                "lab",
+                "",
+                0.0,
+                1.0,
+                {"tags": ["radio"]},
+            )
+            it = Host(InProcessZygote(network), network.join(PLACER, clock), network.join("ui_console/x", clock))
+            it.stranger.subscribe(CREATOR, Conversation.TELEMETRY, HostLoad, lambda heard: it.loads.append(heard.body))
+            it.stranger.subscribe(CREATOR, Conversation.EVENTS, ProcessFell, lambda heard: it.fell.append(heard.body))
+            async with beside(Creator(launch, network.join(launch.address, clock), clock, it.zygote)):
+                yield it
+            assert not it.zygote.lives, "a creator left something behind"
+            await it.placer.close()
+            await it.stranger.close()
+
+    def run(body: Callable[[Host], Awaitable[None]]) -> None:
+        async def main() -> None:
+            async with host() as it:
+                await body(it)
+
+        run_virtual(main())
+
+    return run
+
+
+def test_a_spawned_component_is_ready_and_registered_with_host_and_requester(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        spawned = await host.spawn(order("Quiet", "scout1"))
+        assert spawned == Spawned("resource_pool/scout1", next(iter(host.zygote.lives)))
+        state: ComponentState = (
+            await host.stranger.ask(NAMESERVER, Resolve("scout1"), Resolved, within_s=1.0)
+        ).component
+        assert (state.host, state.requester, state.type) == ("lab", "ui_console/operator", "quiet")
+
+    on_host(body)
+
+
+def test_the_list_shows_the_orders_as_they_were_given(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        asked = order("Quiet", "scout1", pinned=True, tags=["radio"])
+        await host.spawn(asked)
+        listing = await host.processes()
+        assert (listing.host, listing.tags) == ("lab", ["radio"])
+        assert [process.spawn for process in listing.processes] == [asked]
+
+    on_host(body)
+
+
+def test_only_the_placer_starts_and_ends_processes(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await host.spawn(order("Quiet", "scout1"))
+        with pytest.raises(NotThePlacer):
+            await host.stranger.ask(CREATOR, order("Quiet", "scout2"), Spawned, within_s=1.0)
+        with pytest.raises(NotThePlacer):
+            await host.stranger.ask(CREATOR, EndProcess("scout1"), ProcessEnded, within_s=1.0)
+        assert len(host.zygote.lives) == 1
+
+    on_host(body)
+
+
+def test_the_same_order_twice_starts_one_process_and_another_of_that_name_is_refused(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        first = await host.spawn(order("Quiet", "scout1"))
+        assert await host.spawn(order("Quiet", "scout1")) == first
+        with pytest.raises(AlreadyHere):
+            await host.spawn(order("Quiet", "scout1", requester="ui_console/other"))
+        assert host.zygote.forked == ["scout1"]
+
+    on_host(body)
+
+
+def test_a_failed_start_is_refused_with_what_is_known(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        with pytest.raises(StartFailed, match="broken: exit code 1"):
+            await host.spawn(order("Broken", "broken"))
+        assert (await host.processes()).processes == []
+
+    on_host(body)
+
+
+def test_ending_answers_when_it_is_gone_and_an_unknown_name_is_refused(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await host.spawn(order("Quiet", "scout1"))
+        assert await host.end("scout1") == ProcessEnded("scout1", EndedBy.ASKING, 0)
+        assert not host.zygote.lives
+        with pytest.raises(NotHere):
+            await host.end("scout1")
+
+    on_host(body)
+
+
+def test_a_fall_is_published_with_what_follows(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await host.spawn(order("Quiet", "scout1"))
+        for _ in range(2):
+            host.zygote.kill(next(iter(host.zygote.lives)), signal.SIGKILL)
+            await VirtualClock().sleep_s(0.5)
+        assert [(fell.name, fell.how, fell.restart_in_s) for fell in host.fell] == [
+            ("scout1", "killed by SIGKILL", 0.1),
+            ("scout1", "killed by SIGKILL", -1.0),
+        ]
+        assert (await host.processes()).processes[0].given_up
+
+    on_host(body)
+
+
+def test_the_load_is_published_each_second_and_when_processes_change(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await VirtualClock().sleep_s(3.5)
+        assert len(host.loads) == 4
+        host.loads.clear()
+        await host.spawn(order("Quiet", "scout1"))
+        await VirtualClock().sleep_s(0.01)
+        assert host.loads[-1].components == 1
+        await host.end("scout1")
+        await VirtualClock().sleep_s(0.01)
+        assert host.loads[-1].components == 0
+        load = host.loads[-1]
+        assert (load.host, load.tags) == ("lab", ["radio"])
+        assert 0.0 <= load.cpu <= 1.0
+        assert 0.0 < load.memory <= 1.0
+        assert load.cores >= 1
+
+    on_host(body)
+
+
+def test_new_tags_are_told_at_once(on_host: Callable) -> None:
+    async def body(host: Host) -> None:
+        await host.stranger.ask(CREATOR, SetParameter("tags", ["camera"]), ParametersAnswer, within_s=1.0)
+        await VirtualClock().sleep_s(0.01)
+        assert host.loads[-1].tags == ["camera"]
+
+    on_host(body)
+
+
+def test_orders_survive_the_wire() -> None:
+    asked = order("Quiet", "scout1", parameters={"speed": 1.5, "names": ["a"]})
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(asked), type=Spawn) == asked

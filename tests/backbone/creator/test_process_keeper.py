@@ -1,0 +1,247 @@
+"""The keeper on virtual time: components run in this process, the nameserver too."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from in_process_zygote import InProcessZygote
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.launch import Launch
+from backbone.creator.messages import (
+    AlreadyHere,
+    EndedBy,
+    NotHere,
+    ProcessFell,
+    RestartPolicy,
+    StartFailed,
+)
+from backbone.creator.process_keeper import LAST_LINES, ProcessKeeper, last_lines
+from backbone.creator.zygote_process import log_path
+from backbone.naming import Subsystem
+
+POLICY = RestartPolicy(back_off_s=0.1, limit=2, window_s=60.0)
+
+
+@dataclass
+class Bench:
+    keeper: ProcessKeeper
+    zygote: InProcessZygote
+    fell: list[ProcessFell]
+
+    async def start(self, kind: str, name: str, policy: RestartPolicy = POLICY, within_s: float = 5.0) -> int:
+        return await self.keeper.start(launch(kind, name), policy, within_s)
+
+
+def launch(kind: str, name: str) -> Launch:
+    path = f"in_process_zygote:{kind}"
+    return Launch("local", Subsystem.RESOURCE_POOL, name, kind.lower(), path, "local", "", 0.0, 1.0)
+
+
+@pytest.fixture
+def on_bench(local_mission: Callable) -> Callable[[Callable[[Bench], Awaitable[None]]], None]:
+    """Return a runner of a test's body with a keeper that is closed afterwards."""
+
+    @asynccontextmanager
+    async def bench() -> AsyncIterator[Bench]:
+        async with local_mission() as network:
+            zygote, fell = InProcessZygote(network), []
+            keeper = ProcessKeeper(zygote, VirtualClock())
+            keeper.on_fell = fell.append
+            bus = network.join("backbone/tester", VirtualClock())
+            keeper.use(bus)
+            yield Bench(keeper, zygote, fell)
+            await keeper.close()
+            assert not zygote.lives, "something was left after the keeper's end"
+            await bus.close()
+
+    def run(body: Callable[[Bench], Awaitable[None]]) -> None:
+        async def main() -> None:
+            async with bench() as it:
+                await body(it)
+
+        run_virtual(main())
+
+    return run
+
+
+def now_s() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def test_start_returns_the_pid_when_the_component_is_ready(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        pid = await bench.start("Quiet", "scout1")
+        assert list(bench.zygote.lives) == [pid]
+        assert [(each.spawn.name, each.pid) for each in bench.keeper.processes()] == [("scout1", pid)]
+
+    on_bench(body)
+
+
+def test_a_killed_component_is_restarted_after_its_back_off_and_given_up_at_the_limit(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        await bench.start("Quiet", "scout1")
+        for _ in range(2):
+            bench.zygote.kill(bench.keeper.processes()[0].pid, signal.SIGKILL)
+            await VirtualClock().sleep_s(1.0)
+            assert bench.keeper.processes()[0].pid in bench.zygote.lives
+        bench.zygote.kill(bench.keeper.processes()[0].pid, signal.SIGKILL)
+        await VirtualClock().sleep_s(1.0)
+        state = bench.keeper.processes()[0]
+        assert (state.given_up, state.restarts, state.pid, state.last_end) == (True, 2, 0, "killed by SIGKILL")
+        assert [fell.restart_in_s for fell in bench.fell] == [0.1, 0.2, -1.0]
+
+    on_bench(body)
+
+
+def test_a_component_that_ends_by_itself_is_forgotten(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        await bench.start("Leaver", "watcher")
+        await VirtualClock().sleep_s(2.0)
+        assert bench.keeper.processes() == []
+        assert bench.fell == []
+        with pytest.raises(NotHere):
+            await bench.keeper.end("watcher")
+
+    on_bench(body)
+
+
+def test_a_start_that_is_not_ready_in_time_fails_and_leaves_nothing(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        with pytest.raises(StartFailed, match="not ready within 5 s"):
+            await bench.start("Late", "slow")
+        assert not bench.zygote.lives
+        assert now_s() < 6.0
+
+    on_bench(body)
+
+
+def test_a_start_that_breaks_fails_at_once(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        with pytest.raises(StartFailed, match="exit code 1"):
+            await bench.start("Broken", "broken")
+        assert now_s() < 0.1
+        assert bench.keeper.processes() == []
+
+    on_bench(body)
+
+
+def test_a_start_without_a_process_fails_with_the_reason(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        bench.zygote.refuses = "too many processes"
+        with pytest.raises(StartFailed, match="too many processes"):
+            await bench.start("Quiet", "scout1")
+        with pytest.raises(StartFailed, match="too many processes"):
+            await bench.keeper.start_hub(launch("Quiet", "hub"), POLICY)
+
+    on_bench(body)
+
+
+def test_end_says_what_it_took(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        await bench.start("Quiet", "obeys")
+        await bench.start("Stubborn", "hangs")
+        assert (await bench.keeper.end("obeys", "over")).by is EndedBy.ASKING
+        began_s = now_s()
+        assert (await bench.keeper.end("hangs", "over", 1.5, 0.5)).by is EndedBy.SIGKILL
+        assert now_s() - began_s == pytest.approx(2.0, abs=0.01)
+
+    on_bench(body)
+
+
+def test_everybody_who_ordered_an_end_is_answered(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        await bench.start("Stubborn", "hangs")
+        ends = await asyncio.gather(bench.keeper.end("hangs", "one"), bench.keeper.end("hangs", "two", 0.1, 0.1))
+        assert ends[0] == ends[1]
+        assert now_s() < 0.5
+
+    on_bench(body)
+
+
+def test_a_start_hears_that_its_component_was_ended_meanwhile(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        starting = asyncio.create_task(bench.start("Late", "slow"))
+        await VirtualClock().sleep_s(1.0)
+        await bench.keeper.end("slow")
+        with pytest.raises(StartFailed):
+            await starting
+
+    on_bench(body)
+
+
+def test_a_name_runs_once(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        await bench.start("Quiet", "scout1")
+        with pytest.raises(AlreadyHere):
+            await bench.start("Quiet", "scout1")
+
+    on_bench(body)
+
+
+def test_waiting_for_readiness_outlasts_a_restart(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        pid = await bench.start("Quiet", "scout1")
+        assert await bench.keeper.wait_ready("scout1", 1.0) == pid
+        bench.zygote.kill(pid, signal.SIGKILL)
+        await VirtualClock().sleep_s(0.01)
+        assert await bench.keeper.wait_ready("scout1", 1.0) > pid
+
+    on_bench(body)
+
+
+def test_waiting_for_readiness_ends_when_the_component_is_given_up(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        pid = await bench.start("Quiet", "scout1", RestartPolicy(limit=0))
+        bench.zygote.kill(pid, signal.SIGKILL)
+        await VirtualClock().sleep_s(0.01)
+        with pytest.raises(StartFailed, match="given up"):
+            await bench.keeper.wait_ready("scout1", 1.0)
+        with pytest.raises(NotHere):
+            await bench.keeper.wait_ready("nobody", 1.0)
+
+    on_bench(body)
+
+
+def test_closing_ends_the_last_started_first_and_waits_for_nobody_who_hangs(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        for kind, name in [("Quiet", "first"), ("Stubborn", "second"), ("Stubborn", "third"), ("Quiet", "fourth")]:
+            await bench.start(kind, name)
+        ended = await bench.keeper.close()
+        assert [(end.name, end.by) for end in ended] == [
+            ("fourth", EndedBy.ASKING),
+            ("third", EndedBy.SIGKILL),
+            ("second", EndedBy.SIGKILL),
+            ("first", EndedBy.ASKING),
+        ]
+        assert now_s() < 2.5
+        with pytest.raises(StartFailed, match="being ended"):
+            await bench.start("Quiet", "late")
+
+    on_bench(body)
+
+
+def test_closing_ends_who_waits_for_a_restart(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        pid = await bench.start("Quiet", "scout1")
+        bench.zygote.kill(pid, signal.SIGKILL)
+        await VirtualClock().sleep_s(0.01)
+        assert [end.by for end in await bench.keeper.close()] == [EndedBy.ITSELF]
+        await VirtualClock().sleep_s(5.0)
+        assert bench.zygote.forked == ["scout1"]
+
+    on_bench(body)
+
+
+def test_the_end_of_a_log_is_shown_without_reading_all_of_it(tmp_path: Path) -> None:
+    assert last_lines(str(tmp_path), "nobody") == []
+    path = log_path(str(tmp_path), "scout1")
+    path.parent.mkdir()
+    path.write_text("\n".join(f"line {number}" for number in range(100_000)))
+    assert last_lines(str(tmp_path), "scout1") == [f"line {number}" for number in range(100_000 - LAST_LINES, 100_000)]

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+import asyncio
+import os
+import subprocess
+import sys
+
+from backbone.creator.process_table import (
+    Process,
+    descendants,
+    environment,
+    read_line,
+    read_table,
+    remains,
+    tree,
+    wait_gone,
+    zygote_title,
+    zygotes_of,
+)
+
+
+def alive(parent: int, session: int, title: str = "x") -> Process:
+    return Process(parent, session, title, is_gone=False)
+
+
+CREATOR, ITS_ZYGOTE = 20, 21
+TABLE = {
+    10: alive(1, 10, zygote_title(1)),
+    CREATOR: alive(10, 20),
+    ITS_ZYGOTE: alive(20, 21, zygote_title(CREATOR)),
+    30: alive(21, 30, "scout1"),
+    31: alive(30, 30, "sleep"),
+    32: alive(30, 32, "own session"),
+    33: alive(21, 30, "orphan of 30"),
+    34: Process(30, 30, "zombie", is_gone=True),
+}
+
+
+def test_a_component_is_itself_its_session_and_its_descendants() -> None:
+    assert tree(TABLE, 30) == {30, 31, 32, 33}
+
+
+def test_a_creator_does_not_include_its_zygote_nor_what_that_forked() -> None:
+    assert tree(TABLE, CREATOR) == {CREATOR}
+    assert descendants(TABLE, 10) == {CREATOR}
+    assert zygotes_of(TABLE, CREATOR) == {ITS_ZYGOTE}
+
+
+def test_what_a_dead_component_left_is_known_by_its_session() -> None:
+    table = {pid: process for pid, process in TABLE.items() if pid != 30}
+    assert remains(table, 30) == {31, 33}
+
+
+def test_a_zombie_is_nothing_that_is_left() -> None:
+    assert remains({34: TABLE[34]}, 30) == set()
+
+
+def test_a_title_may_hold_anything() -> None:
+    assert read_line("5 (a) b (c)) Z 4 5 3 0 -1") == Process(4, 3, "a) b (c)", is_gone=True)
+
+
+def test_the_table_knows_this_process() -> None:
+    own = read_table()[os.getpid()]
+    assert (own.parent, own.session, own.is_gone) == (os.getppid(), os.getsid(0), False)
+
+
+def test_an_environment_that_cannot_be_read_is_empty() -> None:
+    assert environment(0) == []
+
+
+async def test_waiting_for_the_gone_returns_when_all_are() -> None:
+    sleepers = [subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) for _ in range(2)]
+    waiting = asyncio.create_task(wait_gone([sleeper.pid for sleeper in sleepers]))
+    for sleeper in sleepers:
+        assert not waiting.done()
+        assert sleeper.stdin is not None
+        sleeper.stdin.close()
+        await asyncio.to_thread(sleeper.wait)
+    await asyncio.wait_for(waiting, 5.0)
+    await wait_gone([sleeper.pid for sleeper in sleepers])
