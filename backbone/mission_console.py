@@ -50,9 +50,12 @@ class ConsoleObserver:
 
     def tell(self, line: str) -> None:
         """Print one line, also to whoever waits for readiness."""
-        self._console.print(line, highlight=False, markup=False)
+        self._print(line)
         if self._ready_to is not None:
             print(line, file=self._ready_to, flush=True)
+
+    def _print(self, line: str) -> None:
+        self._console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Show the mission until cancelled."""
@@ -80,7 +83,7 @@ class ConsoleObserver:
         event: StoryEvent = envelope.body
         self._events.append(event)
         if not self._live:
-            self._console.print(f"{event.at_s:9.2f} s  {event.where}: {event.what}", highlight=False)
+            self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
 
     def _heard_schedule(self, envelope: Envelope[Any]) -> None:
         schedule: Schedule = envelope.body
@@ -89,7 +92,7 @@ class ConsoleObserver:
         line = holders_line(schedule)
         if line != self._told:
             self._told = line
-            self._console.print(f"{schedule.at_s:9.2f} s  {line}", highlight=False)
+            self._print(f"{schedule.at_s:9.2f} s  {line}")
 
 
 async def bring_up_on_console(

@@ -311,7 +311,10 @@ class RcManager(Component[RcManagerParameters]):
                 return
             failed = ""
         await self._disconnect_rcs(order.arc, order.epochs, f"connection failed at {failed or order.arc}")
+        self._running_rcs.discard(failed)
         self.happened(OpenFailed(order.arc, failed))
+        if failed:  # down until it has said how it is
+            await self._meet_rc(failed)
 
     def _measure_switch(self, order: ConnectArc) -> None:
         """Keep the time since the first of these RCs was revoked from another ARC, settling not counted."""

