@@ -98,17 +98,19 @@ def tree(table: Table, component: int) -> set[int]:
     return {pid for pid in own | session | descendants(table, component) if not table[pid].is_gone}
 
 
-def remains(table: Table, component: int, adopter: int = 0) -> set[int]:
+def remains(table: Table, component: int, adopter: int | None = None) -> set[int]:
     """Return what a component that has ended left behind, except zygotes.
 
     Args:
-        adopter: Who inherits the children of dead components; 0: nobody of ours.
+        adopter: Who inherited its children, if that is known: fewer environments have to be read then.
     """
-    found = {pid for pid, process in table.items() if process.session == component}
-    if adopter:
-        mark = f"{MARK}={component}".encode()
-        found |= {pid for pid, process in table.items() if process.parent == adopter and mark in environment(pid)}
-    return {pid for pid in found if not table[pid].is_gone and not is_zygote(table[pid])}
+    mark = f"{MARK}={component}".encode()
+    left = {
+        pid
+        for pid, process in table.items()
+        if process.session == component or (adopter in (None, process.parent) and mark in environment(pid))
+    }
+    return {pid for pid in left if not table[pid].is_gone and not is_zygote(table[pid])}
 
 
 def zygotes_of(table: Table, parent: int) -> set[int]:

@@ -94,6 +94,8 @@ class Zygote:
             run_directory: Folder the zygote removes at its end, also when this process is killed; empty: none.
             preload: Modules the zygote imports before the first order.
         """
+        if run_directory:
+            log_path(run_directory, "any").parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         settings = ZygoteSettings(os.getpid(), run_directory, tuple(preload), tuple(sys.path))
         return cls(_spawn(settings), settings)
 
@@ -260,6 +262,7 @@ def _spawn(settings: ZygoteSettings) -> _Body:
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,
+            env={name: value for name, value in os.environ.items() if name != process_table.MARK},
             start_new_session=True,
         )
         if output is not None:

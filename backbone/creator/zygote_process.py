@@ -344,14 +344,16 @@ def _only_wake(_number: int, _frame: object) -> None:
 
 
 def _redirect(launch: Launch) -> None:
-    """Connect standard input to nothing, output and errors to the component's log if the mission has a folder."""
+    """Connect standard input to nothing, output and errors to the component's log while the mission has a folder."""
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
     if launch.run_directory:
         path = log_path(launch.run_directory, launch.name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        try:
+            file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        except FileNotFoundError:  # the mission ends just now and its folder is gone: do not bring it back
+            file = os.open(os.devnull, os.O_WRONLY)
         os.dup2(file, 1)
         os.dup2(file, 2)
         os.close(file)

@@ -19,21 +19,14 @@ class Parent(Component[NoParameters]):
     """Has children: a program, a program in a session of its own, and a plain fork."""
 
     async def connect(self) -> None:
-        sleep = [sys.executable, "-c", "import signal, time; signal.signal(15, signal.SIG_IGN); time.sleep(600)"]
-        subprocess.Popen(sleep)
-        subprocess.Popen(sleep, start_new_session=True)
-        if os.fork() == 0:
-            signal.signal(signal.SIGTERM, signal.SIG_IGN)
-            time.sleep(600)
-            os._exit(0)
+        _have_children()
 
 
 class Stubborn(Component[NoParameters]):
     """Hangs as soon as it is told to drain, and ignores SIGTERM."""
 
     async def drain(self) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
-        time.sleep(600)
+        _hang()
 
 
 class Late(Component[NoParameters]):
@@ -57,3 +50,17 @@ class Leaver(Component[NoParameters]):
     async def serve(self) -> None:
         await self.clock.sleep_s(0.1)
         self.end("its work is done")
+
+
+def _have_children() -> None:
+    sleep = [sys.executable, "-c", "import signal, time; signal.signal(15, signal.SIG_IGN); time.sleep(600)"]
+    subprocess.Popen(sleep)
+    subprocess.Popen(sleep, start_new_session=True)
+    if os.fork() == 0:
+        _hang()
+
+
+def _hang() -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    time.sleep(600)
+    os._exit(0)

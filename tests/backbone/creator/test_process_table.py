@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 from backbone.creator.process_table import (
+    MARK,
     Process,
     descendants,
     environment,
@@ -68,13 +69,27 @@ def test_an_environment_that_cannot_be_read_is_empty() -> None:
     assert environment(0) == []
 
 
+def test_what_left_the_session_by_another_program_is_known_by_its_environment() -> None:
+    component = 4_194_305  # no pid: Linux gives none above 2**22
+    environ = {**os.environ, MARK: str(component)}
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, env=environ) as program:
+        assert remains(read_table(), component) == {program.pid}
+        assert remains(read_table(), component, adopter=os.getpid()) == {program.pid}
+        assert remains(read_table(), component, adopter=program.pid) == set()
+        program.kill()
+
+
+def sleeper() -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+
+
 async def test_waiting_for_the_gone_returns_when_all_are() -> None:
-    sleepers = [subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) for _ in range(2)]
-    waiting = asyncio.create_task(wait_gone([sleeper.pid for sleeper in sleepers]))
-    for sleeper in sleepers:
+    sleepers = [sleeper(), sleeper()]
+    waiting = asyncio.create_task(wait_gone([one.pid for one in sleepers]))
+    for one in sleepers:
         assert not waiting.done()
-        assert sleeper.stdin is not None
-        sleeper.stdin.close()
-        await asyncio.to_thread(sleeper.wait)
+        assert one.stdin is not None
+        one.stdin.close()
+        await asyncio.to_thread(one.wait)
     await asyncio.wait_for(waiting, 5.0)
-    await wait_gone([sleeper.pid for sleeper in sleepers])
+    await wait_gone([one.pid for one in sleepers])
