@@ -1,0 +1,171 @@
+"""From the order to all ready: 20 light components started by one creator, beside bare process starts.
+
+Prints one JSON line. Real hub, real nameserver, real creator; the components are started all at once, as
+the placer does it. Floors, measured in the same run: a bare zygote (imports done, no bus) that forks 20
+children which answer with one byte on a pipe, and 20 bare interpreters (``python -c pass``), two at a time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import AsyncIterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+
+import msgspec
+import uvloop
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.launch import Launch
+from backbone.creator.messages import EndProcess, ProcessEnded, RestartPolicy, Spawn, Spawned
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.zygote import Zygote
+from backbone.naming import Subsystem
+from backbone.placer.messages import ADDRESS as PLACER
+
+COMPONENTS = 20
+CREATOR = "backbone/creator-bench"
+
+
+@asynccontextmanager
+async def creator_up(folder: str) -> AsyncIterator[ZenohBus]:
+    """Give the placer's bus to a host with nameserver and creator."""
+    clock = MissionClock.started_now()
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    hub = Launch(
+        "bench",
+        Subsystem.BACKBONE,
+        "nameserver",
+        "nameserver",
+        "backbone.nameserver.service:Nameserver",
+        "bench",
+        f"tcp/127.0.0.1:{port}",
+        clock.origin_monotonic_s,
+        1.0,
+        run_directory=str(Path(folder) / "run"),
+    )
+    creator = msgspec.structs.replace(
+        hub, name="creator-bench", type="creator", class_path="backbone.creator.service:Creator"
+    )
+    zygote = await Zygote.spawn_fresh(run_directory=hub.run_directory)
+    keeper = ProcessKeeper(zygote)
+    try:
+        await keeper.start_hub(hub, RestartPolicy())
+        bus = await ZenohBus.open_when_up("bench", PLACER, clock, client_config(hub.endpoint))
+        try:
+            keeper.use(bus)
+            await keeper.wait_ready(hub.name, 20.0)
+            await keeper.start(creator, RestartPolicy(), 20.0)
+            yield bus
+            await keeper.end(creator.name)
+        finally:
+            await bus.close()
+    finally:
+        await keeper.close()
+        await zygote.close()
+
+
+async def start_light(bus: ZenohBus, count: int) -> list[Spawned]:
+    """Start so many components at once and return when all are ready."""
+    orders = [
+        Spawn(Subsystem.RESOURCE_POOL, f"light-{number}", "light", "light_component:Light") for number in range(count)
+    ]
+    return await asyncio.gather(*(bus.ask(CREATOR, order, Spawned, within_s=30.0) for order in orders))
+
+
+async def end_light(bus: ZenohBus, count: int) -> None:
+    """End them again."""
+    ends = (bus.ask(CREATOR, EndProcess(f"light-{n}"), ProcessEnded, within_s=10.0) for n in range(count))
+    await asyncio.gather(*ends)
+
+
+async def timed_start(bus: ZenohBus, count: int) -> float:
+    """Return the seconds from the order to all ready."""
+    began_s = perf_counter()
+    await start_light(bus, count)
+    took_s = perf_counter() - began_s
+    await end_light(bus, count)
+    return took_s
+
+
+def bare_forks() -> float:
+    """Return the seconds in which a process with everything imported forks 20 children and hears of each."""
+    began_s = perf_counter()
+    heard, said = os.pipe()
+    pids = []
+    for _ in range(COMPONENTS):
+        pid = os.fork()
+        if pid == 0:
+            os.write(said, b".")
+            os._exit(0)
+        pids.append(pid)
+    count = 0
+    while count < COMPONENTS:
+        count += len(os.read(heard, COMPONENTS))
+    took_s = perf_counter() - began_s
+    for pid in pids:
+        os.waitpid(pid, 0)
+    os.close(heard)
+    os.close(said)
+    return took_s
+
+
+def bare_interpreters() -> float:
+    """Return the seconds for 20 bare interpreters, two at a time."""
+    began_s = perf_counter()
+    with ThreadPoolExecutor(2) as two:
+        list(two.map(lambda _: subprocess.run([sys.executable, "-c", "pass"], check=True), range(COMPONENTS)))
+    return perf_counter() - began_s
+
+
+async def measure(rounds: int) -> tuple[list[float], list[float]]:
+    """Return the seconds for 20 components and for one, of each round."""
+    with tempfile.TemporaryDirectory() as folder:
+        async with creator_up(folder) as bus:
+            await timed_start(bus, 1)
+            many = [await timed_start(bus, COMPONENTS) for _ in range(rounds)]
+            one = [await timed_start(bus, 1) for _ in range(rounds)]
+    return many, one
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5)
+    rounds = parser.parse_args().rounds
+    forks = [bare_forks() for _ in range(rounds)]  # first: later this process has threads
+    interpreters = [bare_interpreters() for _ in range(rounds)]
+    many, one = uvloop.run(measure(rounds))
+    print(
+        json.dumps(
+            {
+                "bench": "component_start",
+                "rounds": rounds,
+                "components": COMPONENTS,
+                "all_ready_s": round(median(many), 3),
+                "slowest_s": round(max(many), 3),
+                "one_ready_s": round(median(one), 4),
+                "floor": f"{COMPONENTS} bare forks / {COMPONENTS} bare interpreters, two at a time",
+                "floor_forks_s": round(median(forks), 3),
+                "floor_interpreters_s": round(median(interpreters), 3),
+                "ratio_to_interpreters": round(median(many) / median(interpreters), 2),
+            }
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,9 @@
+"""The lightest component there can be, for the benches."""
+
+from __future__ import annotations
+
+from backbone.component.component import Component, NoParameters
+
+
+class Light(Component[NoParameters]):
+    """Is ready and waits."""
