@@ -200,6 +200,7 @@ class LoadPacket(Message, frozen=True):
         robot_epoch: Of the robot RC's connection, for the audit.
         at_once: True: once, ahead of its turn, answered when it is on the air.
             False: at the ARC's rate from now on, until replaced.
+        afterwards: With ``at_once``: what is sent at the ARC's rate from then on; empty: what was before.
     """
 
     arc: str
@@ -209,6 +210,7 @@ class LoadPacket(Message, frozen=True):
     safe_payload: bytes
     robot_epoch: int
     at_once: bool = False
+    afterwards: bytes = b""
 
 
 class PacketLoaded(Message, frozen=True):

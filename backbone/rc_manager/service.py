@@ -171,7 +171,7 @@ class RcManager(Component[RcManagerParameters]):
         self._news = asyncio.Event()
         self._trace: TextIO | None = None
         self._found = _Found({}, {})
-        self._revoked_s: dict[str, float] = {}
+        self._revoked: dict[str, tuple[float, str]] = {}
         self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
 
     # ------------------------------------------------------------------ life
@@ -274,7 +274,7 @@ class RcManager(Component[RcManagerParameters]):
             case ConnectArc(arc=arc):
                 self._switch(arc, self._connect(instruction))
             case RevokeArc(arc=arc, epochs=epochs):
-                self._revoked_s |= dict.fromkeys(epochs, self.clock.now_s())
+                self._revoked |= dict.fromkeys(epochs, (self.clock.now_s(), arc))
                 self._switch(arc, self._revoke(instruction))
             case _:
                 assert_never(instruction)
@@ -317,10 +317,11 @@ class RcManager(Component[RcManagerParameters]):
             await self._meet_rc(failed)
 
     def _measure_switch(self, order: ConnectArc) -> None:
-        """Keep the time since the first of these RCs was revoked from another ARC, settling not counted."""
-        revoked = [self._revoked_s.pop(rc) for rc in order.epochs if rc in self._revoked_s]
-        if revoked:
-            self._switch_times_s.append(self.clock.now_s() - min(revoked) - order.settle_s)
+        """Keep the time since these RCs were revoked from another ARC, settling not counted."""
+        revoked = [self._revoked.pop(rc) for rc in order.epochs if rc in self._revoked]
+        from_others = [at_s for at_s, arc in revoked if arc != order.arc]
+        if from_others:
+            self._switch_times_s.append(self.clock.now_s() - min(from_others) - order.settle_s)
 
     async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""

@@ -5,6 +5,7 @@ Source: RAM 2002, "Examples of ARCs and RCs".
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -18,7 +19,6 @@ class CaptureArc(VideoDriveArc):
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency", "framegrabber")
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
-        """Switch the transmitter on, then tune."""
-        await super().prepare(epochs)
+        """Switch the transmitter on and tune, at the same time."""
         tune = Tune(self.name, epochs[self.rc("framegrabber")], self.rc("video_frequency"))
-        await self.tell_rc("framegrabber", tune)
+        await asyncio.gather(super().prepare(epochs), self.tell_rc("framegrabber", tune))

@@ -6,6 +6,7 @@ Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from typing import Any
 
 from backbone.bus.interface import Bus, Clock
@@ -72,7 +73,9 @@ class CommandRadio(ResourceController[RcParameters]):
                 self.holds.admit(order.arc, order.epoch)  # it may have lost the radio while the air was busy
                 self._schedule.touch(packet)
                 await self._transmit(packet)
-        else:
+            packet = replace(packet, payload=order.afterwards)
+        if packet.payload:
+            self.holds.admit(order.arc, order.epoch)
             self._schedule.load(packet)
             self._loaded.set()
         return PacketLoaded()

@@ -100,20 +100,27 @@ class Scout(ResourceController[ScoutParameters]):
                 await self._load(hold, self._protocol.jump(), at_once=True)
                 return self._applied(hold, "jump", {})
             case SwitchTransmitter(on=on, frequency=frequency):
-                await self._load(hold, self._protocol.transmitter(on, frequency), at_once=True)
-                await self._load(hold, self._protocol.halt())  # repeated, so that the robot hears it is not forgotten
+                still = self._protocol.halt()  # repeated, so that the robot hears it is not forgotten
+                await self._load(hold, self._protocol.transmitter(on, frequency), at_once=True, afterwards=still)
                 return self._applied(hold, "transmitter", {"on": float(on)})
 
     def statistics(self) -> dict[str, float]:
         """Count also the halts because commands stayed away."""
         return {**super().statistics(), "command_timeouts": self._timeouts}
 
-    async def _load(self, hold: Hold, payload: bytes, *, at_once: bool = False) -> None:
+    async def _load(self, hold: Hold, payload: bytes, *, at_once: bool = False, afterwards: bytes = b"") -> None:
         epoch = hold.companions.get(self._radio)
         if epoch is None:
             raise NoRadio(f"{hold.arc} holds {self.name} without {self._radio or 'a radio'}")
         order = LoadPacket(
-            hold.arc, epoch, self.parameters.network_id, payload, self._protocol.safe(), hold.epoch, at_once
+            hold.arc,
+            epoch,
+            self.parameters.network_id,
+            payload,
+            self._protocol.safe(),
+            hold.epoch,
+            at_once,
+            afterwards,
         )
         radio = address(Subsystem.RESOURCE_POOL, self._radio)
         await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)
