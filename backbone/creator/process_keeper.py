@@ -183,15 +183,20 @@ class ProcessKeeper:
         self._is_closing = True
         ends = []
         for name in reversed([one.name for one in self._supervision]):
-            if self._supervision.find(name) is not None:
-                ends.append(asyncio.create_task(self.end(name, "everything ends"), name=f"end {name}"))
-                await asyncio.wait(ends[-1:], timeout=OVERLAP_S)
-        ended = await asyncio.gather(*ends)
+            ends.append(asyncio.create_task(self._end_if_here(name), name=f"end {name}"))
+            await asyncio.wait(ends[-1:], timeout=OVERLAP_S)
+        ended = [end for end in await asyncio.gather(*ends) if end is not None]
         tasks = list(self._tasks)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         return ended
+
+    async def _end_if_here(self, name: str) -> ProcessEnded | None:
+        try:
+            return await self.end(name, "everything ends")
+        except NotHere:  # it ended by itself meanwhile
+            return None
 
     # Picture
     def order(self, name: str) -> Spawn | None:
@@ -276,8 +281,10 @@ class ProcessKeeper:
                 case ReportReady(name=name, pid=pid):
                     _settle(self._starting.pop(name, []), pid)
                 case ReportStartFailed(name=name, how=how):
-                    failure = self._failures[name] = self._start_failed(name, how)
-                    _settle(self._starting.pop(name, []), failure)
+                    failure, waiting = self._start_failed(name, how), self._starting.pop(name, [])
+                    if not waiting:  # a hub's: told to whoever waits for it next
+                        self._failures[name] = failure
+                    _settle(waiting, failure)
                 case ReportEnded(name=name, by=by, exit_code=exit_code):
                     _settle(self._starting.pop(name, []), self._start_failed(name, "was ended"))
                     _settle(self._ending.pop(name, []), ProcessEnded(name, by, exit_code))

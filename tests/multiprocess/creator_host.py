@@ -51,7 +51,6 @@ class CreatorHost:
     keeper: ProcessKeeper
     bus: ZenohBus
     fell: list[ProcessFell] = field(default_factory=list)
-    core_fell: list[ProcessFell] = field(default_factory=list)
 
     async def spawn(self, kind: str, name: str, **more: Any) -> Spawned:
         order = Spawn(
@@ -66,13 +65,16 @@ class CreatorHost:
     async def end(self, name: str) -> ProcessEnded:
         return await self.bus.ask(CREATOR, EndProcess(name, "over", 0.5, 0.3), ProcessEnded, within_s=10.0)
 
-    async def process(self, name: str) -> ProcessState:
+    async def processes(self) -> dict[str, ProcessState]:
         listing = await self.bus.ask(CREATOR, ListProcesses(), Processes, within_s=5.0)
-        return next(process for process in listing.processes if process.spawn.name == name)
+        return {process.spawn.name: process for process in listing.processes}
+
+    async def process(self, name: str) -> ProcessState:
+        return (await self.processes())[name]
 
     def core(self, name: str) -> int:
-        """Return the pid of a core service."""
-        return next(process.pid for process in self.keeper.processes() if process.spawn.name == name)
+        """Return the pid of a core service, 0 while it waits for its restart."""
+        return {process.spawn.name: process.pid for process in self.keeper.processes()}[name]
 
     def creators_zygote(self) -> int:
         return next(iter(process_table.zygotes_of(process_table.read_table(), self.core("creator-lab"))))
@@ -131,7 +133,6 @@ async def creator_host(directory: Path) -> AsyncIterator[CreatorHost]:
             await keeper.wait_ready("nameserver", 20.0)
             await keeper.start(creator, CORE_POLICY, 20.0)
             host = CreatorHost(directory, zygote, keeper, bus)
-            keeper.on_fell = host.core_fell.append
             bus.subscribe(CREATOR, Conversation.EVENTS, ProcessFell, lambda heard: host.fell.append(heard.body))
             yield host
             await keeper.end("creator-lab", "the test is over")
