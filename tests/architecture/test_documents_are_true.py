@@ -1,0 +1,64 @@
+"""Links in the documents lead somewhere, and the names they speak of exist where they say."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+LINK = re.compile(r"\[(?P<text>[^\]]*)\]\((?P<target>[^)\s]+)\)")
+NAME = re.compile(r"`([A-Za-z_][A-Za-z0-9_]*(?:\.[A-Za-z_][A-Za-z0-9_]*)?)`")
+
+
+def links(document: Path) -> list[tuple[str, Path]]:
+    """Return text and target of every link to a file of this project."""
+    found = []
+    for match in LINK.finditer(document.read_text()):
+        target = match["target"].partition("#")[0]
+        if target and "://" not in target and not target.startswith("mailto:"):
+            found.append((match["text"], (document.parent / target).resolve()))
+    return found
+
+
+def names_of(module: Path) -> set[str]:
+    """Return functions, classes and ``Class.member`` defined at the top of a module."""
+    names = set()
+    for node in ast.parse(module.read_text()).body:
+        match node:
+            case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name):
+                names.add(name)
+            case ast.ClassDef(name=name, body=body):
+                names.add(name)
+                members = (n for n in body if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef))
+                names |= {f"{name}.{member.name}" for member in members}
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                names.add(name)
+    return names
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_link_leads_to_a_file_of_the_project(document: Path) -> None:
+    missing = [str(target) for _, target in links(document) if not target.exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_name_linked_to_a_module_is_defined_there(document: Path) -> None:
+    missing = []
+    for text, target in links(document):
+        name = NAME.fullmatch(text)
+        if name and target.suffix == ".py" and target.exists() and name[1] not in names_of(target):
+            missing.append(f"{name[1]} in {target.relative_to(ROOT)}")
+    assert not missing
+
+
+def test_the_tour_is_short_and_follows_one_grant() -> None:
+    stops = [target.name for _, target in links(ROOT / "docs" / "tour.md")]
+    assert stops[0] == "mission.xml"
+    assert len(set(stops)) <= 25
+    order = ["reader.py", "arc_client.py", "schedule_manager.py", "service.py", "holds.py", "scout.py", "world.py"]
+    assert [stops.index(name) for name in order] == sorted(stops.index(name) for name in order)
