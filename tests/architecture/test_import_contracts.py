@@ -1,0 +1,146 @@
+"""The walls between the packages stand, and whoever breaks one is found."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+import walls
+
+TOP = Path(__file__).parents[2]
+PACKAGES, CONTRACTS = walls.contracts(TOP)
+MODULES = walls.modules(TOP, PACKAGES)
+
+PLANTED = [
+    ("layers", "backbone/planted.py", "import scout_model.description"),
+    ("layers", "backbone/planted.py", "def late() -> None:\n    from resource_pool import arc_client"),
+    ("layers", "resource_pool/planted.py", "from mission_control import behaviors"),
+    ("layers", "scout_model/planted.py", "import backbone.wire"),
+    ("layers", "ui_console/planted.py", "import mission_control.behaviors"),
+    ("one-door", "mission_control/behaviors/planted.py", "from resource_pool import messages"),
+    ("one-door", "mission_control/planted.py", "import resource_pool.rcs"),
+    ("one-door", "ui_console/planted.py", "from resource_pool.messages import Frame"),
+    ("one-door", "mission_control/planted.py", "import scout_model.description"),
+    ("core-services", "backbone/placer/planted.py", "from backbone.nameserver import service"),
+    ("core-services", "backbone/rc_manager/planted.py", "import backbone.creator"),
+    ("zenoh", "backbone/bus/planted.py", "import zenoh"),
+    ("zenoh", "resource_pool/planted.py", "from zenoh.handlers import Callback"),
+    ("mujoco", "resource_pool/planted.py", "import mujoco"),
+    ("cv2", "mission_control/planted.py", "import cv2"),
+    ("cv2", "ui_console/planted.py", "import cv2"),
+    ("pydantic", "backbone/placer/planted.py", "import pydantic"),
+    ("pydantic", "resource_pool/planted.py", "from lxml import etree"),
+    ("textual", "mission_control/planted.py", "import textual.app"),
+    ("terminal", "resource_pool/planted.py", "from rich.console import Console"),
+    ("terminal", "backbone/creator/planted.py", "import typer"),
+]
+
+
+@pytest.fixture(scope="module")
+def edges() -> set[walls.Import]:
+    """Return all direct imports of the five packages."""
+    return walls.imports(MODULES, MODULES)
+
+
+def broken_with(edges: set[walls.Import], folder: Path, file: str, line: str) -> dict[str, list[walls.Import]]:
+    """Return what is broken when the file with this line is added to the packages."""
+    planted = folder / "planted.py"
+    planted.write_text(f"{line}\n")
+    name = module_of(file)
+    return walls.broken(CONTRACTS, edges | walls.imports({**MODULES, name: planted}, [name]))
+
+
+def module_of(file: str) -> str:
+    return file.removesuffix(".py").replace("/", ".")
+
+
+def test_the_walls_stand(edges: set[walls.Import]) -> None:
+    assert walls.broken(CONTRACTS, edges) == {}
+
+
+def test_every_wall_has_a_planted_violation() -> None:
+    assert {wall for wall, _file, _line in PLANTED} == {contract["id"] for contract in CONTRACTS}
+
+
+@pytest.mark.parametrize(("wall", "file", "line"), PLANTED)
+def test_a_planted_violation_is_found(
+    edges: set[walls.Import], tmp_path: Path, wall: str, file: str, line: str
+) -> None:
+    found = broken_with(edges, tmp_path, file, line)
+    assert wall in found
+    assert {importer for importer, _imported in found[wall]} == {module_of(file)}
+
+
+@pytest.mark.parametrize(
+    ("file", "line"),
+    [
+        ("mission_control/planted.py", "from resource_pool import arc_client"),
+        ("mission_control/vision/planted.py", "import cv2"),
+        ("backbone/placer/planted.py", "from backbone.nameserver.messages import Register"),
+        ("resource_pool/planted.py", "import scout_model.description, backbone.wire"),
+        ("ui_console/planted.py", "import textual, typer, rich.table"),
+    ],
+)
+def test_what_is_allowed_is_not_complained_about(
+    edges: set[walls.Import], tmp_path: Path, file: str, line: str
+) -> None:
+    assert broken_with(edges, tmp_path, file, line) == {}
+
+
+def test_import_linter_finds_the_walls_standing() -> None:
+    assert "0 broken" in lint_imports(TOP)
+
+
+def test_import_linter_finds_a_violation_of_each_wall_in_a_copy_of_the_tree(tmp_path: Path) -> None:
+    shutil.copy(TOP / "pyproject.toml", tmp_path)
+    for package in PACKAGES:
+        shutil.copytree(TOP / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for number, (_wall, file, line) in enumerate(PLANTED):
+        (tmp_path / file).with_name(f"planted_{number}.py").write_text(f"{line}\n")
+    told = lint_imports(tmp_path)
+    for contract in CONTRACTS:
+        assert f"{contract['name']} BROKEN" in told, told
+
+
+def lint_imports(top: Path) -> str:
+    pytest.importorskip("importlinter", reason="import-linter comes with the dev extra")
+    linting = subprocess.run(
+        [sys.executable, "-c", "from importlinter.cli import lint_imports_command as lint; lint()", "--no-cache"],
+        cwd=top,
+        env={"PYTHONPATH": str(top), "PYTHONSAFEPATH": "1", "COLUMNS": "200"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert linting.returncode in (0, 1), linting.stderr
+    return linting.stdout
+
+
+def test_only_the_clock_sleeps() -> None:
+    """The local bus yields once, which takes no time."""
+    sleepers = set()
+    for name, file in MODULES.items():
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            match node:
+                case ast.Call(
+                    func=ast.Attribute(value=ast.Name(id="asyncio" | "time"), attr="sleep"), args=[argument]
+                ) if not (isinstance(argument, ast.Constant) and argument.value == 0):
+                    sleepers.add(name)
+    assert sleepers == {"backbone.bus.clock"}
+
+
+def test_each_refusal_has_a_code_of_its_own() -> None:
+    """scout_model knows no refusals: what it raises is turned into one, under the same code, above it."""
+    codes: Counter[str] = Counter()
+    for file in (file for name, file in MODULES.items() if not name.startswith("scout_model")):
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            match node:
+                case ast.Assign(targets=[ast.Name(id="code")], value=ast.Constant(value=str(code))):
+                    codes[code] += 1
+    assert [code for code, count in codes.items() if count > 1] == []
