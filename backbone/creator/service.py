@@ -103,7 +103,7 @@ class Creator(Component[CreatorParameters]):
                 self._refuse_strangers(asked)
                 ended = await self._keeper.end(name, reason, ask_s, term_s)
                 self._ended += 1
-                self.tell(name, f"was ended by {ended.by}: {reason}")
+                self.story.note(name, f"was ended by {ended.by}: {reason}")
                 return ended
             case ListProcesses():
                 return Processes(self.launch.host, self.parameters.tags, self._keeper.processes())
@@ -145,7 +145,7 @@ class Creator(Component[CreatorParameters]):
                 raise
             pid = await self._keeper.wait_ready(order.name, order.ready_within_s)  # the same order, asked again
         self._spawned += 1
-        self.tell(order.name, f"is ready, pid {pid}, ordered by {order.requester or PLACER}")
+        self.story.note(order.name, f"is ready, pid {pid}, ordered by {order.requester or PLACER}")
         return Spawned(launch.address, pid)
 
     def _refuse_strangers(self, asked: Envelope[Any]) -> None:

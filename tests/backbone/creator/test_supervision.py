@@ -10,6 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, RestartPolicy
 from backbone.creator.supervision import (
+    LEAVE_S,
     TERM_S,
     AskToStop,
     Fork,
@@ -212,11 +213,19 @@ def test_ending_escalates_from_asking_to_sigterm_to_sigkill() -> None:
     assert supervision.exited(7, -9, 12.1) == [ReportEnded("scout1", EndedBy.SIGKILL, -9)]
 
 
-def test_who_cannot_be_asked_gets_sigterm_at_once() -> None:
+def test_who_cannot_be_asked_gets_sigterm_unless_it_is_about_to_leave() -> None:
     supervision = running()
     supervision.end_ordered("scout1", 1.5, 0.5, 10.0)
-    assert supervision.ask_failed("scout1", 10.1) == [Signal("scout1", 7, signal.SIGTERM), WakeAt(10.6)]
+    assert supervision.ask_failed("scout1", 10.0) == [WakeAt(10.0 + LEAVE_S)]
+    assert supervision.woken(10.0 + LEAVE_S)[0] == Signal("scout1", 7, signal.SIGTERM)
     assert supervision.exited(7, 0, 10.2) == [ReportEnded("scout1", EndedBy.SIGTERM, 0)]
+
+
+def test_who_was_about_to_leave_when_asked_ended_by_itself() -> None:
+    supervision = running()
+    supervision.end_ordered("scout1", 1.5, 0.5, 10.0)
+    supervision.ask_failed("scout1", 10.0)
+    assert supervision.exited(7, 0, 10.01) == [ReportEnded("scout1", EndedBy.ITSELF, 0)]
 
 
 def test_a_hub_is_asked_by_signal() -> None:
