@@ -19,6 +19,7 @@ import socket
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -116,6 +117,9 @@ class Observer(Protocol):
 
     def done(self, step: str, took_s: float) -> None:
         """Take note that this step is done after these seconds of the machine."""
+
+    def connected(self, bus: Bus) -> None:
+        """Listen to what the mission says; the hub is up, nothing else is."""
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Do what is to be done while the mission is up; cancelled when it ends."""
@@ -299,6 +303,7 @@ async def _with_hub(
     hub = _service_launch(own, "nameserver", "nameserver", description, {})
     await keeper.start_hub(hub, CORE_POLICY)
     bus = await ZenohBus.open_when_up(own.mission, own.address, clock, client_config(own.endpoint))
+    observer.connected(bus)
     keeper.use(bus)
     await keeper.wait_ready(hub.name, START_TIME_S)
     observer.done("nameserver", time.monotonic() - began_s)
@@ -418,7 +423,7 @@ def _service_launch(
 def _free_port() -> int:
     """Return a loopback port nobody listens on; the hub keeps it over its restarts."""
     start = FIRST_PORT + os.getpid() * 7 % (LAST_PORT - FIRST_PORT)
-    for port in [*range(start, LAST_PORT), *range(FIRST_PORT, start)]:
+    for port in chain(range(start, LAST_PORT), range(FIRST_PORT, start)):
         with socket.socket() as probe:
             try:
                 probe.bind(("127.0.0.1", port))

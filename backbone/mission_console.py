@@ -48,6 +48,10 @@ class ConsoleObserver:
         """Print the step with its time."""
         self.tell(f"  ✓ {step:<42} {took_s * 1000:7.0f} ms")
 
+    def connected(self, bus: Bus) -> None:
+        """Listen to what components tell people."""
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
+
     def tell(self, line: str) -> None:
         """Print one line, also to whoever waits for readiness."""
         self._print(line)
@@ -63,7 +67,6 @@ class ConsoleObserver:
         if self._ready_to is not None:
             self._ready_to.close()
             self._ready_to = None
-        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
         if self._live:
             await self._show_live(bus, clock)
         else:
