@@ -43,6 +43,8 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
+PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
+
 MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
 MissionName = Annotated[str | None, typer.Option("--mission", help="Name of the mission; needed if several are up.")]
 Endpoint = Annotated[
@@ -184,7 +186,7 @@ def status(
                     await clock.sleep_s(clock.rate)
                     print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
                 return ExitCode.DONE
-            console = Console()
+            console = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
             if not watch:
                 console.print(screen(await look(bus, clock.now_s())))
                 return ExitCode.DONE

@@ -12,7 +12,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import AskPlacement, Placement
+from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy, UnknownRequest, Why
 
@@ -83,10 +83,8 @@ async def reasons_for(bus: Bus, name: str) -> Reasons:
         resolved.component if isinstance(resolved, Resolved) else None,
     )
     if reasons.why is None and reasons.placement is None and reasons.component is None:
-        for error in (resolved, why, placement):
-            if not isinstance(error, UnknownName | UnknownRequest):
-                raise error
-        raise UnknownName(f"nobody knows {name!r}")
+        errors = (why, placement, resolved)
+        raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), resolved)
     return reasons
 
 
