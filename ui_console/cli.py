@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from backbone.component.launch import Launch
     from ui_console.observer import Observer
 
-SCREEN_KIND, SCRIPT_KIND = "capture", "video_drive"
-"""With a screen, pictures come to this machine; a script, or a person with a video monitor of their own,
-leaves the framegrabber to others."""
+KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
+"""With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
+others; a script needs no picture, so it waits for none to settle and leaves the video frequency to others too."""
 
 SYNCHRONIZE_WITHIN_S = 2.0  # chosen: an RC manager that is up answers in milliseconds
 
@@ -57,7 +57,7 @@ def attach(
     as_json: Annotated[bool, typer.Option("--json", help="JSON lines, no screen; implies --script -.")] = False,
     within: Annotated[float, typer.Option(help="Mission seconds a script waits for the grant; 0: for ever.")] = 0.0,
     minimum_runtime: Annotated[float, typer.Option(help="Shortest useful time beside equals, seconds.")] = 5.0,
-    kind: Annotated[str, typer.Option(help="Kind of ARC; default: capture, or video_drive without a picture.")] = "",
+    kind: Annotated[str, typer.Option(help="Kind of ARC; default: what the console shows needs.")] = "",
     mission: Mission = None,
     connect: Connect = None,
 ) -> None:
@@ -65,11 +65,10 @@ def attach(
     script = script or ("-" if as_json else "")
     if profile is Profile.MONITOR:
         run(lambda: _watch(mission, connect, as_json=as_json))
-    shows_picture = not script and profile is Profile.TERMINAL
     wished = {
         "robot": robot,
         "priority": priority,
-        "kind": kind or (SCREEN_KIND if shows_picture else SCRIPT_KIND),
+        "kind": kind or KINDS["script" if script else profile],
         "minimum_runtime_s": minimum_runtime,
     }
     if script:
@@ -136,7 +135,7 @@ async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[
 
     launch, clock = await _launch(mission, connect, wished)
     session = TerminalSession(launch.name)
-    see = session.see if wished["kind"] == SCREEN_KIND else None
+    see = session.see if wished["kind"] == KINDS[Profile.TERMINAL] else None
     console = Teleoperation(launch, await _open_bus(launch, clock), clock, show=session.show, see=see)
     _end_on_signals(console)
     await session.run(console)

@@ -51,6 +51,11 @@ class Granted:
     asked_s: float
     again: bool
 
+    @property
+    def after_s(self) -> float:
+        """How long the grant took, from the wish on, mission seconds."""
+        return self.at_s - self.asked_s
+
 
 @dataclass(frozen=True, slots=True)
 class Lost:
@@ -183,6 +188,8 @@ def event_json(event: ConsoleEvent) -> bytes:
         b'{"event":"suspended","at_s":2.0,"reason":"higher","by":"console-1","expected_start_s":-1.0}'
     """
     plain: dict[str, Any] = msgspec.to_builtins(_by_name(event))
+    if isinstance(event, Granted):
+        plain["after_s"] = event.after_s
     return msgspec.json.encode({"event": event_word(event), **plain})
 
 
