@@ -18,12 +18,12 @@ from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
 from backbone.mission_picture import holders_line, look
-from backbone.mission_screen import screen
+from backbone.mission_screen import live_screen
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
 from backbone.wire import Envelope
 
-EVENTS_SHOWN = 8  # chosen: a terminal of 50 lines holds them below the tables
+EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
 REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds; more costs a core that the mission needs
 
 
@@ -38,7 +38,7 @@ class ConsoleObserver:
 
     def __init__(self, console: Console, *, live: bool, ready_to: TextIO | None = None) -> None:
         self._console, self._live, self._ready_to = console, live, ready_to
-        self._events: deque[StoryEvent] = deque(maxlen=EVENTS_SHOWN)
+        self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
         self._told = ""
 
     def began(self, step: str) -> None:
@@ -74,10 +74,12 @@ class ConsoleObserver:
             await asyncio.Event().wait()
 
     async def _show_live(self, bus: Bus, clock: Clock) -> None:
-        with Live(console=self._console, auto_refresh=False, transient=True) as live:
+        console = self._console
+        with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
             while True:
                 try:
-                    live.update(screen(await look(bus, clock.now_s()), self._events), refresh=True)
+                    picture = await look(bus, clock.now_s())
+                    live.update(live_screen(picture, self._events, console.height), refresh=True)
                 except LinkError as error:
                     live.update(f"the nameserver does not answer: {error}", refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)

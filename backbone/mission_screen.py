@@ -1,14 +1,18 @@
-"""A mission picture as rich tables. Imported by the command line only."""
+"""A mission picture as rich tables: ``screen`` whole, for paper; ``live_screen`` fitted to a terminal.
+
+Imported by the command line only.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from rich.console import Group, RenderableType
+from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.mission_picture import MissionPicture
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.messages import RequestState, RequestView, Schedule
@@ -20,6 +24,117 @@ _STATE_STYLE = {
     RequestState.WAITING: "yellow",
     RequestState.IDLE: "dim",
 }
+
+
+_FRAME_LINES = 2  # a panel's upper and lower edge
+_EVENTS_MOST = 12  # chosen: more than a glance takes in would push components off the picture
+_EVENTS_LEAST = 3
+
+
+def live_screen(picture: MissionPicture, events: Iterable[StoryEvent], height: int) -> RenderableType:
+    """Return the picture fitted to a terminal: one line a component left, holders and schedule right, events below.
+
+    On a terminal of 120 × 40 a mission of 26 components fits; on a smaller one components are left out first.
+
+    Args:
+        picture: What there is.
+        events: Newest last; as many of the newest are shown as there is room for.
+        height: Lines of the terminal.
+    """
+    head = Text(f"mission {picture.mission}  {picture.at_s:8.1f} s", style="bold", no_wrap=True)
+    head.append(f"   {_how_many(picture)}", style="not bold")
+    problems = [Text(problem, style="red", no_wrap=True, overflow="ellipsis") for problem in picture.problems]
+    components = _component_lines(picture)
+    right: list[RenderableType] = []
+    right_lines = 0
+    if picture.schedule is not None:
+        resources, requests = _holder_lines(picture.schedule), _request_lines(picture.schedule, picture.at_s)
+        right = [_panel("resources", resources), _panel("schedule", requests)]
+        right_lines = len(resources) + len(requests) + 2 * _FRAME_LINES
+    left_lines = len(components) + _FRAME_LINES
+    free = height - 1 - len(problems) - max(left_lines, right_lines) - _FRAME_LINES
+    newest = list(events)[-min(_EVENTS_MOST, max(_EVENTS_LEAST, free)) :]
+    room = height - 1 - len(problems) - len(newest) - 2 * _FRAME_LINES
+    if len(components) > room:
+        hidden = len(components) - max(1, room - 1)
+        components = [*components[: max(1, room - 1)], Text(f"… and {hidden} lines more: a taller terminal shows them")]
+    body = Table.grid(expand=True)
+    body.add_column(ratio=1)
+    body.add_column(ratio=1)
+    body.add_row(_panel("components", components), Group(*right))
+    shown = [_event_line(event) for event in newest] or [Text("nothing yet", style="dim")]
+    return Group(head, *problems, body, _panel("events", shown))
+
+
+def _how_many(picture: MissionPicture) -> str:
+    states = [component.state for component in picture.components.values()]
+    ready = states.count(LifeState.READY)
+    restarts = sum(picture.restarts(component) for component in picture.components.values())
+    return f"{ready} of {len(states)} components ready" + (f", {restarts} restarts" if restarts else "")
+
+
+def _panel(title: str, lines: list[Text]) -> Panel:
+    for line in lines:
+        line.no_wrap, line.overflow = True, "ellipsis"
+    return Panel(Group(*lines), title=title, title_align="left", border_style="blue", padding=(0, 1))
+
+
+def _component_lines(picture: MissionPicture) -> list[Text]:
+    lines: list[Text] = []
+    for subsystem in Subsystem:
+        members = picture.of_subsystem(subsystem)
+        if members:
+            lines.append(Text(str(subsystem), style="bold cyan"))
+        lines += [_component_line(picture, component) for component in members]
+    return lines
+
+
+def _component_line(picture: MissionPicture, component: ComponentState) -> Text:
+    is_ready = component.state is LifeState.READY
+    line = Text.assemble(
+        ("● " if is_ready else "○ ", "green" if is_ready else "yellow"),
+        f"{component_of(component.address):21.21s}",
+        (f"{component.pid:8d}  ", "dim"),
+    )
+    if not is_ready:
+        line.append(f"{component.state} ", style="yellow")
+    if restarts := picture.restarts(component):
+        line.append(f"restarted {restarts}× ", style="yellow")
+    line.append(component.feedback or component.type, style="" if component.feedback else "dim")
+    return line
+
+
+def _holder_lines(schedule: Schedule) -> list[Text]:
+    lines = []
+    for rc in schedule.rcs:
+        line = Text(f"{rc.rc:10.10s} ")
+        if rc.holders:
+            holders = ", ".join(f"{holder.arc} #{holder.epoch}" for holder in rc.holders)
+            line.append(holders, style="green")
+        else:
+            line.append("free" if rc.state != "down" else rc.state, style="dim" if rc.state != "down" else "red")
+        if rc.next:
+            line.append(f"  then {', '.join(rc.next)}", style="dim")
+        lines.append(line)
+    return lines
+
+
+def _request_lines(schedule: Schedule, now_s: float) -> list[Text]:
+    lines = []
+    for request in schedule.requests:
+        line = Text(f"{request.arc:22.22s} ")
+        line.append(f"{request.state:10s} ", style=_STATE_STYLE[request.state])
+        line.append(_when(request, now_s))
+        reason = Text("  ", style="dim")
+        reason.append(f"for {', '.join(request.blockers)}, " if request.blockers else "")
+        reason.append(f"{request.turns} turn{'' if request.turns == 1 else 's'} so far, {request.priority}")
+        lines += [line, reason]
+    return lines or [Text("nobody asks for anything", style="dim")]
+
+
+def _event_line(event: StoryEvent) -> Text:
+    style = "bold yellow" if "motion" in event.what else ""
+    return Text.assemble((f"{event.at_s:8.2f} s  ", "dim"), f"{component_of(event.where):22.22s} ", (event.what, style))
 
 
 def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> RenderableType:

@@ -352,4 +352,5 @@ def _request_line(request: RequestView, now_s: float) -> str:
         when = f"in {max(0.0, request.expected_start_s - now_s):4.1f} s"
     else:
         when = str(request.state)
-    return f"{_owner(request)}: {when}; {request.because}"
+    because = request.because.removeprefix(f"{request.arc} {request.state}: ")
+    return f"{_owner(request)}: {when}; {because}"

@@ -10,7 +10,6 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.table import Table
 from rich.text import Text
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
@@ -140,7 +139,7 @@ class ConsoleApp(App[None]):
         if self._drives:
             status += [f"speed {self.speed_rad_s:g} rad/s", model.video_line(now_s)]
         self.query_one("#status", Static).update(Text(" · ".join(status)))
-        self.query_one("#robots", Static).update(_robot_table(model, now_s))
+        self.query_one("#robots", Static).update(_robot_lines(model, now_s))
         self.query_one("#schedule", Static).update(Text("\n".join(model.schedule_lines(now_s)) or "nobody asks"))
         self.query_one("#alarms", Static).update(Text("\n".join(model.alarm_lines(ALARMS_SHOWN)) or "none"))
         if self._drives:
@@ -181,10 +180,18 @@ class ConsoleApp(App[None]):
             self._session.stop()
 
 
-def _robot_table(model: ConsoleModel, now_s: float) -> Table:
-    table = Table.grid(padding=(0, 1))
+def _robot_lines(model: ConsoleModel, now_s: float) -> Text:
+    """Return for each robot who holds it and, below, since when, how much longer, and who is next."""
+    lines = Text()
     for row in model.robots():
-        left = f"{max(0.0, row.until_s - now_s):.1f} s" if row.until_s >= 0 else ""
-        since = f"since {row.since_s:.1f} s" if row.holder else ""
-        table.add_row(row.robot, row.holder or "free", row.priority, since, left, " ".join(row.waiting))
-    return table
+        lines.append(f"{row.robot:10s} ", style="bold")
+        lines.append(f"{row.holder or 'free'}\n", style="green" if row.holder else "dim")
+        facts = [f"for {max(0.0, now_s - row.since_s):.0f} s"] if row.holder else []
+        if row.until_s > now_s:
+            facts.append(f"{row.until_s - now_s:.1f} s left")
+        if row.waiting:
+            facts.append(f"then {', '.join(row.waiting)}")
+        if facts:
+            lines.append(f"  {', '.join(facts)}\n", style="dim")
+    lines.rstrip()
+    return lines
