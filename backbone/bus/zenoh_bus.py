@@ -139,7 +139,7 @@ class ZenohBus(Speaker):
         Raises:
             HubUnreachable: It did not listen within ``OPEN_TIMEOUT_MS``.
         """
-        pool = ThreadPoolExecutor(max_workers=1)
+        pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh_open")
         opening = pool.submit(zenoh.open, config)
         pool.shutdown(wait=False)
         try:
