@@ -134,7 +134,7 @@ def _request_lines(schedule: Schedule, now_s: float) -> list[Text]:
 
 def _event_line(event: StoryEvent) -> Text:
     style = "bold yellow" if "motion" in event.what else ""
-    return Text.assemble((f"{event.at_s:8.2f} s  ", "dim"), f"{component_of(event.where):22.22s} ", (event.what, style))
+    return Text.assemble((f"{event.at_s:8.2f} s  ", "dim"), f"{event.subject:22.22s} ", (event.what, style))
 
 
 def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> RenderableType:
@@ -216,7 +216,7 @@ def events_table(events: list[StoryEvent]) -> Table:
     """Return the newest events, newest last."""
     table = Table(title="events", title_justify="left", show_header=False)
     for event in events:
-        table.add_row(f"{event.at_s:8.2f} s", component_of(event.where), event.what)
+        table.add_row(f"{event.at_s:8.2f} s", event.subject, event.what)
     return table
 
 

@@ -285,7 +285,7 @@ class ConsoleModel:
             case WhyHeard(why=why):
                 self.why = why
             case StoryHeard(story=story):
-                self._alarm(story.at_s, f"{story.where.rpartition('/')[2]}: {story.what}")
+                self._alarm(story.at_s, f"{story.subject}: {story.what}")
 
     def robots(self) -> list[RobotRow]:
         """Return one row for each robot in the schedule, sorted by name."""
