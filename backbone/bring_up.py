@@ -360,7 +360,8 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     hosts = {host.name: host for host in description.hosts}
     launches = []
     for service in description.core:
-        if service.type == "nameserver" or not is_this_machine(hosts[service.host]):
+        here = is_this_machine(hosts[service.host]) or service.host == own.host
+        if service.type == "nameserver" or not here:
             continue
         name = creator_name(service.host) if service.type == "creator" else service.type
         given = parameters[service.type](hosts[service.host])
@@ -407,7 +408,7 @@ def _launch(
         type=component_type,
         class_path=class_path,
         host=description.hosts[0].name,
-        endpoint=f"tcp/127.0.0.1:{_free_port()}",
+        endpoint=f"tcp/{description.hosts[0].address}:{_free_port(description.hosts[0].address)}",
         clock_origin_monotonic_s=clock.origin_monotonic_s,
         clock_rate=clock.rate,
         requester=LAUNCHER,
@@ -422,13 +423,13 @@ def _service_launch(
     return msgspec.structs.replace(own, name=name, type=component_type, class_path=class_path, parameters=parameters)
 
 
-def _free_port() -> int:
-    """Return a loopback port nobody listens on; the hub keeps it over its restarts."""
+def _free_port(host_address: str) -> int:
+    """Return a port of this machine's address that nobody listens on; the hub keeps it over its restarts."""
     start = FIRST_PORT + os.getpid() * 7 % (LAST_PORT - FIRST_PORT)
     for port in chain(range(start, LAST_PORT), range(FIRST_PORT, start)):
         with socket.socket() as probe:
             try:
-                probe.bind(("127.0.0.1", port))
+                probe.bind((host_address, port))
             except OSError:
                 continue
             return port

@@ -7,11 +7,11 @@ and ``check`` stay quick. Exit codes are those of ARCHITECTURE.md, section 5; se
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import json
 import os
 import sys
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import Awaitable, Callable
+from contextlib import AbstractAsyncContextManager
 from enum import IntEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -88,26 +88,13 @@ def run(work: Callable[[], Awaitable[int]]) -> None:
     raise typer.Exit(int(code))
 
 
-@contextlib.asynccontextmanager
-async def visiting(mission: str | None, endpoint: str | None) -> AsyncIterator[Any]:
-    """Open a bus to a mission that is up: found by name on this machine, or at the endpoint."""
-    from backbone import run_files
-    from backbone.bus.clock import MissionClock
-    from backbone.bus.zenoh_bus import ZenohBus, client_config
+def visiting(mission: str | None, endpoint: str | None) -> AbstractAsyncContextManager[tuple[Any, Any]]:
+    """Return ``async with`` a bus to a mission that is up, and its clock."""
+    from backbone import visit
 
-    if endpoint is None:
-        found = run_files.find(mission)
-        name, endpoint = found.mission, found.endpoint
-        clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-    else:
-        if mission is None:
-            raise typer.BadParameter("--connect needs --mission NAME")
-        name, clock = mission, MissionClock.started_now()
-    bus = await ZenohBus.open_when_up(name, f"ui_console/cli-{os.getpid()}", clock, client_config(endpoint))
-    try:
-        yield bus, clock
-    finally:
-        await bus.close()
+    if endpoint is not None and mission is None:
+        raise typer.BadParameter("--connect needs --mission NAME")
+    return visit.visiting(mission, endpoint, f"ui_console/cli-{os.getpid()}")
 
 
 def read_or_exit(mission_file: Path) -> Any:
@@ -309,6 +296,28 @@ def down(mission: MissionName = None) -> None:
         from backbone.detached import take_down
 
         return await take_down(mission)
+
+    run(work)
+
+
+@app.command()
+def creator(
+    host: Annotated[str, typer.Option("--host", help="Name of this machine in the mission.")],
+    connect: Annotated[str, typer.Option("--connect", help="The mission's hub, tcp/HOST:PORT.")],
+    mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
+    tag: Annotated[list[str] | None, typer.Option("--tag", help="What this machine has; repeatable.")] = None,
+) -> None:
+    """Offer this machine to a mission until Ctrl-C: its placer may start components here."""
+
+    async def work() -> int:
+        from backbone.creator.offer import offer
+
+        say(f"{host} is offered to mission {mission}; end with Ctrl-C")
+        fell = await offer(mission, connect, host, tag or [])
+        if fell is None:
+            return ExitCode.DONE
+        say(f"{fell.name} was given up: {fell.how}")
+        return ExitCode.MISSION_FAILED
 
     run(work)
 

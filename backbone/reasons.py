@@ -48,7 +48,10 @@ class Reasons:
             doing = f": {self.component.feedback}" if self.component.feedback else ""
             lines.append(f"{self.name} is {self.component.state} on {self.component.host}{doing}")
         if self.placement is not None:
-            lines.append(f"{self.name} was placed on {self.placement.host}, wanted by {self.placement.requester}")
+            where = (
+                f"was placed on {self.placement.host}" if self.placement.host else "waits for a host that can take it"
+            )
+            lines.append(f"{self.name} {where}, wanted by {self.placement.requester}")
             lines += [f"  {reason}" for reason in self.placement.reasons]
         return lines
 

@@ -27,9 +27,11 @@ from backbone.component.messages import (
     AskState,
     AskStatistics,
     AskStory,
+    AskTime,
     CommonQuestion,
     ComponentState,
     LifeState,
+    MissionTime,
     Parameters,
     SetParameter,
     Statistics,
@@ -335,6 +337,8 @@ class Component(Generic[P]):
         match asked.body:
             case AskState():
                 return self.component_state()
+            case AskTime():
+                return MissionTime(self.clock.now_s(), self.clock.rate)
             case AskStatistics():
                 bus = {
                     f"bus_{name}": float(value) for name, value in msgspec.structs.asdict(self.bus.statistics()).items()

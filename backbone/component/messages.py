@@ -46,6 +46,22 @@ class ComponentState(Message, frozen=True):
     requester: str = ""
 
 
+class AskTime(Message, frozen=True):
+    """What time is it in your mission?"""
+
+
+class MissionTime(Message, frozen=True):
+    """Answer to ``AskTime``.
+
+    Attributes:
+        at_s: Mission time at which this was answered.
+        rate: Mission seconds per second of the machine.
+    """
+
+    at_s: float
+    rate: float
+
+
 class AskStatistics(Message, frozen=True):
     """What did you count?"""
 
@@ -128,4 +144,4 @@ class Stopping(Message, frozen=True):
     """Answer to ``Stop``: it is on its way out."""
 
 
-CommonQuestion = AskState | AskStatistics | AskParameters | SetParameter | AskStory | Stop
+CommonQuestion = AskState | AskTime | AskStatistics | AskParameters | SetParameter | AskStory | Stop

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -108,6 +111,45 @@ def test_a_stopped_rc_is_started_again_when_it_is_claimed(mission: RunningMissio
     done = mission.command(*words, stdin=script)
     assert done.returncode == 0, done.stdout + done.stderr + mission.story()
     assert mission.component("scout3")["requester"] == "backbone/rc_manager"
+
+
+def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_is_withdrawn(
+    mission: RunningMission,
+) -> None:
+    words = (
+        "creator",
+        "--host",
+        "field",
+        "--connect",
+        mission.endpoint,
+        "--mission",
+        mission.name,
+        "--tag",
+        "outdoors",
+    )
+    offered = subprocess.Popen([str(BIN / "scout-backbone"), *words], env=mission.environment, stderr=subprocess.PIPE)
+    try:
+        wait_for(lambda: "creator-field" in names(mission), "the creator is ready", mission)
+        start = ("scout-backbone", "start", "video_frequency", "--name", "video7", "--host", "field")
+        done = mission.command(*start, "--mission", mission.name)
+        assert done.returncode == 0, done.stderr
+        assert mission.component("video7")["host"] == "field"
+    finally:
+        offered.send_signal(signal.SIGINT)
+        _, said = offered.communicate(timeout=20)
+    assert offered.returncode == 0, said
+    wait_for(lambda: not {"creator-field", "video7"} & names(mission), "what ran there is gone", mission)
+    assert mission.command("scout-backbone", "stop", "video7", "--mission", mission.name).returncode == 0
+
+
+def names(mission: RunningMission) -> set[str]:
+    return {component["name"] for component in mission.status()["components"]}
+
+
+def wait_for(holds: Callable[[], bool], what: str, mission: RunningMission) -> None:
+    deadline = time.monotonic() + 15.0
+    while not holds():
+        assert time.monotonic() < deadline, f"not within 15 s: {what}\n{mission.story()}"
 
 
 @pytest.mark.slow

@@ -1,0 +1,74 @@
+"""Get in touch with a mission that is up: by name on this machine, or at its hub's endpoint.
+
+Only a machine that shares the mission's monotonic clock knows the mission's time by itself; everybody
+else asks the nameserver and halves the way.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import AsyncIterator
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.messages import AskTime, MissionTime
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+
+REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+ASKED_TIMES = 5  # chosen: the quickest of a few answers is within a millisecond
+
+
+@contextlib.asynccontextmanager
+async def visiting(
+    mission: str | None, endpoint: str | None, source: str
+) -> AsyncIterator[tuple[ZenohBus, MissionClock]]:
+    """Open a bus to a mission, speaking as ``source``, and close it at the end.
+
+    Args:
+        mission: Name; may be None if just one is up on this machine.
+        endpoint: Its hub elsewhere; needs the mission's name.
+        source: Address that stands in every envelope.
+
+    Raises:
+        MissionNotUp: None of this name is up on this machine.
+        HubUnreachable: Nobody listens at the endpoint.
+        LinkError: The nameserver there did not answer.
+    """
+    if endpoint is None:
+        found = run_files.find(mission)
+        clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+        bus = await ZenohBus.open_when_up(found.mission, source, clock, client_config(found.endpoint))
+    else:
+        assert mission is not None  # noqa: S101  the command line has seen to that
+        clock = await clock_elsewhere(mission, endpoint, source)
+        bus = await ZenohBus.open_when_up(mission, source, clock, client_config(endpoint))
+    try:
+        yield bus, clock
+    finally:
+        await bus.close()
+
+
+async def clock_elsewhere(mission: str, endpoint: str, source: str) -> MissionClock:
+    """Return a clock of this machine that shows the mission's time there.
+
+    Raises:
+        HubUnreachable: Nobody listens at the endpoint.
+        LinkError: The nameserver there did not answer.
+    """
+    bus = await ZenohBus.open_when_up(mission, source, MissionClock.started_now(), client_config(endpoint))
+    try:
+        readings = [await _reading(bus) for _ in range(ASKED_TIMES)]
+    finally:
+        await bus.close()
+    _, origin_s, rate = min(readings)
+    return MissionClock(origin_s, rate)
+
+
+async def _reading(bus: ZenohBus) -> tuple[float, float, float]:
+    """Return how long an answer took, and the monotonic origin and rate that follow from it."""
+    asked_s = time.monotonic()
+    answer = await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
+    took_s = time.monotonic() - asked_s
+    return took_s, asked_s + took_s / 2 - answer.at_s / answer.rate, answer.rate

@@ -1,0 +1,103 @@
+"""Draws the pictures of the documentation from a running mission: ``.venv/bin/python docs/pictures/make.py``.
+
+What is shown is what a terminal of 120 columns shows. It takes about half a minute: the target has to pass.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import os
+import subprocess
+import sys
+import tempfile
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from textual.pilot import Pilot
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.launch import Launch
+from backbone.component.messages import StoryEvent
+from backbone.keys import Conversation
+from backbone.mission_picture import look
+from backbone.mission_screen import live_screen
+from backbone.naming import Subsystem
+from mission_control.messages import MotionSeen
+from ui_console.teleoperation import Teleoperation
+from ui_console.terminal.session import TerminalSession
+
+HERE = Path(__file__).parent
+MISSION_XML = HERE.parents[1] / "mission.xml"
+COLUMNS, LINES = 120, 34
+MOTION_WITHIN_S = 90.0
+PICTURE_STANDS_S, KEY_EVERY_S, KEYS = 2.0, 0.1, 8
+
+
+async def main() -> None:
+    """Write ``up.svg`` and ``attach.svg`` beside this file."""
+    found = run_files.find(None)
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+
+    async def join(address: str) -> ZenohBus:
+        return await ZenohBus.open_when_up(found.mission, address, clock, client_config(found.endpoint))
+
+    bus = await join("ui_console/painter")
+    try:
+        (HERE / "up.svg").write_text(await _picture_of_up(bus, clock))
+    finally:
+        await bus.close()
+
+    launch = Launch(
+        found.mission,
+        Subsystem.UI_CONSOLE,
+        "console-1",
+        "console",
+        "ui_console.teleoperation:Teleoperation",
+        found.host,
+        found.endpoint,
+        found.clock_origin_monotonic_s,
+        found.clock_rate,
+        {"robot": "scout3", "kind": "capture", "priority": 100},
+    )
+    session = TerminalSession(launch.name)
+
+    async def drive(pilot: Pilot[Any]) -> None:
+        await asyncio.sleep(PICTURE_STANDS_S)
+        for _key in range(KEYS):
+            await pilot.press("left")
+            await asyncio.sleep(KEY_EVERY_S)
+        (HERE / "attach.svg").write_text(pilot.app.export_screenshot(title="scout-console attach scout3"))
+        await pilot.press("q")
+
+    console = Teleoperation(launch, await join(launch.address), clock, show=session.show, see=session.see)
+    await session.run(console, pilot=drive, size=(COLUMNS, LINES))
+
+
+async def _picture_of_up(bus: ZenohBus, clock: MissionClock) -> str:
+    """Return the live picture as of shortly after the first motion event."""
+    events: deque[StoryEvent] = deque(maxlen=12)
+    moved = asyncio.Event()
+    bus.subscribe("*/*", Conversation.LOG, StoryEvent, lambda heard: events.append(heard.body))
+    bus.subscribe("mission_control/*", Conversation.EVENTS, MotionSeen, lambda _heard: moved.set())
+    async with asyncio.timeout(MOTION_WITHIN_S):
+        await moved.wait()
+    await asyncio.sleep(PICTURE_STANDS_S)
+    paper = Console(record=True, width=COLUMNS, file=io.StringIO())
+    paper.print(live_screen(await look(bus, clock.now_s()), events, LINES))
+    return paper.export_svg(title="scout-backbone up mission.xml")
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory(prefix="scout-pictures-") as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        command = [sys.executable, "-m", "backbone.cli"]
+        subprocess.run([*command, "up", str(MISSION_XML), "--detach"], check=True)  # noqa: S603
+        try:
+            asyncio.run(main())
+        finally:
+            subprocess.run([*command, "down"], check=True)  # noqa: S603
