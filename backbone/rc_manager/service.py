@@ -3,8 +3,6 @@
 Rules of this file:
 
 * No decision about who runs: that is ``schedule_manager``'s. Here is only how.
-* An RC that does not confirm its disconnection counts as held until its lease is over: a holder may
-  be late, there are never two.
 * Nothing that matters lives only here. After a restart the RCs say who holds them, the ARCs what they ask for.
 
 Source: RAM 2002, "The RC Scheduler".
@@ -36,6 +34,7 @@ from backbone.nameserver.messages import Appeared, Components, Disappeared, List
 from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
+from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
 from backbone.rc_manager.decisions import (
     Adopted,
     CapacityChanged,
@@ -70,18 +69,10 @@ from backbone.rc_manager.messages import (
     AskWhy,
     Beat,
     ChangeRuntime,
-    CloseGate,
-    Connect,
-    Connected,
     CurrentRequest,
-    Disconnect,
-    Disconnected,
     Done,
     Extend,
-    GateClosed,
-    GateOpen,
     Leases,
-    OpenGate,
     RcManagerQuestion,
     RcState,
     RcUse,
@@ -97,8 +88,7 @@ from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
-RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
-ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it answers
+SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; after this the question was lost
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
 SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
 RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
@@ -170,6 +160,7 @@ class RcManager(Component[RcManagerParameters]):
         self._wake_at_s: float | None = None
         self._news = asyncio.Event()
         self._trace: TextIO | None = None
+        self._context_switch = ContextSwitch(bus, clock, self.story.note)
         self._found = _Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
         self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
@@ -301,20 +292,19 @@ class RcManager(Component[RcManagerParameters]):
 
     # ------------------------------------------------------------------ context switches
     async def _connect(self, order: ConnectArc) -> None:
-        uses = self._uses.get(order.arc, {})
-        failed = await self._connect_rcs(order, uses)
+        failed = await self._context_switch.connect(order, self._uses.get(order.arc, {}))
         if failed is None:
-            opened = await self._open_gate(order)
-            if opened:
-                self._measure_switch(order)
-                self.happened(Opened(order.arc))
-                return
-            failed = ""
-        await self._disconnect_rcs(order.arc, order.epochs, f"connection failed at {failed or order.arc}")
+            self._measure_switch(order)
+            self.happened(Opened(order.arc))
+            return
         self._running_rcs.discard(failed)
         self.happened(OpenFailed(order.arc, failed))
         if failed:  # down until it has said how it is
             await self._meet_rc(failed)
+
+    async def _revoke(self, order: RevokeArc) -> None:
+        await self._context_switch.revoke(order)
+        self.happened(Freed(order.arc))
 
     def _measure_switch(self, order: ConnectArc) -> None:
         """Keep the time since these RCs were revoked from another ARC, settling not counted."""
@@ -322,69 +312,6 @@ class RcManager(Component[RcManagerParameters]):
         from_others = [at_s for at_s, arc in revoked if arc != order.arc]
         if from_others:
             self._switch_times_s.append(self.clock.now_s() - min(from_others) - order.settle_s)
-
-    async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
-        """Connect all RCs at once; return the name of one that failed, or None."""
-        lease_s = LEASE_S * self.clock.rate
-        epochs = dict(order.epochs)
-
-        async def connect(rc: str, epoch: int) -> None:
-            question = Connect(order.arc, epoch, lease_s, uses.get(rc, RcUse()), epochs, order.ranks.get(rc, 0))
-            await self.bus.ask(_rc(rc), question, Connected, within_s=RC_REPLY_S)
-
-        outcomes = await asyncio.gather(*(connect(rc, epoch) for rc, epoch in epochs.items()), return_exceptions=True)
-        for rc, outcome in zip(epochs, outcomes, strict=True):
-            if isinstance(outcome, Refusal | LinkError):
-                log.warning("%s could not be connected to %s: %s", rc, order.arc, outcome)
-                self.story.note(rc, f"could not be connected to {order.arc}: {outcome}")
-                return rc
-            if outcome is not None:
-                raise outcome
-        return None
-
-    async def _open_gate(self, order: ConnectArc) -> bool:
-        question = OpenGate(dict(order.epochs), order.settle_s, order.until_s)
-        within_s = ARC_REPLY_S + order.settle_s / self.clock.rate
-        try:
-            await self.bus.ask(_arc(order.arc), question, GateOpen, within_s=within_s)
-        except (Refusal, LinkError) as error:
-            log.warning("%s did not open: %s", order.arc, error)
-            return False
-        return True
-
-    async def _revoke(self, order: RevokeArc) -> None:
-        close = CloseGate(order.why, order.by, order.deadline_s, order.expected_s)
-        within_s = ARC_REPLY_S + order.deadline_s / self.clock.rate
-        if order.deadline_s > 0:
-            await self._close_gate(order.arc, close, within_s)
-            await self._disconnect_rcs(order.arc, order.epochs, order.why)
-        else:
-            async with asyncio.TaskGroup() as both:
-                both.create_task(self._close_gate(order.arc, close, within_s))
-                both.create_task(self._disconnect_rcs(order.arc, order.epochs, order.why))
-        self.happened(Freed(order.arc))
-
-    async def _close_gate(self, arc: str, question: CloseGate, within_s: float) -> None:
-        """Close the gate; if the ARC does not answer, its epoch ends with the RCs' disconnection all the same."""
-        try:
-            await self.bus.ask(_arc(arc), question, GateClosed, within_s=within_s)
-        except (Refusal, LinkError) as error:
-            self.story.note(arc, f"did not close its gate: {error}")
-
-    async def _disconnect_rcs(self, arc: str, epochs: Mapping[str, int], reason: str) -> None:
-        """Disconnect all RCs at once; wait out the lease of those that do not confirm."""
-        asked_s = self.clock.now_s()
-        confirmed = await asyncio.gather(*(self._disconnect(rc, arc, epoch, reason) for rc, epoch in epochs.items()))
-        if not all(confirmed):
-            await self.clock.sleep_until_s(asked_s + LEASE_S * self.clock.rate)
-
-    async def _disconnect(self, rc: str, arc: str, epoch: int, reason: str) -> bool:
-        try:
-            await self.bus.ask(_rc(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=RC_REPLY_S)
-        except (Refusal, LinkError) as error:
-            self.story.note(rc, f"did not confirm its disconnection from {arc}: {error}")
-            return False
-        return True
 
     # ------------------------------------------------------------------ RCs that do not run yet
     async def _have_running(self, rcs: Iterable[str]) -> None:
@@ -439,11 +366,9 @@ class RcManager(Component[RcManagerParameters]):
         orphans = [
             (rc.name, holder) for rc in rcs.values() for holder in rc.holders if not found.holds_rightly(holder.arc)
         ]
-        confirmed = await asyncio.gather(
-            *(self._disconnect(rc, holder.arc, holder.epoch, "not adopted after a restart") for rc, holder in orphans)
+        await self._context_switch.disconnect(
+            [(rc, holder.arc, holder.epoch) for rc, holder in orphans], "not adopted after a restart"
         )
-        if not all(confirmed):
-            await self.clock.sleep_s(LEASE_S * self.clock.rate)
         return found
 
     def _take_over(self, found: _Found) -> None:
@@ -493,7 +418,7 @@ class RcManager(Component[RcManagerParameters]):
     async def _until_answered(self, of: str, question: Message, reply: type[Reply]) -> Reply:
         while True:
             try:
-                return await self.bus.ask(of, question, reply, within_s=ARC_REPLY_S)
+                return await self.bus.ask(of, question, reply, within_s=SERVICE_REPLY_S)
             except LinkError as error:
                 log.info("%s does not answer yet: %s", of, error)
                 await self.clock.sleep_s(RETRY_S * self.clock.rate)

@@ -24,6 +24,7 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import (
     ADDRESS,
     BEAT_EVERY_S,
+    LEASE_S,
     AskRc,
     AskRequest,
     AskSchedule,
@@ -79,8 +80,11 @@ class PlainRc(Component[Any]):
         self.holders: dict[str, int] = {}
         self.last_epoch = 0
         self.log: list[tuple[str, str]] = []
+        self.hangs = False
 
     async def answer(self, asked: Envelope[Any]) -> Message:
+        if self.hangs:
+            await self.clock.sleep_s(60.0)
         match asked.body:
             case Connect(arc=arc, epoch=epoch):
                 if epoch <= self.last_epoch:
@@ -300,6 +304,44 @@ def test_an_rc_that_dies_takes_only_its_own_arc_along(pool: Any) -> None:
             assert two.is_open
             await here.rc(HARDWARE[0])
             await here.clock.sleep_s(0.5)
+            assert one.is_open
+
+    run_virtual(main())
+
+
+def test_an_rc_that_does_not_confirm_counts_as_held_until_its_lease_is_over(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one, two = await here.arc("one"), await here.arc("two")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            here.rcs["left"].hangs = True
+            asked_s = here.clock.now_s()
+            await two.ask_for(request("two", "radio", "left", priority=100))
+            await here.clock.sleep_s(LEASE_S - 0.1)
+            assert not one.is_open
+            assert not two.is_open
+            here.rcs["left"].hangs = False
+            here.rcs["left"].holders.clear()
+            await here.clock.sleep_s(2.0)
+            assert two.is_open
+            assert two.granted_s >= asked_s + LEASE_S
+
+    run_virtual(main())
+
+
+def test_a_set_that_cannot_be_connected_whole_is_given_back_whole(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            here.rcs["video"].holders["somebody else"] = 1
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "video", "radio"))
+            await here.clock.sleep_s(0.1)
+            assert not one.is_open
+            assert here.rcs["left"].log[:2] == [("connect", "one"), ("disconnect", "one")]
+            assert here.rcs["left"].holders == {}
+            here.rcs["video"].holders.clear()
+            await here.clock.sleep_s(3.0)
             assert one.is_open
 
     run_virtual(main())

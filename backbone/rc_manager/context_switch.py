@@ -1,0 +1,146 @@
+"""A context switch carried out: RCs disconnect from one ARC and connect to the next.
+
+Rules of this file:
+
+* All or nothing: if one step of a connection fails, all of it is undone before anybody is told.
+* An RC that does not confirm its disconnection counts as held until its lease is over: a holder may
+  be late, there are never two.
+* An ARC that does not answer delays nobody: its epoch ends with the disconnection of its RCs.
+
+Source: RAM 2002, "The RC Scheduler", last paragraph.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.errors import LinkError, Refusal
+from backbone.naming import Subsystem
+from backbone.rc_manager.decisions import ConnectArc, RevokeArc
+from backbone.rc_manager.messages import (
+    LEASE_S,
+    CloseGate,
+    Connect,
+    Connected,
+    Disconnect,
+    Disconnected,
+    GateClosed,
+    GateOpen,
+    OpenGate,
+    RcUse,
+)
+
+log = logging.getLogger(__name__)
+
+RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
+ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it answers
+
+Note = Callable[[str, str], Any]
+
+
+class ContextSwitch:
+    """Speaks to RCs and ARCs on behalf of the schedule manager.
+
+    Args:
+        bus: Of the RC manager.
+        clock: The mission's time.
+        note: Keeps that something happened to a subject.
+    """
+
+    def __init__(self, bus: Bus, clock: Clock, note: Note) -> None:
+        self._bus, self._clock, self._note = bus, clock, note
+
+    async def connect(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
+        """Connect all RCs to the ARC and have it open its gate, or undo all of it.
+
+        Args:
+            order: What the schedule manager decided.
+            uses: How the ARC uses each RC; exclusively if not said.
+
+        Returns:
+            None: the gate is open. Else the RC that failed, empty if it was the ARC; nothing is held.
+        """
+        failed = await self._connect_rcs(order, uses)
+        if failed is None and await self._open_gate(order):
+            return None
+        close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
+        async with asyncio.TaskGroup() as both:
+            both.create_task(self._close_gate(order.arc, close))
+            both.create_task(self.disconnect(_holds(order.arc, order.epochs), f"failed at {failed or order.arc}"))
+        return failed or ""
+
+    async def revoke(self, order: RevokeArc) -> None:
+        """Close the ARC's gate and disconnect its RCs; return when nothing is held any more."""
+        close = CloseGate(order.why, order.by, order.deadline_s, order.expected_s)
+        holds = _holds(order.arc, order.epochs)
+        if order.deadline_s > 0:  # its decision process may stop cleanly while it still commands
+            await self._close_gate(order.arc, close)
+            await self.disconnect(holds, order.why)
+            return
+        async with asyncio.TaskGroup() as both:
+            both.create_task(self._close_gate(order.arc, close))
+            both.create_task(self.disconnect(holds, order.why))
+
+    async def disconnect(self, holds: Sequence[tuple[str, str, int]], reason: str) -> None:
+        """Disconnect all at once, given as (RC, ARC, epoch); wait out the lease of those that do not confirm."""
+        asked_s = self._clock.now_s()
+        confirmed = await asyncio.gather(*(self._disconnect(rc, arc, epoch, reason) for rc, arc, epoch in holds))
+        if not all(confirmed):
+            await self._clock.sleep_until_s(asked_s + LEASE_S * self._clock.rate)
+
+    async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
+        """Connect all RCs at once; return the name of one that failed, or None."""
+        lease_s = LEASE_S * self._clock.rate
+        epochs = dict(order.epochs)
+
+        async def connect(rc: str, epoch: int) -> None:
+            question = Connect(order.arc, epoch, lease_s, uses.get(rc, RcUse()), epochs, order.ranks.get(rc, 0))
+            await self._bus.ask(_in_pool(rc), question, Connected, within_s=RC_REPLY_S)
+
+        outcomes = await asyncio.gather(*(connect(rc, epoch) for rc, epoch in epochs.items()), return_exceptions=True)
+        for rc, outcome in zip(epochs, outcomes, strict=True):
+            if isinstance(outcome, Refusal | LinkError):
+                log.warning("%s could not be connected to %s: %s", rc, order.arc, outcome)
+                self._note(rc, f"could not be connected to {order.arc}: {outcome}")
+                return rc
+            if outcome is not None:
+                raise outcome
+        return None
+
+    async def _open_gate(self, order: ConnectArc) -> bool:
+        question = OpenGate(dict(order.epochs), order.settle_s, order.until_s)
+        within_s = ARC_REPLY_S + order.settle_s / self._clock.rate
+        try:
+            await self._bus.ask(_in_pool(order.arc), question, GateOpen, within_s=within_s)
+        except (Refusal, LinkError) as error:
+            log.warning("%s did not open: %s", order.arc, error)
+            self._note(order.arc, f"did not open its gate: {error}")
+            return False
+        return True
+
+    async def _close_gate(self, arc: str, question: CloseGate) -> None:
+        within_s = ARC_REPLY_S + question.deadline_s / self._clock.rate
+        try:
+            await self._bus.ask(_in_pool(arc), question, GateClosed, within_s=within_s)
+        except (Refusal, LinkError) as error:
+            self._note(arc, f"did not close its gate: {error}")
+
+    async def _disconnect(self, rc: str, arc: str, epoch: int, reason: str) -> bool:
+        try:
+            await self._bus.ask(_in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=RC_REPLY_S)
+        except (Refusal, LinkError) as error:
+            self._note(rc, f"did not confirm its disconnection from {arc}: {error}")
+            return False
+        return True
+
+
+def _holds(arc: str, epochs: Mapping[str, int]) -> list[tuple[str, str, int]]:
+    return [(rc, arc, epoch) for rc, epoch in epochs.items()]
+
+
+def _in_pool(name: str) -> str:
+    return f"{Subsystem.RESOURCE_POOL}/{name}"
