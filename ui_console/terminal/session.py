@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from textual import pilot as textual_pilot
 
 from resource_pool.arc_client import Frame
 from ui_console.console_model import ConsoleEvent, ConsoleModel
@@ -15,6 +16,8 @@ from ui_console.driving import Drive
 from ui_console.observer import Observer
 from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
+
+Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
 
 
 class TerminalSession:
@@ -38,8 +41,15 @@ class TerminalSession:
         """Keep the newest picture; it is unpacked only if it gets drawn."""
         self._frame = frame
 
-    async def run(self, console: Observer[Any]) -> None:
+    async def run(
+        self, console: Observer[Any], *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
+    ) -> None:
         """Show the screen until a key or the component ends it; both have ended afterwards.
+
+        Args:
+            console: The component.
+            pilot: Presses the keys, on a screen nobody sees, in place of a person at a terminal.
+            size: Columns and lines of the pilot's screen.
 
         Raises:
             BaseException: What ended the component, if that was a bug or a refusal.
@@ -49,7 +59,10 @@ class TerminalSession:
         living = asyncio.create_task(console.run(), name="console")
         living.add_done_callback(lambda _living: screen.exit())
         try:
-            await screen.run_async()
+            if pilot is None:
+                await screen.run_async()
+            else:
+                await screen.run_async(headless=True, size=size, auto_pilot=pilot)
         finally:
             console.end("the screen was closed")
             await living
