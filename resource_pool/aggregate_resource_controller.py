@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import msgspec
@@ -63,6 +64,7 @@ from resource_pool.messages import (
     Jump,
     NoSuchAction,
     Noted,
+    NotMySet,
     NotYours,
     Release,
     Resumed,
@@ -79,6 +81,7 @@ log = logging.getLogger(__name__)
 RC_REPLY_S = 0.8  # chosen: a robot RC itself gives the radio half a second
 OWNER_GONE_S = 0.5  # chosen: a robot is given back within a second of its console's death; a new hub is found sooner
 OWNER_BEAT_S = 0.9  # chosen: less than the RC manager waits for a beat (1 s) with one to spare
+PREPARE_S = 0.9  # chosen: less than the RC manager waits for the opening beyond settling, so it opens in time or never
 NOTICE_S = 1.0  # chosen: an owner that needs longer to take note is noticed by its beat
 REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first have RCs started
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; later it has overlooked this one
@@ -110,6 +113,15 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     idle: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class _Notice:
+    """What the owner is to be told, for how long to wait for its answer (machine seconds), and whether that is over."""
+
+    notice: Resumed | Suspending | Suspended
+    within_s: float
+    told: asyncio.Event
+
+
 class AggregateResourceController(Component[ArcParameters]):
     """Base of every ARC; derive, set ``roles``, override ``prepare``."""
 
@@ -128,7 +140,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._sets: list[dict[str, str]] = []
         self._rcs: dict[str, str] = {}
         self._asked = asyncio.Event()
-        self._owner_hangs = False
+        self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
         self._commands = self._refused = 0
 
     # ------------------------------------------------------------------ hooks
@@ -145,9 +157,12 @@ class AggregateResourceController(Component[ArcParameters]):
 
         Raises:
             NoSuchAction: This kind of ARC has no such role.
+            SwappedOut: None is chosen yet.
         """
         if role not in self.roles:
             raise NoSuchAction(f"{self.launch.type} has no {role}", role=role)
+        if role not in self._rcs:
+            raise SwappedOut(f"{self.name} has no {role} yet", reason=self._gate.reason, by="", expected_start_s=-1.0)
         return self._rcs[role]
 
     async def tell_rc(self, role: str, command: Message) -> Applied:
@@ -172,6 +187,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def serve(self) -> None:
         """Ask for run time, then watch owner and RC manager until told to stop."""
+        self.start_task(self._tell_owner(), "tell owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
         await self._send_request()
@@ -251,14 +267,23 @@ class AggregateResourceController(Component[ArcParameters]):
             )
         except (Refusal, LinkError) as error:
             self.tell(self.name, f"cannot be scheduled: {error}")
-            await self._notify(Suspended(self.name, f"cannot be scheduled: {error}", "rc_manager", -1.0))
+            await self._notify(Suspended(self.name, f"cannot be scheduled: {error}", "rc_manager", -1.0)).wait()
             self.end(f"cannot be scheduled: {error}")
             return
         self._choose(scheduled.rcs)
         self.story.note(self.name, f"{scheduled.state}, position {scheduled.position}, behind {scheduled.blockers}")
 
-    def _choose(self, rcs: list[str]) -> None:
-        self._rcs = next(by_role for by_role in self._sets if set(by_role.values()) == set(rcs))
+    def _choose(self, rcs: Iterable[str]) -> None:
+        """Take this set as the one that was chosen.
+
+        Raises:
+            NotMySet: It is none of the alternatives asked for.
+        """
+        wanted = set(rcs)
+        found = [by_role for by_role in self._sets if set(by_role.values()) == wanted]
+        if not found:
+            raise NotMySet(f"{self.name} asked for no such set: {', '.join(sorted(wanted)) or 'nothing'}")
+        self._rcs = found[0]
 
     async def _tell_rc_manager(self, wish: Message) -> None:
         await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
@@ -276,32 +301,46 @@ class AggregateResourceController(Component[ArcParameters]):
 
     # ------------------------------------------------------------------ the gate
     async def _open(self, order: OpenGate) -> GateOpen:
+        self._choose(order.epochs)
         self._gate.prepare(order.epochs)
-        if not self._rcs:
-            self._choose(list(order.epochs))
         prepared_s = self.clock.now_s()
-        await self.prepare(order.epochs)
+        try:
+            async with asyncio.timeout(PREPARE_S):
+                await self.prepare(order.epochs)
+        except (Refusal, LinkError, TimeoutError) as error:
+            detail = f"not within {PREPARE_S} s" if isinstance(error, TimeoutError) else str(error)
+            reason = f"could not be prepared: {detail}"
+            if self._gate.epochs == order.epochs:
+                self._gate.close(reason, self.name, -1.0)
+            self.tell(self.name, reason)
+            raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0) from error
         await self.clock.sleep_until_s(prepared_s + order.settle_s)
         if not self._gate.open(order.epochs, self.clock.now_s()):
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
         self.report(f"granted: {', '.join(self._rcs.values())}")
-        self.start_task(self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s)), "resumed")
+        self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
         return GateOpen()
 
     async def _close(self, order: CloseGate) -> GateClosed:
         if order.deadline_s > 0 and self._gate.is_open:
             notice = Suspending(self.name, order.reason, order.by, order.deadline_s)
-            await self._notify(notice, order.deadline_s / self.clock.rate)
+            within_s = order.deadline_s / self.clock.rate
+            try:
+                async with asyncio.timeout(within_s):
+                    await self._notify(notice, within_s).wait()
+            except TimeoutError:
+                self.story.note(self._owner, "was not ready when its time to stop cleanly was over")
         was_open = self._gate.is_open
         self._gate.close(order.reason, order.by, order.expected_s)
         self.report(f"swapped out: {order.reason}{f' by {order.by}' if order.by else ''}")
         if was_open:
-            self.start_task(self._notify(Suspended(self.name, order.reason, order.by, order.expected_s)), "suspended")
+            self._notify(Suspended(self.name, order.reason, order.by, order.expected_s))
         return GateClosed()
 
     async def _command(self, command: Drive | Halt | Jump) -> Applied:
         try:
-            epoch = self._gate.epoch_of(self.rc("scout"))
+            scout = self.rc("scout")
+            epoch = self._gate.epoch_of(scout)
         except SwappedOut:
             self._refused += 1
             raise
@@ -322,12 +361,24 @@ class AggregateResourceController(Component[ArcParameters]):
             expected_start_s=gate.expected_s,
         )
 
-    async def _notify(self, notice: Resumed | Suspending | Suspended, within_s: float = NOTICE_S) -> None:
-        """Tell the owner; it may be slow, hang or be gone, which others find out."""
-        try:
-            await self.bus.ask(self._owner, notice, Noted, within_s=within_s)
-        except (Refusal, LinkError) as error:
-            self.story.note(self._owner, f"did not take note of {type(notice).__name__}: {error}")
+    def _notify(self, notice: Resumed | Suspending | Suspended, within_s: float = NOTICE_S) -> asyncio.Event:
+        """Have the owner told after everything it was told before; the event is set when it took note, or did not."""
+        told = asyncio.Event()
+        self._notices.put_nowait(_Notice(notice, within_s, told))
+        return told
+
+    async def _tell_owner(self) -> None:
+        """Tell one notice after the other, so that none overtakes another on its way to a slow owner.
+
+        It may also hang or be gone, which others find out.
+        """
+        while True:
+            waiting = await self._notices.get()
+            try:
+                await self.bus.ask(self._owner, waiting.notice, Noted, within_s=waiting.within_s)
+            except (Refusal, LinkError) as error:
+                self.story.note(self._owner, f"did not take note of {type(waiting.notice).__name__}: {error}")
+            waiting.told.set()
 
     # ------------------------------------------------------------------ watching
     async def _watch_owner(self) -> None:

@@ -65,6 +65,17 @@ class HoldTable:
             StaleEpoch: The epoch is not larger than every one before.
             Held: Another ARC holds this unit RC.
         """
+        self.check(hold)
+        self._last_epoch = hold.epoch
+        self._holds[hold.arc] = hold
+
+    def check(self, hold: Hold) -> Hold | None:
+        """Change nothing; return the ARC's present hold, which this one would replace.
+
+        Raises:
+            StaleEpoch: As ``connect`` would.
+            Held: As ``connect`` would.
+        """
         if hold.epoch <= self._last_epoch:
             raise StaleEpoch(
                 f"{self._rc}: epoch {hold.epoch} of {hold.arc} is not after {self._last_epoch}",
@@ -74,8 +85,12 @@ class HoldTable:
         others = [other for other in self._holds if other != hold.arc]
         if others and not self._sharable:
             raise Held(f"{self._rc} is held by {others[0]}", holder=others[0])
-        self._last_epoch = hold.epoch
-        self._holds[hold.arc] = hold
+        return self._holds.get(hold.arc)
+
+    def has(self, arc: str, epoch: int) -> bool:
+        """Say whether the ARC holds the RC under this epoch."""
+        hold = self._holds.get(arc)
+        return hold is not None and hold.epoch == epoch
 
     def disconnect(self, arc: str, epoch: int) -> Hold | None:
         """End the ARC's hold if it is of this epoch or an older one; return what was ended."""

@@ -340,6 +340,13 @@ class SwappedOut(Refusal):
     remedy = "Wait for 'resumed'; the next expected slot is in the facts."
 
 
+class NotMySet(Refusal):
+    """The order to open names RCs this ARC never asked for."""
+
+    code = "arc.not_my_set"
+    remedy = "Connect the RCs of one of the alternatives in the ARC's request."
+
+
 class NoSuchAction(Refusal):
     """This kind of ARC has no RC that could do it."""
 
@@ -352,6 +359,13 @@ class NotYours(Refusal):
 
     code = "arc.not_yours"
     remedy = "Claim an ARC of your own."
+
+
+class ImpossibleUse(Refusal):
+    """An RC cannot be held like that."""
+
+    code = "rc.impossible_use"
+    remedy = "Connect with a lease and with periods that are finite and above 0."
 
 
 class HardwareFault(Refusal):

@@ -4,7 +4,8 @@ Rules of this file:
 
 * A packet once begun is sent (non-preemptive).
 * First the ARC of higher user priority, then the shorter period, then the name.
-* Each stream has a constant interval; a release not served before the next one is an overrun and lost.
+* Each stream has a constant interval from the first packet on; a release not served before the next one is
+  an overrun and lost.
 * An ARC's packets reach only the robots it loaded packets for; several of its robots take turns.
 
 Pure; times are mission seconds.
@@ -14,6 +15,7 @@ Source: RAM 2002, "Sharable Resources"; IROS 2001, section 4.3 (rate monotonic b
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 from backbone.rc_manager.messages import Usage
@@ -41,9 +43,14 @@ class Packet:
 @dataclass(slots=True)
 class _Stream:
     usage: Usage
-    next_release_s: float
+    first_s: float
+    releases: int = 0
     overruns: int = 0
     sent: int = 0
+
+    @property
+    def next_release_s(self) -> float:
+        return self.first_s + self.releases * self.usage.period_s
 
 
 @dataclass(slots=True)
@@ -72,30 +79,43 @@ class PacketSchedule:
         self._senders: dict[str, _Sender] = {}
 
     def connect(self, arc: str, streams: list[Usage], rank: int, now_s: float) -> None:
-        """Give the ARC its streams; their first releases are now."""
+        """Give the ARC its streams; their first releases come with its first packet.
+
+        Raises:
+            ValueError: A period or packet time is no span of time above 0; nothing has changed.
+        """
+        for usage in streams:
+            if not (0 < usage.period_s < math.inf and 0 < usage.packet_time_s < math.inf):
+                raise ValueError(f"{arc}: packets of {usage.packet_time_s} s every {usage.period_s} s")
         self._senders[arc] = _Sender(rank, [_Stream(usage, now_s) for usage in streams])
 
-    def disconnect(self, arc: str) -> list[Packet]:
+    def disconnect(self, arc: str) -> list[Sending]:
         """Forget the ARC and all it loaded; return for each of its robots the packet that must be sent last."""
         sender = self._senders.pop(arc, None)
         if sender is None:
             return []
+        air_time_s = _air_time_s(sender)
         return [
-            Packet(p.arc, p.network_id, p.safe_payload, p.safe_payload, p.robot_epoch) for p in sender.touched.values()
+            Sending(Packet(p.arc, p.network_id, p.safe_payload, p.safe_payload, p.robot_epoch), air_time_s)
+            for _, p in sorted(sender.touched.items())
         ]
 
     def touch(self, packet: Packet) -> None:
         """Note that the ARC speaks to this robot, so that its safe packet is owed."""
         self._senders[packet.arc].touched[packet.network_id] = packet
 
-    def load(self, packet: Packet) -> None:
+    def load(self, packet: Packet, now_s: float) -> None:
         """Send this packet at the ARC's rate from now on."""
         self.touch(packet)
-        self._senders[packet.arc].packets[packet.network_id] = packet
+        sender = self._senders[packet.arc]
+        if not sender.packets:
+            for stream in sender.streams:
+                stream.first_s = now_s
+        sender.packets[packet.network_id] = packet
 
     def air_time_s(self, arc: str) -> float:
         """Return how long one of the ARC's packets occupies the air."""
-        return max((stream.usage.packet_time_s for stream in self._senders[arc].streams), default=0.0)
+        return _air_time_s(self._senders[arc])
 
     def next_due_s(self) -> float | None:
         """Return the earliest release of a stream that has something to send; None if there is none."""
@@ -118,7 +138,7 @@ class PacketSchedule:
         stream = sender.streams[number]
         missed = int((now_s - stream.next_release_s) / stream.usage.period_s)
         stream.overruns += missed
-        stream.next_release_s += (missed + 1) * stream.usage.period_s
+        stream.releases += missed + 1
         stream.sent += 1
         robots = sorted(sender.packets)
         packet = sender.packets[robots[sender.turn % len(robots)]]
@@ -131,3 +151,7 @@ class PacketSchedule:
             arc: (sum(s.sent for s in sender.streams), sum(s.overruns for s in sender.streams))
             for arc, sender in self._senders.items()
         }
+
+
+def _air_time_s(sender: _Sender) -> float:
+    return max((stream.usage.packet_time_s for stream in sender.streams), default=0.0)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import types
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -19,6 +20,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
@@ -33,12 +35,14 @@ from backbone.rc_manager.messages import (
     StaleEpoch,
 )
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import DriverSite
+from resource_pool.drivers.interface import DriverSite, build_driver
 from resource_pool.holds import Hold, HoldTable
+from resource_pool.messages import HardwareFault, ImpossibleUse
 
 log = logging.getLogger(__name__)
 
 EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
+SAFE_WITHIN_S = 0.4  # chosen: less than the RC manager waits for a disconnection, so that it hears why; machine seconds
 
 
 class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -49,7 +53,9 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
         sharable: True if several ARCs may hold it.
         capacity: Share of its time it can give, 0 to 1.
         links: Other resources it works with: kind → names.
-        world: Simulated world that plays the hardware, for the simulated drivers.
+        world: Simulated world that plays the hardware, for the simulated drivers; others need none.
+        options: What only the driver understands. Parameters of the mission file that are none of the RC's
+            own end up here, and the driver's ``options_type`` checks them.
     """
 
     driver: str = "simulated"
@@ -57,6 +63,7 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     capacity: float = 1.0
     links: dict[str, list[str]] = {}
     world: str = "world"
+    options: dict[str, Any] = {}
 
 
 R = TypeVar("R", bound=RcParameters)
@@ -68,6 +75,8 @@ class ResourceController(Component[R], Generic[R]):
     parameters_type: ClassVar[type[msgspec.Struct]] = RcParameters
     commands: ClassVar[types.UnionType | type[Any] | None] = None
     """Questions this kind of RC answers besides those of the RC manager."""
+    driver_kind: ClassVar[str] = ""
+    """Kind of driver it is built on; empty: it has none, and so no driver's options."""
     accepts: ClassVar[types.UnionType | type[Any] | None] = Connect | Disconnect | AskRc
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -76,11 +85,12 @@ class ResourceController(Component[R], Generic[R]):
             cls.accepts = Connect | Disconnect | AskRc | cls.commands
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
-        super().__init__(launch, bus, clock)
+        super().__init__(_sort_out_options(launch, self.parameters_type) if self.driver_kind else launch, bus, clock)
         first_epoch = int(clock.now_s() * EPOCHS_PER_S)
         self.holds = HoldTable(self.name, sharable=self.parameters.sharable, last_epoch=first_epoch)
         self.applied = self.refused_stale = 0
-        self._connects = self._lease_ends = 0
+        self._connects = self._lease_ends = self._faults = 0
+        self._unsafe: dict[str, Hold] = {}
         self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
 
@@ -92,7 +102,9 @@ class ResourceController(Component[R], Generic[R]):
         """Bring what this hold could command into its safe state.
 
         When: the hold is no longer in the table, so no command of it can come any more; before the
-        disconnection is confirmed. What: stop, switch off, drop what is queued.
+        disconnection is confirmed. What: stop, switch off, drop what is queued. Raise ``HardwareFault`` if
+        the hardware does not obey; after that, or if it took longer than ``SAFE_WITHIN_S`` and was cancelled,
+        it is called again for the same hold, before anybody else is connected.
         """
 
     async def command(self, asked: Envelope[Any]) -> Message:
@@ -102,7 +114,18 @@ class ResourceController(Component[R], Generic[R]):
     # ------------------------------------------------------------------ for derived classes
     def driver_site(self) -> DriverSite:
         """Return what a driver of this RC may use."""
-        return DriverSite(self.name, self.bus, self.clock, self.parameters, lambda what: self.tell(self.name, what))
+        return DriverSite(
+            self.name, self.bus, self.clock, self.parameters, lambda what: self.tell(self.name, what), self.fail
+        )
+
+    def make_driver(self, name: str = "") -> Any:
+        """Return a driver of this RC's kind, not yet open: the one of this name, else the mission's.
+
+        Raises:
+            UnknownDriver: There is none.
+            WrongParameter: It does not understand its options.
+        """
+        return build_driver(self.driver_kind, name or self.parameters.driver, self.driver_site())
 
     def admit(self, arc: str, epoch: int) -> Hold:
         """Return the hold under which the command may be carried out, and count it.
@@ -149,26 +172,26 @@ class ResourceController(Component[R], Generic[R]):
                 continue
             await self.clock.sleep_until_s(expiry_s)
             async with self._changing:
-                for hold in self.holds.expire(self.clock.now_s()):
-                    self._lease_ends += 1
+                over = self.holds.expire(self.clock.now_s())
+                self._lease_ends += len(over)
+                for hold in over:
                     log.warning("the lease of %s is over", hold.arc)
-                    await self._end_hold(hold, "its lease is over")
+                await self._end_holds(over, "its lease is over")
 
     async def drain(self) -> None:
-        """End all holds, safely."""
+        """End all holds, safely if the hardware still obeys."""
         async with self._changing:
-            for hold in self.holds.holds():
-                self.holds.disconnect(hold.arc, hold.epoch)
-                await self._end_hold(hold, "the RC ends")
+            ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
+            await self._end_holds([hold for hold in ended if hold is not None], "the RC ends")
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Connect, disconnect, tell who holds, or carry out a command."""
         match asked.body:
             case Connect() as order:
-                return await self._connect(order)
+                return await self._connect(order, asked.stamp_s)
             case Disconnect(arc=arc, epoch=epoch, reason=reason):
                 async with self._changing:
-                    hold = self.holds.disconnect(arc, epoch)
+                    hold = self.holds.disconnect(arc, epoch) or self._unsafe.get(arc)
                     if hold is not None:
                         await self._end_hold(hold, reason)
                 return Disconnected(self.holds.last_epoch)
@@ -178,34 +201,73 @@ class ResourceController(Component[R], Generic[R]):
                 return await self.command(asked)
 
     def statistics(self) -> dict[str, float]:
-        """Count commands, connections, and ends by lease."""
+        """Count commands, connections, ends by lease, and safe states not reached at the first attempt."""
         return {
             "applied": self.applied,
             "refused_stale": self.refused_stale,
             "connects": self._connects,
             "lease_ends": self._lease_ends,
+            "safety_faults": self._faults,
         }
 
-    async def _connect(self, order: Connect) -> Connected:
+    async def _connect(self, order: Connect, given_s: float) -> Connected:
+        if not 0 < order.lease_s < math.inf:
+            raise ImpossibleUse(f"{self.name}: a lease of {order.lease_s} s for {order.arc}")
         async with self._changing:
-            now_s = self.clock.now_s()
-            hold = Hold(order.arc, order.epoch, now_s, now_s + order.lease_s, order.use, order.companions, order.rank)
+            # From the order's own time: the RC manager counts on the end, however long the order took.
+            lease_until_s = given_s + order.lease_s
+            since_s = self.clock.now_s()
+            hold = Hold(order.arc, order.epoch, since_s, lease_until_s, order.use, order.companions, order.rank)
+            former = self.holds.check(hold)
+            if former is not None:
+                self.holds.disconnect(former.arc, former.epoch)
+                await self._end_hold(former, f"connected anew under epoch {order.epoch}")
+            for unsafe in list(self._unsafe.values()):
+                await self._end_hold(unsafe, "made up for")
             self.holds.connect(hold)
+            try:
+                await self.connected(hold)
+            except Refusal:
+                self.holds.disconnect(hold.arc, hold.epoch)
+                raise
             self._connects += 1
             self._lease_changed.set()
-            await self.connected(hold)
             self.story.note(order.arc, f"connected under epoch {order.epoch}")
             self._publish_holders()
         return Connected(order.epoch)
 
     async def _end_hold(self, hold: Hold, reason: str) -> None:
-        await self.make_safe(hold)
+        """Bring what the ended hold could command into its safe state.
+
+        Raises:
+            HardwareFault: It is not safe; that is kept in mind and tried again before the next connection.
+        """
+        self._unsafe[hold.arc] = hold
+        try:
+            async with asyncio.timeout(SAFE_WITHIN_S):
+                await self.make_safe(hold)
+        except (HardwareFault, TimeoutError) as error:
+            detail = error.detail if isinstance(error, HardwareFault) else f"nothing within {SAFE_WITHIN_S} s"
+            self._faults += 1
+            self.tell(hold.arc, f"disconnected ({reason}), but {self.name} is not safe: {detail}")
+            self._publish_holders()
+            raise HardwareFault(f"{self.name} is not safe after {hold.arc}: {detail}", arc=hold.arc) from error
+        del self._unsafe[hold.arc]
         self.story.note(hold.arc, f"disconnected: {reason}")
         self._publish_holders()
 
+    async def _end_holds(self, ended: list[Hold], reason: str) -> None:
+        """End each of them, also if the hardware does not obey for one: who ends them cannot be refused."""
+        for hold in ended:
+            try:
+                await self._end_hold(hold, reason)
+            except HardwareFault as fault:
+                log.warning("%s", fault)
+
     def _publish_holders(self) -> None:
         holders = ", ".join(hold.arc for hold in self.holds.holds())
-        self.report(f"held by {holders}" if holders else "free")
+        unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
+        self.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
         self.bus.publish(self.address, Conversation.TELEMETRY, self.rc_state())
 
     def _heard_leases(self, envelope: Envelope[Any]) -> None:
@@ -213,3 +275,15 @@ class ResourceController(Component[R], Generic[R]):
         for lease in leases.leases:
             if lease.rc == self.name:
                 self.holds.renew(lease.arc, lease.epoch, envelope.stamp_s + leases.lease_s)
+
+
+def _sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:
+    """Return the launch with everything the RC's parameters do not know moved into its driver's options."""
+    own = {field.encode_name for field in msgspec.structs.fields(parameters_type)}
+    given = launch.parameters
+    options = {name: value for name, value in given.items() if name not in own}
+    if not options:
+        return launch
+    rest = {name: value for name, value in given.items() if name in own}
+    rest["options"] = {**rest.get("options", {}), **options}
+    return msgspec.structs.replace(launch, parameters=rest)

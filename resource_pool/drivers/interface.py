@@ -9,10 +9,15 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
+
+import msgspec
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.component import WrongParameter
 from backbone.errors import Refusal
+
+Options = TypeVar("Options", bound=msgspec.Struct)
 
 
 class UnknownDriver(Refusal):
@@ -30,8 +35,9 @@ class DriverSite:
         resource: Name of the resource.
         bus: For drivers whose hardware is reached over it (the simulated ones).
         clock: The mission's time.
-        parameters: The RC's parameters.
+        parameters: The RC's parameters; the driver's own are in ``options``, checked by its ``options_type``.
         tell: Says one line to the people who watch the mission.
+        fail: Ends the RC because of this bug or fault; its creator starts it anew, with the device reopened.
     """
 
     resource: str
@@ -39,6 +45,22 @@ class DriverSite:
     clock: Clock
     parameters: Any
     tell: Callable[[str], None]
+    fail: Callable[[BaseException], None]
+
+    def options(self, kind: type[Options]) -> Options:
+        """Return what the mission says to this driver alone.
+
+        Raises:
+            WrongParameter: It says something ``kind`` does not have, or not as it should be.
+        """
+        try:
+            return msgspec.convert(self.parameters.options, kind)
+        except msgspec.ValidationError as error:
+            raise WrongParameter(f"{self.resource}: {error}") from None
+
+
+class NoOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """For drivers that need to be told nothing."""
 
 
 class RadioDriver(Protocol):
@@ -48,7 +70,11 @@ class RadioDriver(Protocol):
         """Get hold of the device. When: once, before readiness. Raise ``HardwareFault`` if it is not there."""
 
     async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
-        """Return when the packet is on the air. Not: queue it. ``arc`` and ``robot_epoch`` are for audits only."""
+        """Return when the packet is on the air. Not: queue it. ``arc`` and ``robot_epoch`` are for audits only.
+
+        Raises:
+            HardwareFault: It was not sent.
+        """
 
     async def close(self) -> None:
         """Let go of the device. When: once, last."""
@@ -92,7 +118,7 @@ class FramegrabberDriver(Protocol):
 
 
 class RobotProtocol(Protocol):
-    """How commands to one kind of robot are spelt in packets."""
+    """How commands to one kind of robot are spelt in packets. Raise ``HardwareFault`` for what it cannot do."""
 
     def clip_wheel_speed(self, speed_rad_s: float) -> float:
         """Return the speed the robot really takes, rad/s."""
@@ -123,15 +149,21 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
 def build_driver(kind: str, name: str, site: DriverSite) -> Any:
     """Return the driver of this name, not yet open. Its module is imported only here, in the RC that needs it.
 
+    A driver class takes the site; if it has a class variable ``options_type`` (a msgspec struct), it takes
+    ``site.options(options_type)``, else no options are allowed.
+
     Raises:
         UnknownDriver: There is none.
+        WrongParameter: It does not understand its options.
     """
-    path = BUILT_IN[kind].get(name, name)
+    built_in = BUILT_IN.get(kind, {})
+    path = built_in.get(name, name)
     module_name, colon, class_name = path.partition(":")
     if not colon:
-        raise UnknownDriver(f"{site.resource}: no {kind} driver {name!r}; built in: {', '.join(BUILT_IN[kind])}")
+        raise UnknownDriver(f"{site.resource}: no {kind} driver {name!r}; built in: {', '.join(built_in) or 'none'}")
     try:
         driver_class = getattr(importlib.import_module(module_name), class_name)
     except (ImportError, AttributeError) as error:
         raise UnknownDriver(f"{site.resource}: {path}: {error}") from error
+    site.options(getattr(driver_class, "options_type", NoOptions))
     return driver_class(site)

@@ -8,6 +8,7 @@ from backbone.naming import Subsystem, address
 from resource_pool.drivers.interface import DriverSite
 from resource_pool.messages import AskWorld, HardwareFault, PacketHeard, RadioPacket, WorldModel
 from scout_model import radio_link
+from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed
 
 WORLD_REPLY_S = 0.4  # chosen: less than the RCs give the radio
@@ -78,7 +79,12 @@ class SimulatedScoutProtocol:
 
     def transmitter(self, on: bool, frequency: str) -> bytes:
         """Return the packet that turns the transmitter on or off."""
-        return radio_link.encode_transmitter_on(frequency) if on else radio_link.encode_transmitter_off()
+        if not on:
+            return radio_link.encode_transmitter_off()
+        try:
+            return radio_link.encode_transmitter_on(frequency)
+        except MalformedPacket as error:
+            raise HardwareFault(f"{self._site.resource}: {error}") from error
 
     def safe(self) -> bytes:
         """Return the packet after which the Scout neither moves nor transmits."""

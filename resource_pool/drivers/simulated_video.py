@@ -78,6 +78,11 @@ class SimulatedFramegrabber:
             return
         self._next_s = max(self._next_s + self._pause_s, state.at_s)
         self._drawing = asyncio.create_task(self._take(state, self._frequency, self._deliver), name="take picture")
+        self._drawing.add_done_callback(self._taken)
+
+    def _taken(self, drawing: asyncio.Task[None]) -> None:
+        if not drawing.cancelled() and (bug := drawing.exception()) is not None:
+            self._site.fail(bug)
 
     async def _take(self, state: WorldState, frequency: str, deliver: Callable[[Picture], None]) -> None:
         assert self._studio is not None  # noqa: S101  open before the first state can arrive

@@ -8,7 +8,11 @@ Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 
 from __future__ import annotations
 
-from typing import Any
+import itertools
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -16,7 +20,7 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import FramegrabberDriver, Picture, build_driver
+from resource_pool.drivers.interface import FramegrabberDriver, Picture
 from resource_pool.holds import Hold
 from resource_pool.messages import Applied, Frame, Tune
 from resource_pool.resource_controller import RcParameters, ResourceController
@@ -26,12 +30,12 @@ class FramegrabberParameters(RcParameters, frozen=True, kw_only=True):
     """A framegrabber's own.
 
     Attributes:
-        frame_rate_hz: Pictures a second, 1 to 30.
+        frame_rate_hz: Pictures a second, above 0 to 30.
         camera: For the simulated driver: ``auto``, ``gl`` or ``paint``.
     """
 
-    frame_rate_hz: float = 15.0
-    camera: str = "auto"
+    frame_rate_hz: Annotated[float, msgspec.Meta(gt=0, le=30)] = 15.0
+    camera: Literal["auto", "gl", "paint"] = "auto"
 
 
 class WrongFrequency(Refusal):
@@ -46,11 +50,11 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     parameters_type = FramegrabberParameters
     commands = Tune
+    driver_kind = "framegrabber"
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        site = self.driver_site()
-        self._driver: FramegrabberDriver = build_driver("framegrabber", self.parameters.driver, site)
+        self._driver: FramegrabberDriver = self.make_driver()
         self._delivered = self._garbled = self._silent = 0
 
     async def connect(self) -> None:
@@ -74,7 +78,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         known = self.parameters.links.get("video_frequency", [])
         if order.frequency not in known:
             raise WrongFrequency(f"{self.name} receives {', '.join(known) or 'nothing'}, not {order.frequency}")
-        numbers = iter(range(1, 1 << 62))
+        numbers = itertools.count(1)
 
         def deliver(picture: Picture) -> None:
             self._deliver(hold, picture, numbers)
@@ -91,7 +95,9 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             "frames_silent": self._silent,
         }
 
-    def _deliver(self, hold: Hold, picture: Picture, numbers: Any) -> None:
+    def _deliver(self, hold: Hold, picture: Picture, numbers: Iterator[int]) -> None:
+        if not self.holds.has(hold.arc, hold.epoch):
+            return  # a driver may still be busy with it when it is told to stop
         if picture.transmitters == 0:
             self._silent += 1
             return

@@ -6,6 +6,7 @@ Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissa
 from __future__ import annotations
 
 import asyncio
+import math
 from typing import Any
 
 from backbone.bus.interface import Bus, Clock
@@ -13,7 +14,7 @@ from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import RobotProtocol, build_driver
+from resource_pool.drivers.interface import RobotProtocol
 from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
@@ -50,63 +51,84 @@ class NoRadio(Refusal):
     remedy = "Claim a kind of ARC whose set includes the robot's command radio."
 
 
+class NotFinite(Refusal):
+    """A wheel cannot turn at a speed that is no number."""
+
+    code = "scout.not_finite"
+    remedy = "Send finite wheel speeds; those beyond the motor's limit are clipped."
+
+
 class Scout(ResourceController[ScoutParameters]):
     """Turns commands into packets of the Scout's protocol and has the radio send them at the ARC's rate."""
 
     parameters_type = ScoutParameters
     commands = CommandScout
+    driver_kind = "robot"
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        name = self.parameters.protocol or self.parameters.driver
-        site = self.driver_site()
-        self._protocol: RobotProtocol = build_driver("robot", name, site)
+        self._protocol: RobotProtocol = self.make_driver(self.parameters.protocol)
         self._radio = (self.parameters.links.get("command_radio") or [""])[0]
         self._halt_at_s: float | None = None
         self._driven = asyncio.Event()
         self._holder: Hold | None = None
+        self._frequency = ""
         self._timeouts = 0
 
     async def serve(self) -> None:
         """Stop the wheels when commands stay away, and end the hold when its lease is over."""
-        async with asyncio.TaskGroup() as both:
-            both.create_task(super().serve())
-            both.create_task(self._halt_when_silent())
+        self.start_task(self._halt_when_silent(), "dead man")
+        await super().serve()
 
     async def connected(self, hold: Hold) -> None:
         """Remember under which grant the robot may be commanded."""
-        self._holder = hold
+        self._holder, self._halt_at_s, self._frequency = hold, None, ""
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
         """Command nothing any more; the radio sends the safe packet when it is disconnected."""
-        self._holder, self._halt_at_s = None, None
+        self._holder, self._halt_at_s, self._frequency = None, None, ""
 
     async def command(self, asked: Envelope[Any]) -> Message:
         """Drive, halt, jump, or switch the transmitter."""
         order: CommandScout = asked.body
+        if isinstance(order.command, Drive) and not _is_finite(order.command):
+            raise NotFinite(
+                f"{self.name}: wheel speeds {order.command.left_rad_s} and {order.command.right_rad_s} rad/s"
+            )
         hold = self.admit(order.arc, order.epoch)
         match order.command:
             case Drive(left_rad_s=left, right_rad_s=right):
                 left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
-                await self._load(hold, self._protocol.drive(left, right))
+                # Before the packet goes: while it does, the hold may end, or the answer of the radio be lost.
                 self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
                 self._driven.set()
+                await self._load(hold, self._protocol.drive(left, right))
                 return self._applied(hold, "drive", {"left_rad_s": left, "right_rad_s": right})
             case Halt():
                 await self._load(hold, self._protocol.halt())
-                self._halt_at_s = None
+                self._stopped(hold)
                 return self._applied(hold, "halt", {})
             case Jump():
-                await self._load(hold, self._protocol.jump(), at_once=True)
+                # Repeating the last drive or halt would trip the robot or call the jump off.
+                as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
+                await self._load(hold, self._protocol.jump(), at_once=True, afterwards=as_it_is)
+                self._stopped(hold)
                 return self._applied(hold, "jump", {})
             case SwitchTransmitter(on=on, frequency=frequency):
+                packet = self._protocol.transmitter(on, frequency)
+                self._frequency = frequency if on else ""
                 still = self._protocol.halt()  # repeated, so that the robot hears it is not forgotten
-                await self._load(hold, self._protocol.transmitter(on, frequency), at_once=True, afterwards=still)
+                await self._load(hold, packet, at_once=True, afterwards=still)
                 return self._applied(hold, "transmitter", {"on": float(on)})
 
     def statistics(self) -> dict[str, float]:
         """Count also the halts because commands stayed away."""
         return {**super().statistics(), "command_timeouts": self._timeouts}
+
+    def _stopped(self, hold: Hold) -> None:
+        """Note that the wheels stand, unless the robot has another holder by now."""
+        if self._holder is not None and self._holder.epoch == hold.epoch:
+            self._halt_at_s = None
 
     async def _load(self, hold: Hold, payload: bytes, *, at_once: bool = False, afterwards: bytes = b"") -> None:
         epoch = hold.companions.get(self._radio)
@@ -137,9 +159,11 @@ class Scout(ResourceController[ScoutParameters]):
                 continue
             await self.clock.sleep_until_s(self._halt_at_s)
             hold = self._holder
-            if hold is None or not self._silent_too_long():
+            if not self._silent_too_long():
                 continue
             self._halt_at_s = None
+            if hold is None:
+                continue
             self._timeouts += 1
             self.story.note(hold.arc, "sent no command for too long: wheels stopped")
             try:
@@ -150,3 +174,7 @@ class Scout(ResourceController[ScoutParameters]):
     def _silent_too_long(self) -> bool:
         """Say whether, after the sleep, still no command has come."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
+
+
+def _is_finite(speeds: Drive) -> bool:
+    return math.isfinite(speeds.left_rad_s) and math.isfinite(speeds.right_rad_s)

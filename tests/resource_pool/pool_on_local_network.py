@@ -1,0 +1,312 @@
+"""The real resource pool in one process, on virtual time: RC manager, RCs, ARCs, world; only hardware is fake."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeVar
+
+import msgspec
+
+from backbone.bus.clock import VirtualClock
+from backbone.bus.interface import Bus
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.dependency_database.messages import Resource
+from backbone.dependency_database.service import DependencyDatabase
+from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import PathNode
+from backbone.rc_manager.service import RcManager
+from backbone.wire import Envelope, Message
+from resource_pool.aggregate_resource_controller import AggregateResourceController
+from resource_pool.arc_client import ArcClient, claim_parameters
+from resource_pool.arcs.capture import CaptureArc
+from resource_pool.arcs.drive import DriveArc
+from resource_pool.arcs.video_drive import VideoDriveArc
+from resource_pool.drivers.interface import DriverSite, Picture
+from resource_pool.drivers.simulated import SimulatedRadio
+from resource_pool.messages import (
+    ArcNotice,
+    AskBeat,
+    AskPose,
+    HardwareFault,
+    Pose,
+    Resumed,
+    Suspended,
+    Suspending,
+)
+from resource_pool.rcs.command_radio import CommandRadio
+from resource_pool.rcs.framegrabber import Framegrabber
+from resource_pool.rcs.scout import Scout
+from resource_pool.rcs.video_frequency import VideoFrequency
+from resource_pool.simulated_world import SimulatedWorld
+from scout_model.description import ScoutPlace, WorldDescription
+
+C = TypeVar("C", bound=Component[Any])
+
+WORLD = WorldDescription(
+    6.0, 6.0, scouts=[ScoutPlace("scout1", 1, 2.0, 2.0, 0.0), ScoutPlace("scout2", 2, 4.0, 4.0, 0.0)]
+)
+HERE = "pool_on_local_network"
+HARDWARE = [
+    Resource("scout1", "scout", parameters={"network_id": 1}, links={"command_radio": ["radio"]}, features=["camera"]),
+    Resource("scout2", "scout", parameters={"network_id": 2}, links={"command_radio": ["radio"]}, features=["camera"]),
+    Resource("radio", "command_radio", sharable=True, driver=f"{HERE}:WiretappedRadio"),
+    Resource("video", "video_frequency", connect_s=0.1),
+    Resource("grabber", "framegrabber", driver=f"{HERE}:HandOperatedGrabber", links={"video_frequency": ["video"]}),
+]
+RC_CLASSES: dict[str, type[Component[Any]]] = {
+    "scout": Scout,
+    "command_radio": CommandRadio,
+    "video_frequency": VideoFrequency,
+    "framegrabber": Framegrabber,
+}
+ARC_CLASSES: dict[str, type[AggregateResourceController]] = {
+    "drive": DriveArc,
+    "video_drive": VideoDriveArc,
+    "capture": CaptureArc,
+}
+
+
+@dataclass(frozen=True)
+class OnAir:
+    """A packet that was heard."""
+
+    at_s: float
+    network_id: int
+    payload: bytes
+    arc: str
+    robot_epoch: int
+
+
+class WiretappedRadio(SimulatedRadio):
+    """Keeps what it sent; breaks or hangs when the test says so."""
+
+    built: ClassVar[list[WiretappedRadio]] = []
+
+    def __init__(self, site: DriverSite) -> None:
+        super().__init__(site)
+        self.clock = site.clock
+        self.heard: list[OnAir] = []
+        self.breaks = self.hangs = False
+        self.opened = self.closed = 0
+        self.built.append(self)
+
+    async def open(self) -> None:
+        self.opened += 1
+
+    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
+        if self.breaks:
+            raise HardwareFault("the antenna fell off")
+        if self.hangs:
+            await asyncio.Event().wait()
+        self.heard.append(OnAir(self.clock.now_s(), network_id, payload, arc, robot_epoch))
+        await super().transmit(network_id, payload, arc=arc, robot_epoch=robot_epoch)
+
+    async def close(self) -> None:
+        self.closed += 1
+
+    def heard_by(self, network_id: int) -> list[OnAir]:
+        return [packet for packet in self.heard if packet.network_id == network_id]
+
+
+class HandOperatedGrabber:
+    """Delivers when the test says so, also when it should not."""
+
+    built: ClassVar[list[HandOperatedGrabber]] = []
+
+    def __init__(self, site: DriverSite) -> None:
+        self.clock = site.clock
+        self.frequency = ""
+        self.stops = 0
+        self.deliver: Callable[[Picture], None] | None = None
+        self.built.append(self)
+
+    async def open(self) -> None:
+        pass
+
+    def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
+        self.frequency, self.deliver = frequency, deliver
+
+    def stop(self) -> None:
+        self.frequency = ""
+        self.stops += 1
+
+    async def close(self) -> None:
+        pass
+
+    def picture(self, transmitters: int = 1) -> Picture:
+        return Picture(self.clock.now_s(), memoryview(bytes(4)), 2, 2, transmitters, "scout1")
+
+
+class Owner(Component[Any]):
+    """A decision process that keeps what it was told."""
+
+    accepts = ArcNotice
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.arcs: dict[str, ArcClient] = {}
+        self.notices: list[Resumed | Suspending | Suspended] = []
+        self.hangs = False
+        self.slow_s = 0.0
+
+    def know(self, arc: str) -> ArcClient:
+        self.arcs[arc] = ArcClient(self.bus, arc, self)
+        return self.arcs[arc]
+
+    def heard(self) -> list[str]:
+        return [type(notice).__name__ for notice in self.notices]
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        if self.hangs:
+            await asyncio.Event().wait()
+        notice = asked.body
+        if not isinstance(notice, AskBeat):
+            if self.slow_s:
+                await self.clock.sleep_s(self.slow_s)
+                self.slow_s /= 2
+            self.notices.append(notice)
+            return await self.arcs[notice.arc].handle(notice)
+        return await next(iter(self.arcs.values())).handle(notice)
+
+    async def arc_resumed(self, notice: Resumed) -> None:
+        pass
+
+    async def arc_suspending(self, notice: Suspending) -> None:
+        pass
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        pass
+
+
+@dataclass
+class Pool:
+    """A running pool. Components are started, ended and killed by name."""
+
+    network: LocalNetwork
+    clock: VirtualClock
+    hardware: list[Resource]
+    running: dict[str, Component[Any]] = field(default_factory=dict)
+    lives: dict[str, asyncio.Task[None]] = field(default_factory=dict)
+
+    @property
+    def radio_driver(self) -> WiretappedRadio:
+        return WiretappedRadio.built[-1]
+
+    @property
+    def grabber_driver(self) -> HandOperatedGrabber:
+        return HandOperatedGrabber.built[-1]
+
+    async def start(
+        self,
+        component: type[C],
+        name: str,
+        parameters: dict[str, Any] | None = None,
+        subsystem: Subsystem = Subsystem.RESOURCE_POOL,
+        kind: str = "",
+    ) -> C:
+        """Return the component when it is ready."""
+        launch = Launch(
+            self.network.mission, subsystem, name, kind or name, "x:Y", "local", "", 0.0, 1.0, parameters or {}
+        )
+        made = component(launch, self.network.join(launch.address, self.clock), self.clock)
+        ready = asyncio.Event()
+        watching = made.bus.watch_alive(launch.address, lambda _address, alive: ready.set() if alive else None)
+        life = asyncio.create_task(made.run(), name=f"life of {name}")
+        waiting = asyncio.create_task(ready.wait())
+        await asyncio.wait({life, waiting}, return_when=asyncio.FIRST_COMPLETED)
+        waiting.cancel()
+        watching.close()
+        if life.done():
+            await life
+            raise AssertionError(f"{name} ended before it was ready")
+        self.running[name], self.lives[name] = made, life
+        return made
+
+    async def rc(self, name: str, **changed: Any) -> Any:
+        resource = next(resource for resource in self.hardware if resource.name == name)
+        parameters = resource.rc_parameters() | changed
+        return await self.start(RC_CLASSES[resource.type], name, parameters, kind=resource.type)
+
+    async def manager(self) -> RcManager:
+        parameters = {"mission": "local", "mission_priority": 10}
+        return await self.start(RcManager, "rc_manager", parameters, Subsystem.BACKBONE)
+
+    async def owner(self, name: str) -> Owner:
+        return await self.start(Owner, name, None, Subsystem.MISSION_CONTROL)
+
+    async def arc(self, owner: Owner, kind: str, scout: str, **more: Any) -> ArcClient:
+        """Have an ARC for this robot started and return the owner's hold on it."""
+        name = f"{owner.name}-{kind}"
+        client = owner.know(name)
+        given = {"minimum_runtime_s": 5.0, "path": [PathNode("local", 10), PathNode(owner.name, 1)]} | more
+        parameters = claim_parameters(owner.address, wish={"scout": scout}, **given)
+        await self.start(ARC_CLASSES[kind], name, msgspec.to_builtins(parameters), kind=kind)
+        return client
+
+    async def console(self, name: str, kind: str, scout: str, priority: int = 100) -> tuple[Owner, ArcClient]:
+        owner = await self.owner(name)
+        path = [PathNode(name, priority)]
+        return owner, await self.arc(owner, kind, scout, path=path, console=True, minimum_runtime_s=0.1)
+
+    async def end(self, name: str) -> None:
+        """Let it leave in good order."""
+        self.running.pop(name).end("the test ends it")
+        await self.lives.pop(name)
+
+    async def kill(self, name: str) -> None:
+        """End it as SIGKILL does."""
+        del self.running[name]
+        life = self.lives.pop(name)
+        life.cancel()
+        await asyncio.wait({life})
+
+    async def outcome(self, name: str) -> BaseException | None:
+        """Return what ended it, when it has ended by itself; None for a good end."""
+        life = self.lives.pop(name)
+        del self.running[name]
+        await asyncio.wait({life})
+        return life.exception()
+
+    def is_alive(self, name: str) -> bool:
+        return not self.lives[name].done()
+
+    async def pose(self, body: str) -> tuple[float, float]:
+        found = await self.ear.ask(address(Subsystem.RESOURCE_POOL, "world"), AskPose(body), Pose, within_s=1)
+        return found.x_m, found.y_m
+
+    @property
+    def ear(self) -> Bus:
+        return self.running["world"].bus
+
+    @property
+    def audit(self) -> dict[str, float]:
+        return self.running["world"].statistics()
+
+    async def close(self) -> None:
+        for name in list(reversed(self.lives)):
+            if name in self.lives:
+                await self.end(name)
+
+
+@asynccontextmanager
+async def a_pool(mission: Any, rcs: list[str], *, manager: bool = True) -> AsyncIterator[Pool]:
+    """Give a pool with these RCs running."""
+    clock = VirtualClock()
+    WiretappedRadio.built.clear()
+    HandOperatedGrabber.built.clear()
+    async with mission(clock=clock) as network, AsyncExitStack() as stack:
+        pool = Pool(network, clock, HARDWARE)
+        stack.push_async_callback(pool.close)
+        resources = [msgspec.to_builtins(resource) for resource in HARDWARE if resource.name in rcs]
+        await pool.start(DependencyDatabase, "dependency_database", {"resources": resources}, Subsystem.BACKBONE)
+        await pool.start(SimulatedWorld, "world", {"world": msgspec.to_builtins(WORLD)})
+        for name in rcs:
+            await pool.rc(name)
+        if manager:
+            await pool.manager()
+        yield pool
