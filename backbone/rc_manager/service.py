@@ -90,6 +90,7 @@ log = logging.getLogger(__name__)
 
 SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; after this the question was lost
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
+MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: what keeps an RC from connecting is mostly an old hold
 SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
 RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
@@ -299,8 +300,8 @@ class RcManager(Component[RcManagerParameters]):
             return
         self._running_rcs.discard(failed)
         self.happened(OpenFailed(order.arc, failed))
-        if failed:  # down until it has said how it is
-            await self._meet_rc(failed)
+        if failed:
+            self.start_task(self._meet_later(failed), f"meet {failed}")
 
     async def _revoke(self, order: RevokeArc) -> None:
         await self._context_switch.revoke(order)
@@ -434,6 +435,15 @@ class RcManager(Component[RcManagerParameters]):
         if name in self._resources and at.startswith("resource_pool/"):
             self.start_task(self._meet_again(name), f"meet {name}")
 
+    async def _meet_later(self, rc: str) -> None:
+        """Ask a failed RC how it is; not at once, or it and the schedule would try each other without end."""
+        await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
+        while not await self._meet_rc(rc) and rc in await self._present():
+            await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
+
+    async def _present(self) -> set[str]:
+        return {component_of(component.address) for component in await self._listing()}
+
     async def _meet_again(self, rc: str) -> None:
         await self._meet_rc(rc)
 
@@ -452,7 +462,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
-        names = {component_of(component.address) for component in await self._listing()}
+        names = await self._present()
         for name in [*self._running_rcs, *self._uses]:
             if name not in names:
                 self._disappeared(name)

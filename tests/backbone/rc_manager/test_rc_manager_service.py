@@ -325,7 +325,7 @@ def test_an_rc_that_does_not_confirm_counts_as_held_until_its_lease_is_over(pool
             here.rcs["left"].holders.clear()
             await here.clock.sleep_s(2.0)
             assert two.is_open
-            assert two.granted_s >= asked_s + LEASE_S
+            assert two.granted_s >= asked_s + LEASE_S - 1e-6
 
     run_virtual(main())
 
@@ -341,7 +341,7 @@ def test_a_set_that_cannot_be_connected_whole_is_given_back_whole(pool: Any) -> 
             assert here.rcs["left"].log[:2] == [("connect", "one"), ("disconnect", "one")]
             assert here.rcs["left"].holders == {}
             here.rcs["video"].holders.clear()
-            await here.clock.sleep_s(3.0)
+            await here.clock.sleep_s(1.0)
             assert one.is_open
 
     run_virtual(main())
