@@ -280,6 +280,8 @@ class RcManager(Component[RcManagerParameters]):
                 before.cancel()
                 await asyncio.gather(before, return_exceptions=True)
             await work
+            if self._switches.get(arc) is asyncio.current_task():
+                del self._switches[arc]
 
         self._switches[arc] = self.start_task(in_turn(), f"switch {arc}")
 
@@ -511,8 +513,8 @@ class RcManager(Component[RcManagerParameters]):
         arc = envelope.body.arc
         if arc in self._uses:
             self._beats[arc] = self.clock.now_s()
-        elif arc not in self._switches or self._switches[arc].done():
-            self._switches[arc] = self.start_task(self._meet_arc(arc), f"meet {arc}")
+        elif arc not in self._switches:
+            self._switch(arc, self._meet_arc(arc))
 
     async def _meet_arc(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
