@@ -164,7 +164,7 @@ def status(
         from rich.live import Live
 
         from backbone.mission_picture import look
-        from backbone.mission_screen import screen
+        from backbone.mission_screen import live_screen, screen
 
         async with visiting(mission, connect) as (bus, clock):
             if as_json:
@@ -177,9 +177,9 @@ def status(
             if not watch:
                 console.print(screen(await look(bus, clock.now_s())))
                 return ExitCode.DONE
-            with Live(console=console, auto_refresh=False) as live:
+            with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
                 while True:
-                    live.update(screen(await look(bus, clock.now_s())), refresh=True)
+                    live.update(live_screen(await look(bus, clock.now_s()), None, console.height), refresh=True)
                     await clock.sleep_s(0.5 * clock.rate)
 
     run(work)

@@ -31,14 +31,14 @@ _EVENTS_MOST = 12  # chosen: more than a glance takes in would push components o
 _EVENTS_LEAST = 3
 
 
-def live_screen(picture: MissionPicture, events: Iterable[StoryEvent], height: int) -> RenderableType:
+def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, height: int) -> RenderableType:
     """Return the picture fitted to a terminal: one line a component left, holders and schedule right, events below.
 
     On a terminal of 120 × 40 a mission of 26 components fits; on a smaller one components are left out first.
 
     Args:
         picture: What there is.
-        events: Newest last; as many of the newest are shown as there is room for.
+        events: Newest last; as many of the newest are shown as there is room for. None: nobody listens to them.
         height: Lines of the terminal.
     """
     head = Text(f"mission {picture.mission}  {picture.at_s:8.1f} s", style="bold", no_wrap=True)
@@ -53,8 +53,10 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent], height: i
         right_lines = len(resources) + len(requests) + 2 * _FRAME_LINES
     left_lines = len(components) + _FRAME_LINES
     free = height - 1 - len(problems) - max(left_lines, right_lines) - _FRAME_LINES
-    newest = list(events)[-min(_EVENTS_MOST, max(_EVENTS_LEAST, free)) :]
-    room = height - 1 - len(problems) - len(newest) - 2 * _FRAME_LINES
+    newest = list(events or ())[-min(_EVENTS_MOST, max(_EVENTS_LEAST, free)) :]
+    shown = [_event_line(event) for event in newest] or [Text("nothing yet", style="dim")]
+    foot = [] if events is None else [_panel("events", shown)]
+    room = height - 1 - len(problems) - _FRAME_LINES - len(foot) * (len(shown) + _FRAME_LINES)
     if len(components) > room:
         hidden = len(components) - max(1, room - 1)
         components = [*components[: max(1, room - 1)], Text(f"… and {hidden} lines more: a taller terminal shows them")]
@@ -62,8 +64,7 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent], height: i
     body.add_column(ratio=1)
     body.add_column(ratio=1)
     body.add_row(_panel("components", components), Group(*right))
-    shown = [_event_line(event) for event in newest] or [Text("nothing yet", style="dim")]
-    return Group(head, *problems, body, _panel("events", shown))
+    return Group(head, *problems, body, *foot)
 
 
 def _how_many(picture: MissionPicture) -> str:

@@ -92,6 +92,11 @@ def test_a_mission_whose_rc_manager_is_away_is_shown_all_the_same() -> None:
     assert "backbone/rc_manager: no answer" in drawn(live_screen(alone, [], 24))
 
 
+def test_who_does_not_listen_to_events_sees_no_place_for_them() -> None:
+    assert "events" not in drawn(live_screen(picture(*FEW), None, 40))
+    assert len(drawn(live_screen(picture(*MANY), None, 30)).splitlines()) <= 30
+
+
 def test_the_whole_picture_names_what_the_fitted_one_leaves_out() -> None:
     shown = drawn(screen(picture(*MANY)), 160)
     assert all(f"part{number:02}" in shown for number in range(40))
