@@ -1,8 +1,9 @@
 """A context switch on real processes: from the revocation of one ARC to the grant of the next.
 
-Runs the mission of IROS 2001, figure 2, with short slices and no settling time, and reads what the RC
-manager measured: it revokes, four RCs disconnect, four connect, the ARC prepares and opens.
-Prints one JSON line; the floor is a bare zenoh question through the same kind of hub, asked in the same run.
+Runs the mission of IROS 2001, figure 2, with short slices, and reads what the RC manager measured: the
+behavior stops cleanly, the gate closes, four RCs disconnect, four connect, the ARC prepares and opens.
+The time the picture needs to settle is the mission's own and not counted; preparing is part of it.
+Prints one JSON line; the floor is one question through the same hub, asked in the same run.
 """
 
 from __future__ import annotations
@@ -30,10 +31,9 @@ SLICE_S = 0.3
 
 
 def fast_mission(folder: Path) -> Path:
-    """Write the mission with short slices and no settling time; return its path."""
+    """Write the mission with short slices; return its path."""
     text = MISSION.read_text()
     text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', text)
-    text = re.sub(r'\bconnect-s="[^"]*"', 'connect-s="0"', text)
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', r"\g<1>switching", text, count=1)
     file = folder / "mission.xml"
     file.write_text(text)

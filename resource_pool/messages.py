@@ -253,7 +253,7 @@ class Frame(Message, frozen=True):
 
 # ---------------------------------------------------------------------- the simulated world, played as hardware
 class RadioPacket(Message, frozen=True):
-    """A packet on the air.
+    """A packet on the air: published under the world's address as a command, acknowledged by nobody.
 
     Attributes:
         radio: Radio that sent it.
@@ -268,12 +268,6 @@ class RadioPacket(Message, frozen=True):
     payload: bytes
     arc: str = ""
     epoch: int = 0
-
-
-class PacketHeard(Message, frozen=True):
-    """Answer to ``RadioPacket``: it was on the air; the robot, if any has this id, obeyed."""
-
-    at_s: float
 
 
 class AskWorld(Message, frozen=True):

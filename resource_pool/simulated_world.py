@@ -20,7 +20,6 @@ from resource_pool.messages import (
     AskPose,
     AskWorld,
     ClockTick,
-    PacketHeard,
     Pose,
     RadioPacket,
     WorldModel,
@@ -49,7 +48,7 @@ class SimulatedWorld(Component[WorldParameters]):
     """Plays robots and room for the simulated drivers, and audits what it hears."""
 
     parameters_type = WorldParameters
-    accepts = RadioPacket | AskWorld | AskPose
+    accepts = AskWorld | AskPose
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -57,6 +56,10 @@ class SimulatedWorld(Component[WorldParameters]):
         self._epochs: dict[int, int] = {}
         self._packets = self._stale = self._late_frames = 0
         self._jammed_frames = 0
+
+    async def connect(self) -> None:
+        """Begin to hear the air."""
+        self.bus.subscribe(self.address, Conversation.COMMAND, RadioPacket, self._hear)
 
     async def serve(self) -> None:
         """Step one frame after the other, each at its time, and publish what came of it."""
@@ -71,10 +74,8 @@ class SimulatedWorld(Component[WorldParameters]):
             self._publish(frame, due_s)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Hear a packet, or tell what the world is and where a body stands."""
+        """Tell what the world is and where a body stands."""
         match asked.body:
-            case RadioPacket() as packet:
-                return self._hear(packet)
             case AskWorld():
                 robots = {scout.name: scout.network_id for scout in self.parameters.world.scouts}
                 return WorldModel(self._world.mjcf, robots)
@@ -96,14 +97,14 @@ class SimulatedWorld(Component[WorldParameters]):
             "frames": self._world.frame,
         }
 
-    def _hear(self, packet: RadioPacket) -> PacketHeard:
+    def _hear(self, envelope: Envelope[Any]) -> None:
+        packet: RadioPacket = envelope.body
         self._packets += 1
         if packet.epoch < self._epochs.get(packet.network_id, 0):
             self._stale += 1
             self.story.note(packet.arc, f"sent robot {packet.network_id} a packet of the past epoch {packet.epoch}")
         self._epochs[packet.network_id] = max(packet.epoch, self._epochs.get(packet.network_id, 0))
         self._world.hear(packet.network_id, packet.payload)
-        return PacketHeard(self.clock.now_s())
 
     def _publish(self, frame: int, at_s: float) -> None:
         transmitting = self._world.transmitting()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from resource_pool.drivers.interface import DriverSite
-from resource_pool.messages import AskWorld, HardwareFault, PacketHeard, RadioPacket, WorldModel
+from resource_pool.messages import AskWorld, HardwareFault, RadioPacket, WorldModel
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed
 
-WORLD_REPLY_S = 0.4  # chosen: less than the RCs give the radio
 WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
 
 
@@ -35,7 +35,7 @@ def world_of(site: DriverSite) -> str:
 
 
 class SimulatedRadio:
-    """A radio whose packets the simulated world hears."""
+    """A radio whose packets the simulated world hears, in the order in which they were sent."""
 
     def __init__(self, site: DriverSite) -> None:
         self._site, self._world = site, world_of(site)
@@ -44,12 +44,9 @@ class SimulatedRadio:
         """Wait for nothing: packets into a world that is not there are lost, as on the air."""
 
     async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
-        """Return when the world has heard the packet, or lose it if there is no world."""
+        """Put the packet on the air; nobody acknowledges it, as on the air."""
         packet = RadioPacket(self._site.resource, network_id, payload, arc, robot_epoch)
-        try:
-            await self._site.bus.ask(self._world, packet, PacketHeard, within_s=WORLD_REPLY_S)
-        except LinkError:
-            return
+        self._site.bus.publish(self._world, Conversation.COMMAND, packet)
 
     async def close(self) -> None:
         """Nothing is held."""
