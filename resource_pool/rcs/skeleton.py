@@ -1,0 +1,60 @@
+"""A complete RC on a complete driver, to be copied: a lamp that is dark whenever nobody holds it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.wire import Envelope, Message
+from resource_pool.drivers.interface import DriverSite
+from resource_pool.holds import Hold
+from resource_pool.messages import Applied
+from resource_pool.resource_controller import RcParameters, ResourceController
+
+
+class Shine(Message, frozen=True):
+    """Shine this brightly, 0 (dark) to 1, under the grant of this epoch."""
+
+    arc: str
+    epoch: int
+    brightness: float
+
+
+class PaintedLamp:
+    """A driver: of a lamp that exists only as a line people see."""
+
+    class options_type(msgspec.Struct, frozen=True, forbid_unknown_fields=True):  # noqa: N801
+        """What the mission file says to this driver."""
+
+        color: str = "white"
+
+    def __init__(self, site: DriverSite) -> None:
+        self._site, self._color = site, site.options(self.options_type).color
+
+    async def set_brightness(self, share: float) -> None:
+        """Return when the lamp shines like that, 0 to 1; a real one raises ``HardwareFault`` if it does not."""
+        self._site.tell(f"shines {self._color} at {share:.0%}" if share else "is dark")
+
+
+class Lamp(ResourceController[RcParameters]):
+    """The RC: admit, act, say what was applied; and know the safe state."""
+
+    commands, driver_kind = Shine, "lamp"
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._driver: PaintedLamp = self.make_driver()
+
+    async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
+        """Go dark."""
+        await self._driver.set_brightness(0.0)
+
+    async def command(self, asked: Envelope[Any]) -> Message:
+        """Shine."""
+        order: Shine = asked.body
+        self.admit(order.arc, order.epoch)
+        await self._driver.set_brightness(share := min(1.0, max(0.0, order.brightness)))
+        return Applied(self.name, order.epoch, self.clock.now_s(), "shine", {"brightness": share})

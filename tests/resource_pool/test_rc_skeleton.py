@@ -1,0 +1,61 @@
+"""The RC to be copied lives, obeys one holder, goes dark, and its driver is told what the mission file says."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from pool_on_local_network import Pool, a_pool
+
+from backbone.bus.clock import run_virtual
+from backbone.component.component import WrongParameter
+from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, RcUse, StaleEpoch
+from resource_pool.drivers.interface import UnknownDriver
+from resource_pool.messages import Applied
+from resource_pool.rcs.scout import Scout
+from resource_pool.rcs.skeleton import Lamp, Shine
+
+DRIVER = "resource_pool.rcs.skeleton:PaintedLamp"
+
+
+def said(pool: Pool) -> list[str]:
+    """Return what the lamp told, oldest first."""
+    events = [event.what for event in pool.running["lamp1"].story.of("lamp1")]
+    return [what for what in events if what.startswith(("shines", "is dark"))]
+
+
+def test_the_lamp_shines_for_its_holder_only_and_is_dark_afterwards(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            await pool.start(Lamp, "lamp1", {"driver": DRIVER, "color": "green"})
+            ask = pool.ear.ask
+            await ask("resource_pool/lamp1", Connect("one", 1, 2.0, RcUse(), {}), Connected, within_s=1)
+            applied = await ask("resource_pool/lamp1", Shine("one", 1, 7.0), Applied, within_s=1)
+            assert applied.values == {"brightness": 1.0}
+            with pytest.raises(StaleEpoch):
+                await ask("resource_pool/lamp1", Shine("two", 1, 0.5), Applied, within_s=1)
+            await ask("resource_pool/lamp1", Disconnect("one", 1), Disconnected, within_s=1)
+            assert said(pool) == ["shines green at 100%", "is dark"]
+
+    run_virtual(main())
+
+
+@pytest.mark.parametrize(
+    ("component", "parameters", "fault"),
+    [
+        (Lamp, {"driver": DRIVER, "colour": "green"}, WrongParameter),
+        (Lamp, {"driver": DRIVER, "color": 3}, WrongParameter),
+        (Lamp, {"driver": "simulated"}, UnknownDriver),
+        (Lamp, {"driver": "resource_pool.rcs.skeleton:NoLamp"}, UnknownDriver),
+        (Scout, {"network_id": 1, "port": "/dev/null"}, WrongParameter),
+    ],
+)
+def test_what_neither_rc_nor_driver_understands_keeps_it_from_starting(
+    local_mission: Any, component: Any, parameters: dict[str, Any], fault: type[Exception]
+) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, [], manager=False) as pool:
+            with pytest.raises(fault):
+                await pool.start(component, "lamp1", parameters)
+
+    run_virtual(main())

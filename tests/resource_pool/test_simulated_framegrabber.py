@@ -1,0 +1,110 @@
+"""The simulated receiver and camera: what is heard is drawn, a failed drawing is not silent, an end is prompt."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from backbone.bus.clock import VirtualClock
+from backbone.bus.local_bus import LocalBus, LocalNetwork
+from backbone.keys import Conversation
+from backbone.wire import Envelope
+from resource_pool.drivers.interface import DriverSite, Picture
+from resource_pool.drivers.simulated_video import SimulatedFramegrabber
+from resource_pool.messages import AskWorld, WorldModel, WorldState
+from scout_model.description import ScoutPlace, WorldDescription
+from scout_model.world import World
+
+WORLD = WorldDescription(
+    6.0, 6.0, scouts=[ScoutPlace("scout1", 1, 2.0, 2.0, 0.0), ScoutPlace("scout2", 2, 4.0, 4.0, 0.0)]
+)
+
+
+class Studio:
+    """A world that is played by hand, and a driver that looks at it."""
+
+    def __init__(self) -> None:
+        self.network, self.clock = LocalNetwork(), VirtualClock()
+        self.world = World(WORLD)
+        self.bus: LocalBus = self.network.join("resource_pool/world", self.clock)
+        self.bus.serve("resource_pool/world", AskWorld, self._answer)
+        self.bugs: list[BaseException] = []
+        self.failed = asyncio.Event()
+        parameters = SimpleNamespace(world="world", camera="paint", frame_rate_hz=30.0)
+        self.ear = self.network.join("resource_pool/grabber", self.clock)
+        site = DriverSite("grabber", self.ear, self.clock, parameters, lambda what: None, self._fail)
+        self.driver = SimulatedFramegrabber(site)
+
+    def _fail(self, bug: BaseException) -> None:
+        self.bugs.append(bug)
+        self.failed.set()
+
+    async def _answer(self, asked: Envelope[Any]) -> WorldModel:
+        return WorldModel(self.world.mjcf, {"scout1": 1, "scout2": 2})
+
+    def show(self, frame: int, transmitting: dict[str, str], state: bytes | None = None) -> None:
+        drawn = self.world.state().tobytes() if state is None else state
+        self.bus.publish(
+            "resource_pool/world", Conversation.TELEMETRY, WorldState(frame, frame / 30, drawn, transmitting)
+        )
+
+    async def close(self) -> None:
+        await self.driver.close()
+        await self.ear.close()
+        await self.bus.close()
+
+
+def collector() -> tuple[asyncio.Queue[Picture], Callable[[Picture], None]]:
+    pictures: asyncio.Queue[Picture] = asyncio.Queue()
+    return pictures, pictures.put_nowait
+
+
+async def test_a_picture_tells_who_was_heard_on_the_tuned_frequency() -> None:
+    studio = Studio()
+    await studio.driver.open()
+    pictures, deliver = collector()
+    studio.driver.tune("video", deliver)
+    for frame, transmitting in enumerate(
+        [{"scout1": "video"}, {}, {"scout1": "video", "scout2": "video"}, {"scout1": "other", "scout2": "video"}], 1
+    ):
+        studio.show(frame, transmitting)
+        picture = await asyncio.wait_for(pictures.get(), 5)
+        heard = sorted(robot for robot, frequency in transmitting.items() if frequency == "video")
+        assert (picture.transmitters, picture.robot) == (len(heard), heard[0] if len(heard) == 1 else "")
+        assert (picture.width_px, picture.height_px, len(picture.pixels)) == (320, 240, 320 * 240)
+        assert picture.captured_s == frame / 30
+    assert not studio.bugs
+    await studio.close()
+
+
+async def test_a_drawing_that_fails_fails_the_rc() -> None:
+    studio = Studio()
+    await studio.driver.open()
+    pictures, deliver = collector()
+    studio.driver.tune("video", deliver)
+    studio.show(1, {"scout1": "video"}, state=b"\0" * 8)
+    await asyncio.wait_for(studio.failed.wait(), 5)
+    assert type(studio.bugs[0]).__name__ == "StateMismatch"
+    assert pictures.empty()
+    await studio.close()
+
+
+async def test_what_is_being_drawn_at_the_end_of_a_hold_is_not_delivered() -> None:
+    studio = Studio()
+    await studio.driver.open()
+    pictures, deliver = collector()
+    studio.driver.tune("video", deliver)
+    studio.show(1, {"scout1": "video"})
+    await asyncio.sleep(0)
+    studio.driver.stop()
+    await asyncio.wait_for(studio.close(), 2)
+    assert pictures.empty()
+    assert not studio.bugs
+
+
+async def test_it_can_be_closed_before_it_was_opened_and_twice() -> None:
+    studio = Studio()
+    await studio.driver.close()
+    await studio.close()
