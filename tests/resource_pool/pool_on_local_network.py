@@ -167,8 +167,8 @@ class Owner(Component[Any]):
         notice = asked.body
         if not isinstance(notice, AskBeat):
             if self.slow_s:
-                await self.clock.sleep_s(self.slow_s)
-                self.slow_s /= 2
+                slow_s, self.slow_s = self.slow_s, self.slow_s / 4
+                await self.clock.sleep_s(slow_s)
             self.notices.append(notice)
             return await self.arcs[notice.arc].handle(notice)
         return await next(iter(self.arcs.values())).handle(notice)
