@@ -2,7 +2,8 @@
 
 An ARC asks the RC manager for its set, lets commands of its one owner through while it holds the set,
 and tells the owner when that begins and ends. It watches its owner: when that is gone or hangs, it
-gives everything back. Nobody has to say goodbye.
+gives everything back. Nobody has to say goodbye. It hears the same renewals as its RCs, so when their
+leases run out its gate is shut too and the owner knows.
 
 Source: RAM 2002, "Resource Pool" and "The RC Scheduler".
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -30,6 +32,7 @@ from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     BEAT_EVERY_S,
+    LEASE_S,
     AskRequest,
     Beat,
     ChangeRuntime,
@@ -39,6 +42,8 @@ from backbone.rc_manager.messages import (
     Extend,
     GateClosed,
     GateOpen,
+    Leases,
+    MissingRuntime,
     OpenGate,
     PathNode,
     RcUse,
@@ -141,6 +146,9 @@ class AggregateResourceController(Component[ArcParameters]):
         self._rcs: dict[str, str] = {}
         self._asked = asyncio.Event()
         self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
+        self._lease_until_s = 0.0
+        self._leased = asyncio.Event()
+        self._manager: Companion | None = None
         self._commands = self._refused = 0
 
     # ------------------------------------------------------------------ hooks
@@ -184,12 +192,14 @@ class AggregateResourceController(Component[ArcParameters]):
         )
         self._sets = found.sets
         self._request = self._make_request()
+        self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 
     async def serve(self) -> None:
         """Ask for run time, then watch owner and RC manager until told to stop."""
         self.start_task(self._tell_owner(), "tell owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
+        self.start_task(self._watch_lease(), "watch lease")
         await self._send_request()
         self.start_task(self._watch_rc_manager(), "watch RC manager")
 
@@ -218,9 +228,11 @@ class AggregateResourceController(Component[ArcParameters]):
             case Drive() | Halt() | Jump() as command:
                 return await self._command(command)
             case WantIdle(idle=idle):
-                await self._tell_rc_manager(SetIdle(self.name, idle))
+                await self._change_request(SetIdle(self.name, idle), idle=idle)
             case WantRuntime(minimum_runtime_s=least, maximum_runtime_s=most):
-                await self._tell_rc_manager(ChangeRuntime(self.name, least, most))
+                self._require_runtime(least, most)
+                change = ChangeRuntime(self.name, least, most)
+                await self._change_request(change, minimum_runtime_s=least, maximum_runtime_s=most)
             case WantLonger(until_s=until_s):
                 await self._tell_rc_manager(Extend(self.name, until_s))
             case Release(reason=reason):
@@ -285,6 +297,32 @@ class AggregateResourceController(Component[ArcParameters]):
             raise NotMySet(f"{self.name} asked for no such set: {', '.join(sorted(wanted)) or 'nothing'}")
         self._rcs = found[0]
 
+    def _require_runtime(self, least_s: float, most_s: float) -> None:
+        """Refuse run times no slice can be planned for: a later RC manager would refuse the whole request for them.
+
+        Raises:
+            MissingRuntime: They are such.
+        """
+        if not (0 < least_s < math.inf and (most_s == 0 or least_s <= most_s < math.inf)):
+            raise MissingRuntime(f"{self.name} asks for at least {least_s:g} s and at most {most_s:g} s", arc=self.name)
+
+    async def _change_request(self, wish: Message, **changed: bool | float) -> None:
+        """Tell the RC manager; a later one that asks for the request is told the same.
+
+        Raises:
+            Refusal: The RC manager refused; the request is as it was.
+            LinkError: It did not answer. The change stands here, and the next RC manager hears of it.
+        """
+        request = self._request
+        assert request is not None  # noqa: S101  made in connect
+        before = {name: getattr(request, name) for name in changed}
+        self._request = msgspec.structs.replace(request, **changed)
+        try:
+            await self._tell_rc_manager(wish)
+        except Refusal:
+            self._request = msgspec.structs.replace(self._request, **before)
+            raise
+
     async def _tell_rc_manager(self, wish: Message) -> None:
         await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
 
@@ -304,6 +342,8 @@ class AggregateResourceController(Component[ArcParameters]):
         self._choose(order.epochs)
         self._gate.prepare(order.epochs)
         prepared_s = self.clock.now_s()
+        self._lease_until_s = prepared_s + LEASE_S * self.clock.rate
+        self._leased.set()
         try:
             async with asyncio.timeout(PREPARE_S):
                 await self.prepare(order.epochs)
@@ -330,12 +370,16 @@ class AggregateResourceController(Component[ArcParameters]):
                     await self._notify(notice, within_s).wait()
             except TimeoutError:
                 self.story.note(self._owner, "was not ready when its time to stop cleanly was over")
-        was_open = self._gate.is_open
-        self._gate.close(order.reason, order.by, order.expected_s)
-        self.report(f"swapped out: {order.reason}{f' by {order.by}' if order.by else ''}")
-        if was_open:
-            self._notify(Suspended(self.name, order.reason, order.by, order.expected_s))
+        self._shut(order.reason, order.by, order.expected_s)
         return GateClosed()
+
+    def _shut(self, reason: str, by: str, expected_s: float) -> None:
+        """Let nothing pass any more, and tell the owner if something did."""
+        was_open = self._gate.is_open
+        self._gate.close(reason, by, expected_s)
+        self.report(f"swapped out: {reason}{f' by {by}' if by else ''}")
+        if was_open:
+            self._notify(Suspended(self.name, reason, by, expected_s))
 
     async def _command(self, command: Drive | Halt | Jump) -> Applied:
         try:
@@ -381,6 +425,40 @@ class AggregateResourceController(Component[ArcParameters]):
             waiting.told.set()
 
     # ------------------------------------------------------------------ watching
+    def _heard_leases(self, envelope: Envelope[Any]) -> None:
+        """Count the set as held for longer if every one of its RCs was renewed."""
+        leases: Leases = envelope.body
+        renewed = {lease.rc: lease.epoch for lease in leases.leases if lease.arc == self.name}
+        if self._gate.epochs and self._gate.epochs.items() <= renewed.items():
+            self._lease_until_s = max(self._lease_until_s, envelope.stamp_s + leases.lease_s)
+
+    async def _watch_lease(self) -> None:
+        """Shut the gate when the RCs' leases are over: they are in their safe states then, and the owner must know."""
+        while True:
+            self._leased.clear()
+            if not self._gate.epochs:
+                await self._leased.wait()
+                continue
+            await self.clock.sleep_until_s(self._lease_until_s)
+            if self._gate.epochs and self.clock.now_s() >= self._lease_until_s:
+                self.tell(self.name, "its lease is over: nothing was renewed in time")
+                self._shut("lease", "rc_manager", -1.0)
+                if self._manager is not None and self._manager.is_there:
+                    await self._ask_anew()
+
+    async def _ask_anew(self) -> None:
+        """Give back what an RC manager that lives still counts as held, and ask again."""
+        gone = Withdraw(self.name, "lease")
+        try:
+            await ask_until_answered(
+                self.bus, self.clock, RC_MANAGER, gone, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
+            )
+        except Refusal as unknown:  # it has restarted meanwhile
+            log.info("not withdrawn: %s", unknown)
+        except LinkError:  # it is gone after all: the next one asks
+            return
+        await self._send_request()
+
     async def _watch_owner(self) -> None:
         owner = Companion(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
         try:
@@ -404,7 +482,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def _watch_rc_manager(self) -> None:
         """Ask anew if a restarted RC manager has not asked for the request by itself."""
-        manager = Companion(self.bus, RC_MANAGER)
+        manager = self._manager = Companion(self.bus, RC_MANAGER)
         try:
             await manager.wait_there()
             while True:
@@ -416,4 +494,5 @@ class AggregateResourceController(Component[ArcParameters]):
                 except TimeoutError:
                     await self._send_request()
         finally:
+            self._manager = None
             manager.close()

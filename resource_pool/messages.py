@@ -218,11 +218,19 @@ class PacketLoaded(Message, frozen=True):
 
 
 class Tune(Message, frozen=True):
-    """Receive this video frequency and hand its pictures to the ARC that holds the framegrabber."""
+    """Receive this video frequency and hand its pictures to the ARC that holds the framegrabber.
+
+    Attributes:
+        arc: The ARC.
+        epoch: Of the framegrabber's connection.
+        frequency: Name of the video frequency's RC.
+        robot: The one whose transmitter the ARC holds; pictures of another are not delivered. Empty: any.
+    """
 
     arc: str
     epoch: int
     frequency: str
+    robot: str = ""
 
 
 class Frame(Message, frozen=True):

@@ -20,5 +20,5 @@ class CaptureArc(VideoDriveArc):
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the transmitter on and tune, at the same time."""
-        tune = Tune(self.name, epochs[self.rc("framegrabber")], self.rc("video_frequency"))
+        tune = Tune(self.name, epochs[self.rc("framegrabber")], self.rc("video_frequency"), self.rc("scout"))
         await asyncio.gather(super().prepare(epochs), self.tell_rc("framegrabber", tune))

@@ -1,7 +1,7 @@
 """RC of a framegrabber behind a tuned receiver: pictures of one frequency, for the ARC that holds it.
 
 Pictures go out under the ARC's address and carry the connection's epoch; whoever listens drops those
-of another epoch. A picture is delivered only if exactly one robot was heard, where the hardware can tell.
+of another epoch. A picture is delivered only if exactly the expected robot was heard, where the hardware can tell.
 
 Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 """
@@ -55,7 +55,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._driver: FramegrabberDriver = self.make_driver()
-        self._delivered = self._garbled = self._silent = 0
+        self._delivered = self._garbled = self._silent = self._foreign = 0
 
     async def connect(self) -> None:
         """Open the device, so that the first grant is as quick as the others."""
@@ -81,21 +81,22 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         numbers = itertools.count(1)
 
         def deliver(picture: Picture) -> None:
-            self._deliver(hold, picture, numbers)
+            self._deliver(hold, order.robot, picture, numbers)
 
         self._driver.tune(order.frequency, deliver)
         return Applied(self.name, hold.epoch, self.clock.now_s(), "tune")
 
     def statistics(self) -> dict[str, float]:
-        """Count pictures delivered, and those dropped because nobody or several were heard."""
+        """Count pictures delivered, and those dropped because nobody, several or another robot was heard."""
         return {
             **super().statistics(),
             "frames_delivered": self._delivered,
             "frames_garbled": self._garbled,
             "frames_silent": self._silent,
+            "frames_foreign": self._foreign,
         }
 
-    def _deliver(self, hold: Hold, picture: Picture, numbers: Iterator[int]) -> None:
+    def _deliver(self, hold: Hold, expected: str, picture: Picture, numbers: Iterator[int]) -> None:
         if not self.holds.has(hold.arc, hold.epoch):
             return  # a driver may still be busy with it when it is told to stop
         if picture.transmitters == 0:
@@ -104,12 +105,15 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         if picture.transmitters > 1:
             self._garbled += 1
             return
+        if expected and picture.robot and picture.robot != expected:  # a transmitter that should be off
+            self._foreign += 1
+            return
         self._delivered += 1
         frame = Frame(
             rc=self.name,
             arc=hold.arc,
             epoch=hold.epoch,
-            robot=picture.robot,
+            robot=picture.robot or expected,
             number=next(numbers),
             captured_s=picture.captured_s,
             width_px=picture.width_px,

@@ -317,7 +317,7 @@ def test_when_the_rc_manager_dies_for_good_every_rc_makes_itself_safe(local_miss
             for rc in ROBOTS:
                 assert not (await state_of(pool, rc)).holders, rc
             assert pool.radio_driver.heard_by(1)[-1].payload == encode_safe()
-            with pytest.raises(StaleEpoch):
+            with pytest.raises(SwappedOut):
                 await arc.drive(5.0, 5.0)
             assert pool.running["scout1"].statistics()["lease_ends"] == 1
             busy.cancel()
