@@ -173,8 +173,12 @@ async def test_on_a_terminal_keys_drive_pictures_are_drawn_and_q_gives_the_robot
             await placer.wait(lambda: placer.arcs)
             [arc] = placer.arcs.values()
             await placer.wait(lambda: b"scout1" in drawn)
-            arc.publish(bytes(range(240)) * 320, 320, 240)
-            await placer.wait(lambda: "▀".encode() in drawn)
+
+            def a_picture_is_drawn() -> bool:
+                arc.publish(bytes(range(240)) * 320, 320, 240)  # again: the first may come before the console listens
+                return "▀".encode() in drawn
+
+            await placer.wait(a_picture_is_drawn)
             os.write(ours, b"w")
             await placer.wait(lambda: arc.commands and isinstance(arc.commands[-1][2], Halt))
             os.write(ours, b"q")
