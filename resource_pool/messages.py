@@ -200,7 +200,10 @@ class LoadPacket(Message, frozen=True):
         robot_epoch: Of the robot RC's connection, for the audit.
         at_once: True: once, ahead of its turn, answered when it is on the air.
             False: at the ARC's rate from now on, until replaced.
-        afterwards: With ``at_once``: what is sent at the ARC's rate from then on; empty: what was before.
+        lasts_s: With ``at_once`` False: mission seconds after which ``afterwards`` replaces it; 0: none do.
+            A robot RC that hangs must not keep its robot moving through the radio.
+        afterwards: What is sent at the ARC's rate after the packet was sent at once, or has lasted its time;
+            empty: what was before.
     """
 
     arc: str
@@ -211,6 +214,7 @@ class LoadPacket(Message, frozen=True):
     robot_epoch: int
     at_once: bool = False
     afterwards: bytes = b""
+    lasts_s: float = 0.0
 
 
 class PacketLoaded(Message, frozen=True):

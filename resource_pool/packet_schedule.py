@@ -4,6 +4,7 @@ Rules of this file:
 
 * A packet once begun is sent (non-preemptive).
 * First the ARC of higher user priority, then the shorter period, then the name.
+* What is repeated has an age: a packet that is not loaded anew in time gives way to what comes after it.
 * Each stream has a constant interval from the first packet on; a release not served before the next one is
   an overrun and lost.
 * An ARC's packets reach only the robots it loaded packets for; several of its robots take turns.
@@ -16,7 +17,7 @@ Source: RAM 2002, "Sharable Resources"; IROS 2001, section 4.3 (rate monotonic b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from backbone.rc_manager.messages import Usage
 
@@ -31,6 +32,8 @@ class Packet:
         payload: Bytes of the robot's protocol.
         safe_payload: What is to be sent to it last of all.
         robot_epoch: Of the robot RC's connection.
+        until_s: Mission time from which ``afterwards`` is sent in its place.
+        afterwards: See ``until_s``; empty: ``safe_payload``.
     """
 
     arc: str
@@ -38,6 +41,14 @@ class Packet:
     payload: bytes
     safe_payload: bytes
     robot_epoch: int
+    until_s: float = math.inf
+    afterwards: bytes = b""
+
+    def at(self, now_s: float) -> Packet:
+        """Return what is to be sent at this time: itself, or what comes after it."""
+        if now_s < self.until_s:
+            return self
+        return replace(self, payload=self.afterwards or self.safe_payload, until_s=math.inf)
 
 
 @dataclass(slots=True)
@@ -141,7 +152,8 @@ class PacketSchedule:
         stream.releases += missed + 1
         stream.sent += 1
         robots = sorted(sender.packets)
-        packet = sender.packets[robots[sender.turn % len(robots)]]
+        robot = robots[sender.turn % len(robots)]
+        packet = sender.packets[robot] = sender.packets[robot].at(now_s)
         sender.turn += 1
         return Sending(packet, stream.usage.packet_time_s)
 

@@ -91,6 +91,8 @@ class CommandRadio(ResourceController[RcParameters]):
                     self._load(replace(packet, payload=order.afterwards))
         else:
             self.admit(order.arc, order.epoch)
+            if order.lasts_s > 0:
+                packet = replace(packet, until_s=self.clock.now_s() + order.lasts_s, afterwards=order.afterwards)
             self._load(packet)
         return PacketLoaded()
 

@@ -102,7 +102,9 @@ class Scout(ResourceController[ScoutParameters]):
                 # Before the packet goes: while it does, the hold may end, or the answer of the radio be lost.
                 self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
                 self._driven.set()
-                await self._load(hold, self._protocol.drive(left, right))
+                await self._load(
+                    hold, self._protocol.drive(left, right), lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt()
+                )
                 return self._applied(hold, "drive", {"left_rad_s": left, "right_rad_s": right})
             case Halt():
                 await self._load(hold, self._protocol.halt())
@@ -130,7 +132,9 @@ class Scout(ResourceController[ScoutParameters]):
         if self._holder is not None and self._holder.epoch == hold.epoch:
             self._halt_at_s = None
 
-    async def _load(self, hold: Hold, payload: bytes, *, at_once: bool = False, afterwards: bytes = b"") -> None:
+    async def _load(
+        self, hold: Hold, payload: bytes, *, at_once: bool = False, afterwards: bytes = b"", lasts_s: float = 0.0
+    ) -> None:
         epoch = hold.companions.get(self._radio)
         if epoch is None:
             raise NoRadio(f"{hold.arc} holds {self.name} without {self._radio or 'a radio'}")
@@ -143,6 +147,7 @@ class Scout(ResourceController[ScoutParameters]):
             hold.epoch,
             at_once,
             afterwards,
+            lasts_s,
         )
         radio = address(Subsystem.RESOURCE_POOL, self._radio)
         await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)

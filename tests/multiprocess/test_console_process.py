@@ -11,7 +11,7 @@ import socket
 import sys
 import termios
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -155,7 +155,7 @@ async def test_on_a_terminal_keys_drive_pictures_are_drawn_and_q_gives_the_robot
     drawn = bytearray()
     loop = asyncio.get_running_loop()
     loop.add_reader(ours, lambda: drawn.extend(os.read(ours, 65536)))
-    async with placer_behind_a_hub(tmp_path, monkeypatch, beside) as placer:
+    async with placer_behind_a_hub(tmp_path, monkeypatch, beside) as placer, AsyncExitStack() as leftovers:
         placer.on_arc = grant_at_once(placer)
         async with asyncio.timeout(WITHIN_S):
             process = await asyncio.create_subprocess_exec(
@@ -170,6 +170,7 @@ async def test_on_a_terminal_keys_drive_pictures_are_drawn_and_q_gives_the_robot
                 start_new_session=True,
             )
             os.close(theirs)
+            leftovers.callback(lambda: process.returncode is None and process.kill())
             await placer.wait(lambda: placer.arcs)
             [arc] = placer.arcs.values()
             await placer.wait(lambda: b"scout1" in drawn)
@@ -187,3 +188,31 @@ async def test_on_a_terminal_keys_drive_pictures_are_drawn_and_q_gives_the_robot
     loop.remove_reader(ours)
     os.close(ours)
     assert any(isinstance(command, Drive) for _at_s, _epoch, command in arc.commands)
+
+
+async def test_a_terminal_that_goes_away_ends_the_console_and_gives_the_robot_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, beside: Callable[..., Any]
+) -> None:
+    monkeypatch.setenv("TERM", "xterm-256color")
+    ours, theirs = pty.openpty()
+    drawn = bytearray()
+    loop = asyncio.get_running_loop()
+    loop.add_reader(ours, lambda: drawn.extend(os.read(ours, 65536)))
+    async with placer_behind_a_hub(tmp_path, monkeypatch, beside) as placer:
+        placer.on_arc = grant_at_once(placer)
+        async with asyncio.timeout(WITHIN_S):
+            command = (sys.executable, "-m", "ui_console.cli", "attach", "scout1")
+            process = await asyncio.create_subprocess_exec(
+                *command, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True
+            )
+            os.close(theirs)
+            try:
+                await placer.wait(lambda: b"scout1" in drawn)
+                loop.remove_reader(ours)
+                os.close(ours)
+                await process.wait()
+            finally:
+                if process.returncode is None:
+                    process.kill()
+                    await process.wait()
+            assert not placer.arcs

@@ -149,3 +149,20 @@ def test_a_stream_that_is_no_stream_is_refused_and_changes_nothing(wrong: float)
         with pytest.raises(ValueError, match="packets of"):
             schedule.connect("one", [Usage(0.1, 0.001), usage], 0, 0.0)
     assert schedule.counts() == {}
+
+
+def test_what_is_not_loaded_anew_in_time_gives_way_to_what_comes_after_it() -> None:
+    """A robot RC that hangs must not keep its robot moving through the radio."""
+    schedule = PacketSchedule()
+    schedule.connect("arc", [Usage(0.25, 0.002)], 0, 0.0)
+    schedule.load(Packet("arc", 1, b"drive", b"safe", 7, until_s=0.6, afterwards=b"halt"), 0.0)
+    sent = [schedule.take(at_s) for at_s in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    assert [sending.packet.payload for sending in sent if sending] == [b"drive", b"drive", b"drive", b"halt", b"halt"]
+
+
+def test_what_has_no_successor_gives_way_to_the_safe_packet() -> None:
+    schedule = PacketSchedule()
+    schedule.connect("arc", [Usage(0.1, 0.002)], 0, 0.0)
+    schedule.load(Packet("arc", 1, b"drive", b"safe", 7, until_s=0.05), 0.0)
+    sent = [schedule.take(at_s / 10) for at_s in range(2)]
+    assert [sending.packet.payload for sending in sent if sending] == [b"drive", b"safe"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -16,6 +17,7 @@ from ui_console.driving import Drive
 from ui_console.observer import Observer
 from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.hangup import HangupWatch
 
 Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
 
@@ -60,12 +62,30 @@ class TerminalSession:
         living.add_done_callback(lambda _living: screen.exit())
         try:
             if pilot is None:
-                await screen.run_async()
+                await self._on_terminal(screen, console)
             else:
                 await screen.run_async(headless=True, size=size, auto_pilot=pilot)
         finally:
             console.end("the screen was closed")
             await living
+
+    @staticmethod
+    async def _on_terminal(screen: ConsoleApp, console: Observer[Any]) -> None:
+        """Run the screen; a terminal that goes away ends the console and with it the hold on the robot."""
+
+        def gone() -> None:
+            console.end("the terminal has gone away")
+            screening.cancel()
+
+        screening = asyncio.create_task(screen.run_async(), name="screen")
+        watch = HangupWatch(sys.stdin.fileno(), gone)
+        try:
+            await asyncio.wait({screening})
+            if not screening.cancelled():
+                screening.result()
+        finally:
+            watch.close()
+            screening.cancel()
 
     # ------------------------------------------------------------------ what the screen asks for
     def picture(self) -> NDArray[np.uint8] | None:
