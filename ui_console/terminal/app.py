@@ -134,6 +134,8 @@ class ConsoleApp(App[None]):
 
     def redraw(self) -> None:
         """Show what the model says now."""
+        if not self.query("#status"):  # the screen is just being taken down
+            return
         model, now_s = self._session.model, self._session.now_s()
         status = [model.status_line(now_s)]
         if self._drives:
