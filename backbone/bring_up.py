@@ -95,9 +95,15 @@ class Outcome:
     ended: list[ProcessEnded] = field(default_factory=list)
 
     @property
-    def forced(self) -> list[ProcessEnded]:
-        """Those that did not end by being asked."""
+    def pushed(self) -> list[ProcessEnded]:
+        """Those that could not be asked, as they were only starting or did not answer, and were not merely asked."""
         return [end for end in self.ended if end.by in (EndedBy.SIGTERM, EndedBy.SIGKILL)]
+
+    @property
+    def went_well(self) -> bool:
+        """True if it came up, nothing failed, and every process ended in good order, be it after SIGTERM."""
+        killed = any(end.by is EndedBy.SIGKILL for end in self.ended)
+        return self.ready_after_s is not None and self.failure is None and not killed
 
 
 class MissionAlreadyUp(Refusal):

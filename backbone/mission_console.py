@@ -116,7 +116,7 @@ async def bring_up_on_console(
         outcome = Outcome(failure=error)
     for line in last_lines(outcome):
         observer.tell(line)
-    return ExitCode.DONE if outcome.failure is None and not outcome.forced else ExitCode.MISSION_FAILED
+    return ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
 
 
 def last_lines(outcome: Outcome) -> list[str]:
@@ -124,8 +124,8 @@ def last_lines(outcome: Outcome) -> list[str]:
     lines = []
     if outcome.ready_after_s is not None:
         lines.append(f"was ready after {outcome.ready_after_s:.2f} s")
-    if outcome.forced:
-        lines.append("had to be forced: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.forced))
+    if outcome.pushed:
+        lines.append("more than asking was needed: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
     if outcome.failure is not None:
         return [*lines, f"the mission failed: {outcome.failure}"]
     return [*lines, f"down: {len(outcome.ended)} components ended, nothing is left"]
