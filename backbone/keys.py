@@ -22,7 +22,7 @@ class Conversation(StrEnum):
     ASK = "ask"  # questions: request/response
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
-    COMMAND = "command"  # repeated commands of the ARC that holds an RC, fenced by epoch
+    COMMAND = "command"  # commands nobody acknowledges: a radio's packets on the simulated air
     TELEMETRY = "telemetry"  # what was applied, measured or overrun
     FRAMES = "frames"  # pictures
     EVENTS = "events"  # what a behavior or world found out

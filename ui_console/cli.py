@@ -24,7 +24,6 @@ KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
 others; a script needs no picture, so it waits for none to settle and leaves the video frequency to others too."""
 
-SYNCHRONIZE_WITHIN_S = 2.0  # chosen: an RC manager that is up answers in milliseconds
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -175,6 +174,7 @@ async def _launch(mission: str | None, connect: str | None, parameters: dict[str
     from backbone.bus.clock import MissionClock
     from backbone.component.launch import Launch
     from backbone.naming import Subsystem
+    from backbone.visit import clock_elsewhere
 
     name = f"console-{os.getpid()}"
     if connect is None:
@@ -185,7 +185,7 @@ async def _launch(mission: str | None, connect: str | None, parameters: dict[str
         raise typer.BadParameter("--connect needs --mission NAME")
     else:
         endpoint, host = connect, socket.gethostname()
-        clock = await _clock_elsewhere(mission, connect, name)
+        clock = await clock_elsewhere(mission, connect, f"{Subsystem.UI_CONSOLE}/{name}")
     launch = Launch(
         mission,
         Subsystem.UI_CONSOLE,
@@ -199,25 +199,6 @@ async def _launch(mission: str | None, connect: str | None, parameters: dict[str
         parameters,
     )
     return launch, clock
-
-
-async def _clock_elsewhere(mission: str, endpoint: str, name: str) -> Any:
-    """Return the clock of a mission on another machine, which shares no monotonic clock with this one."""
-    import time
-
-    from backbone.bus.clock import MissionClock
-    from backbone.bus.zenoh_bus import ZenohBus, client_config
-    from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-    from backbone.rc_manager.messages import AskSchedule, Schedule
-
-    bus = await ZenohBus.open_when_up(
-        mission, f"ui_console/{name}", MissionClock.started_now(), client_config(endpoint)
-    )
-    try:
-        schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=SYNCHRONIZE_WITHIN_S)
-    finally:
-        await bus.close()
-    return MissionClock(time.monotonic() - schedule.at_s)
 
 
 async def _open_bus(launch: Launch, clock: Clock) -> Any:
