@@ -200,6 +200,11 @@ class ResourceController(Component[R], Generic[R]):
             case _:
                 return await self.command(asked)
 
+    def publish_news(self) -> None:
+        """Publish also who holds the resource."""
+        super().publish_news()
+        self.bus.publish(self.address, Conversation.TELEMETRY, self.rc_state())
+
     def statistics(self) -> dict[str, float]:
         """Count commands, connections, ends by lease, and safe states not reached at the first attempt."""
         return {
@@ -233,7 +238,7 @@ class ResourceController(Component[R], Generic[R]):
             self._connects += 1
             self._lease_changed.set()
             self.story.note(order.arc, f"connected under epoch {order.epoch}")
-            self._publish_holders()
+            self._report_holders()
         return Connected(order.epoch)
 
     async def _end_hold(self, hold: Hold, reason: str) -> None:
@@ -250,11 +255,11 @@ class ResourceController(Component[R], Generic[R]):
             detail = error.detail if isinstance(error, HardwareFault) else f"nothing within {SAFE_WITHIN_S} s"
             self._faults += 1
             self.tell(hold.arc, f"disconnected ({reason}), but {self.name} is not safe: {detail}")
-            self._publish_holders()
+            self._report_holders()
             raise HardwareFault(f"{self.name} is not safe after {hold.arc}: {detail}", arc=hold.arc) from error
         del self._unsafe[hold.arc]
         self.story.note(hold.arc, f"disconnected: {reason}")
-        self._publish_holders()
+        self._report_holders()
 
     async def _end_holds(self, ended: list[Hold], reason: str) -> None:
         """End each of them, also if the hardware does not obey for one: who ends them cannot be refused."""
@@ -264,11 +269,11 @@ class ResourceController(Component[R], Generic[R]):
             except HardwareFault as fault:
                 log.warning("%s", fault)
 
-    def _publish_holders(self) -> None:
+    def _report_holders(self) -> None:
         holders = ", ".join(hold.arc for hold in self.holds.holds())
         unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
         self.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
-        self.bus.publish(self.address, Conversation.TELEMETRY, self.rc_state())
+        self.changed()  # a holder may be the same and its epoch new
 
     def _heard_leases(self, envelope: Envelope[Any]) -> None:
         leases: Leases = envelope.body

@@ -51,6 +51,7 @@ log = logging.getLogger(__name__)
 
 MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
 REGISTER_WITHIN_S = 10.0  # chosen: a hub that is being restarted on a busy machine is back long before
+CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for its spectators; people see no difference
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
 
@@ -111,6 +112,7 @@ class Component(Generic[P]):
         self._group: asyncio.TaskGroup | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._token: Subscription | None = None
+        self._news = asyncio.Event()
 
     # ------------------------------------------------------------------ hooks
     async def connect(self) -> None:
@@ -152,6 +154,13 @@ class Component(Generic[P]):
         """Return named counters and measures, units in the names."""
         return {}
 
+    def publish_news(self) -> None:
+        """Publish what spectators should know now.
+
+        When: ``CALM_S`` after ``report`` or ``changed`` said that there is news, once for all of it.
+        """
+        self._publish_state()
+
     # ------------------------------------------------------------------ for derived classes
     @property
     def name(self) -> str:
@@ -188,11 +197,14 @@ class Component(Generic[P]):
         return task
 
     def report(self, feedback: str) -> None:
-        """Say in one line what the component is doing; published if it is news."""
+        """Say in one line what the component is doing; published soon if it is news."""
         if feedback != self.feedback:
             self.feedback = feedback
-            if self._state is LifeState.READY:
-                self._publish_state()
+            self.changed()
+
+    def changed(self) -> None:
+        """Have ``publish_news`` called soon."""
+        self._news.set()
 
     def tell(self, subject: str, what: str) -> None:
         """Keep that this happened to the subject, and let people who watch the mission see it."""
@@ -299,6 +311,7 @@ class Component(Generic[P]):
             self.address, CommonQuestion if self.accepts is None else CommonQuestion | self.accepts, self._answer
         )
         self.start_task(self.serve(), "serve")
+        self.start_task(self._publish_when_calm(), "publish")
         self._enter(LifeState.READY)
         self._token = self.bus.declare_alive(self.address)
         await self._end.wait()
@@ -329,6 +342,13 @@ class Component(Generic[P]):
         self._state, self._since_s = state, self.clock.now_s()
         self.story.note(self.name, f"is {state}")
         self._publish_state()
+
+    async def _publish_when_calm(self) -> None:
+        while True:
+            await self._news.wait()
+            await self.clock.sleep_s(CALM_S * self.clock.rate)
+            self._news.clear()
+            self.publish_news()
 
     def _publish_state(self) -> None:
         self.bus.publish(self.address, Conversation.STATUS, self.component_state())

@@ -159,7 +159,6 @@ class RcManager(Component[RcManagerParameters]):
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
-        self._news = asyncio.Event()
         self._trace: TextIO | None = None
         self._context_switch = ContextSwitch(bus, clock, self.story.note)
         self._found = _Found({}, {})
@@ -186,7 +185,6 @@ class RcManager(Component[RcManagerParameters]):
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
             loops.create_task(self._renew())
-            loops.create_task(self._publish_changes())
 
     async def drain(self) -> None:
         """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
@@ -254,7 +252,7 @@ class RcManager(Component[RcManagerParameters]):
         for instruction in instructions:
             self._carry_out(instruction)
         if instructions:
-            self._news.set()
+            self.changed()
 
     def _carry_out(self, instruction: Instruction) -> None:
         match instruction:
@@ -497,17 +495,18 @@ class RcManager(Component[RcManagerParameters]):
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
             self.bus.publish(self.address, Conversation.LEASES, Leases(self.manager.leases(), LEASE_S * rate))
-            self._news.set()
+            self.changed()
             await self.clock.sleep_s(RENEW_EVERY_S * rate)
 
-    async def _publish_changes(self) -> None:
-        while True:
-            await self._news.wait()
-            self._news.clear()
-            schedule = self.manager.schedule(self.clock.now_s())
-            self.bus.publish(self.address, Conversation.SCHEDULE, schedule)
-            running = sum(1 for request in schedule.requests if request.state == "running")
-            self.report(f"{running} of {len(schedule.requests)} ARCs run")
+    def publish_news(self) -> None:
+        """Publish the schedule, and how many run if that is news."""
+        schedule = self.manager.schedule(self.clock.now_s())
+        running = sum(1 for request in schedule.requests if request.state == "running")
+        feedback = f"{running} of {len(schedule.requests)} ARCs run"
+        if feedback != self.feedback:
+            self.feedback = feedback
+            super().publish_news()
+        self.bus.publish(self.address, Conversation.SCHEDULE, schedule)
 
     def _heard_beat(self, envelope: Envelope[Any]) -> None:
         arc = envelope.body.arc

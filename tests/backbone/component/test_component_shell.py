@@ -511,11 +511,28 @@ def test_state_says_who_and_how_it_is() -> None:
         state = await stage.ask(AskState(), ComponentState)
         assert (state.address, state.type, state.host, state.requester) == (WALKER, "walker", "here", TOWER)
         assert (state.state, state.since_s, state.feedback) == (LifeState.READY, 0.0, "climbs")
+        await stage.clock.sleep_s(0.1)
         assert stage.states[-1] == state
         count = len(stage.states)
         stage.walker.report("climbs")
         await stage.clock.sleep_s(0.1)
         assert len(stage.states) == count, "no news was published"
+        stage.walker.end("enough")
+        await life
+
+    live(law())
+
+
+def test_several_reports_within_a_moment_are_published_once_with_the_last() -> None:
+    async def law() -> None:
+        stage = Stage(hold="serve")
+        life = await stage.begin()
+        count = len(stage.states)
+        for feedback in ("climbs", "slips", "stands"):
+            stage.walker.report(feedback)
+            await stage.clock.sleep_s(0.001)
+        await stage.clock.sleep_s(0.1)
+        assert [state.feedback for state in stage.states[count:]] == ["stands"]
         stage.walker.end("enough")
         await life
 
