@@ -341,8 +341,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def _open(self, order: OpenGate) -> GateOpen:
         self._choose(order.epochs)
         self._gate.prepare(order.epochs)
-        prepared_s = self.clock.now_s()
-        self._lease_until_s = prepared_s + LEASE_S * self.clock.rate
+        self._lease_until_s = self.clock.now_s() + LEASE_S * self.clock.rate
         self._leased.set()
         try:
             async with asyncio.timeout(PREPARE_S):
@@ -354,7 +353,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 self._gate.close(reason, self.name, -1.0)
             self.tell(self.name, reason)
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0) from error
-        await self.clock.sleep_until_s(prepared_s + order.settle_s)
+        await self.clock.sleep_until_s(order.settled_s)
         if not self._gate.open(order.epochs, self.clock.now_s()):
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
         self.report(f"granted: {', '.join(self._rcs.values())}")

@@ -64,8 +64,9 @@ class ContextSwitch:
         Returns:
             None: the gate is open. Else the RC that failed, empty if it was the ARC; nothing is held.
         """
+        settled_s = self._clock.now_s() + order.settle_s
         failed = await self._connect_rcs(order, uses)
-        if failed is None and await self._open_gate(order):
+        if failed is None and await self._open_gate(order, settled_s):
             return None
         close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
         async with asyncio.TaskGroup() as both:
@@ -111,8 +112,8 @@ class ContextSwitch:
                 raise outcome
         return None
 
-    async def _open_gate(self, order: ConnectArc) -> bool:
-        question = OpenGate(dict(order.epochs), order.settle_s, order.until_s)
+    async def _open_gate(self, order: ConnectArc, settled_s: float) -> bool:
+        question = OpenGate(dict(order.epochs), settled_s, order.until_s)
         within_s = ARC_REPLY_S + order.settle_s / self._clock.rate
         try:
             await self._bus.ask(_in_pool(order.arc), question, GateOpen, within_s=within_s)

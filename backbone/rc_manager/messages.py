@@ -160,16 +160,16 @@ class Beat(Message, frozen=True):
 
 # ---------------------------------------------------------------------- to ARCs
 class OpenGate(Message, frozen=True):
-    """Your RCs are connected: prepare them, let them settle, then let commands through.
+    """Your RCs are connected: prepare them, wait until they have settled, then let commands through.
 
     Attributes:
         epochs: RC name → epoch of this connection.
-        settle_s: Settling time after the preparation, seconds.
+        settled_s: Mission time at which the RCs have settled; they began when they were ordered to connect.
         until_s: Mission time until which the slice lasts at least, counted from now.
     """
 
     epochs: dict[str, int]
-    settle_s: float
+    settled_s: float
     until_s: float
 
 

@@ -133,8 +133,8 @@ class PlainArc(Component[Any]):
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         match asked.body:
-            case OpenGate(epochs=epochs, settle_s=settle_s):
-                await self.clock.sleep_s(settle_s)
+            case OpenGate(epochs=epochs, settled_s=settled_s):
+                await self.clock.sleep_until_s(settled_s)
                 self.epochs, self.granted_s = epochs, self.clock.now_s()
                 self.log.append(("open", "", self.clock.now_s()))
                 return GateOpen()
