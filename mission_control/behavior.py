@@ -158,7 +158,8 @@ class Behavior(Component[B], Generic[B]):
     async def suspending(self, deadline_s: float) -> None:
         """Stop cleanly.
 
-        When: the slice is about to end; not before an override by a human. Commands still pass.
+        When: the slice is about to end; not before an override by a human, and not for a behavior that
+        overrides neither this nor ``act``. Commands still pass.
         What: bring the robot to rest; return as soon as that is done. Not: take longer than the deadline.
 
         Args:
@@ -317,6 +318,11 @@ class Behavior(Component[B], Generic[B]):
         await self._stop_acting()
         await self.suspended(notice.reason, notice.by)
 
+    @property
+    def _commands_nothing(self) -> bool:
+        """Whether there is nothing to bring to rest: it only watches."""
+        return type(self).act is Behavior.act and type(self).suspending is Behavior.suspending
+
     async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
         parameters = claim_parameters(
             self.address,
@@ -326,6 +332,7 @@ class Behavior(Component[B], Generic[B]):
             wish=need.wish,
             features=need.features,
             usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
+            stops_at_once=self._commands_nothing,
         )
         try:
             await arc.keep(self.clock, need.kind, parameters)

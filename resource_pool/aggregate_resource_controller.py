@@ -105,6 +105,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         features: Kind of RC → features.
         usage: Period, packet time, deadline, jitter (seconds) and kind of what is sent on the radio.
         idle: True: no time is wanted yet.
+        stops_at_once: True: nothing must be brought to rest at the end of a slice.
     """
 
     owner: str
@@ -116,6 +117,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     features: dict[str, list[str]] = {}
     usage: tuple[float, float, float, float, str] = (0.05, 0.002, 0.0, 0.0, "drive")
     idle: bool = False
+    stops_at_once: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,6 +263,7 @@ class AggregateResourceController(Component[ArcParameters]):
             minimum_runtime_s=given.minimum_runtime_s,
             maximum_runtime_s=given.maximum_runtime_s,
             idle=given.idle,
+            stops_at_once=given.stops_at_once,
         )
 
     async def _send_request(self) -> None:

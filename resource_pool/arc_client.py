@@ -124,6 +124,7 @@ class ArcClient:
         usage: Usage = DEFAULT_DRIVE_USAGE,
         console: bool = False,
         idle: bool = False,
+        stops_at_once: bool = False,
     ) -> ArcClient:
         """Have an ARC of this kind started for the speaker of ``bus`` and its RCs asked for.
 
@@ -142,6 +143,8 @@ class ArcClient:
             usage: How often commands are sent on the radio.
             console: True for consoles.
             idle: True to want no time yet.
+            stops_at_once: True if nothing must be brought to rest at the end of a slice: ``arc_suspending``
+                is not called then, and the hand-over does not wait for the owner.
 
         Raises:
             Refusal: The ARC could not be started or its request can never be served.
@@ -158,6 +161,7 @@ class ArcClient:
             usage=usage,
             console=console,
             idle=idle,
+            stops_at_once=stops_at_once,
         )
         await client.start(kind, parameters)
         return client
@@ -336,6 +340,7 @@ def claim_parameters(
     usage: Usage = DEFAULT_DRIVE_USAGE,
     console: bool = False,
     idle: bool = False,
+    stops_at_once: bool = False,
 ) -> dict[str, Any]:
     """Return the parameters an ARC is started with for this owner; see ``ArcClient.claim``."""
     return {
@@ -348,6 +353,7 @@ def claim_parameters(
         "features": features or {},
         "usage": [usage.period_s, usage.packet_time_s, usage.deadline_s, usage.jitter_s, usage.kind],
         "idle": idle,
+        "stops_at_once": stops_at_once,
     }
 
 

@@ -72,6 +72,8 @@ class SchedulingRequest(Message, frozen=True):
         minimum_runtime_s: Shortest useful time, above 0.
         maximum_runtime_s: End of all extensions, at least the minimum; 0: the minimum.
         idle: True: it exists but wants no time now.
+        stops_at_once: True: the decision process commands nothing that must be brought to rest, so the end of
+            its slice need not wait for it.
     """
 
     arc: str
@@ -82,6 +84,7 @@ class SchedulingRequest(Message, frozen=True):
     minimum_runtime_s: float
     maximum_runtime_s: float = 0.0
     idle: bool = False
+    stops_at_once: bool = False
 
 
 class RequestState(StrEnum):

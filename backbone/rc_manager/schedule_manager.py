@@ -217,7 +217,7 @@ class ScheduleManager:
 
     def _revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Take all its RCs from an ARC that is connected."""
-        deadline_s = self._grace_s if why == "slice" else 0.0
+        deadline_s = self._grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self._swap_out(arc, why, by)
         arc.afterwards = afterwards
         slot = self._table.slot_of(arc, self._now_s)

@@ -75,7 +75,12 @@ class Driver(Behavior[Any]):
             await self.clock.sleep_s(0.1)
 
 
+class Spectator(Behavior[Any]):
+    """Only looks."""
+
+
 CLASSES: dict[str, type[Component[Any]]] = {
+    "spectator": Spectator,
     "watcher": Watcher,
     "parent": Parent,
     "sequence": Sequence,
@@ -158,6 +163,17 @@ def test_before_the_end_of_a_slice_it_may_stop_cleanly(placer_world: Run) -> Non
         await arc.grant()
         await arc.suspend("slice", "watch2-capture", deadline_s=0.2)
         assert watcher.heard[-2:] == [("suspending", 0.2), ("suspended", "slice", "watch2-capture")]
+
+    placer_world(scene)
+
+
+def test_only_a_behavior_that_commands_nothing_lets_its_slice_end_without_being_asked(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        for name, kind in (("looks", "spectator"), ("drives", "driver"), ("brakes", "watcher")):
+            await root(placer, node(name, kind, arc=ARC))
+        await placer.wait(lambda: len(placer.arcs) == 3)
+        at_once = {arc: claimed.parameters["stops_at_once"] for arc, claimed in placer.arcs.items()}
+        assert at_once == {"looks-capture": True, "drives-capture": False, "brakes-capture": False}
 
     placer_world(scene)
 

@@ -63,6 +63,7 @@ def ask(
     path: Iterable[tuple[str, int]] | None = None,
     console: bool = False,
     idle: bool = False,
+    stops_at_once: bool = False,
 ) -> Requested:
     """Return a request; its owner is a child of the mission's node unless a path is given."""
     wish = {rc: RcUse() for rc in uses.split()} if isinstance(uses, str) else uses
@@ -78,6 +79,7 @@ def ask(
         run_s,
         most_s,
         idle,
+        stops_at_once,
     )
     return Requested(request, tuple(wish))
 

@@ -57,6 +57,14 @@ def test_a_grant_counts_its_minimum_run_time_from_the_open_gate():
     assert told(bench, ConnectArc)[0].until_s == 5.3
 
 
+def test_the_slice_of_an_owner_with_nothing_to_bring_to_rest_ends_at_once():
+    bench = Bench(manager(grace_s=0.2), unit("v"))
+    bench.tell(ask("a", "v", stops_at_once=True))
+    bench.tell(ask("b", "v"))
+    bench.run(6.0)
+    assert [(order.arc, order.why, order.deadline_s) for order in told(bench, RevokeArc)] == [("a", "slice", 0.0)]
+
+
 def test_a_slice_ends_politely_and_an_override_does_not_wait():
     bench = Bench(manager(grace_s=0.2), unit("v"))
     bench.tell(ask("a", "v"))
