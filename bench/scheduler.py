@@ -1,0 +1,249 @@
+"""Time the schedule manager takes to decide, from ten ARCs to ten thousand.
+
+A fleet from a seed runs on virtual time: all ask within one slice, then slices end, new ARCs ask and
+old ones leave. Measured is ``ScheduleManager.handle`` alone, by kind of event: a request, the release
+by an ARC that runs, the end of a slice, and the two outcomes of a context switch (freed, opened).
+
+Prints one JSON line for the headline sizes; ``--table`` prints how it grows, ``--profile`` where the
+time goes. ``--arcs N --rcs M --shape S`` measure one size.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import pstats
+import sys
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from random import Random
+from time import perf_counter
+
+from measuring import percentile, report
+from scheduler_instances import MISSION, SHAPES, Fleet, fleet
+
+from backbone.rc_manager.decisions import Departed, Event, Freed, Instruction, Opened, Requested, Woken
+from backbone.rc_manager.rehearsal import Rehearsal, Timetable
+from backbone.rc_manager.schedule_manager import ScheduleManager
+
+SIZES = ((10, 20), (30, 20), (100, 50), (1000, 200), (10_000, 1000))
+HEADLINE = ((30, 20), (10_000, 1000))
+AIMS_MS = {30: {"p50": 0.5}, 10_000: {"p50": 5.0, "p99": 20.0}}
+KINDS: dict[type[Event], str] = {
+    Requested: "request",
+    Departed: "release",
+    Woken: "slice_end",
+    Freed: "freed",
+    Opened: "opened",
+}
+ARRIVALS_S = 5.0  # chosen: one slice; so that slice ends are spread over time
+CHANGES_S = 15.0  # chosen: mission time between two changes times RCs; about as many changes as slice ends
+
+
+class TooSlow(Exception):
+    """The wall time for this size is used up."""
+
+
+@dataclass
+class Stopwatch:
+    """A schedule manager and how long each of its decisions took.
+
+    Attributes:
+        manager: Who decides.
+        ends_at: ``perf_counter`` at which to give up.
+        times_s: Kind of event → seconds, decision by decision.
+    """
+
+    manager: ScheduleManager
+    ends_at: float
+    times_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def handle(self, event: Event, now_s: float) -> list[Instruction]:
+        """Decide, and note how long it took.
+
+        Raises:
+            TooSlow: There was no time left for it.
+        """
+        began = perf_counter()
+        if began > self.ends_at:
+            raise TooSlow
+        told = self.manager.handle(event, now_s)
+        self.times_s[KINDS.get(type(event), "other")].append(perf_counter() - began)
+        return told
+
+
+@dataclass
+class Measured:
+    """What one size took.
+
+    Attributes:
+        shape: Of the fleet.
+        arcs: ARCs that were to ask.
+        rcs: RCs there were.
+        asked: ARCs that asked before the time was up.
+        build_s: Seconds of deciding until all had asked and run for a while.
+        times_s: Kind of event → seconds, in the running fleet; in the growing one if it did not come to run.
+        parallel: ARCs that ran at once, on average over the measured mission time.
+    """
+
+    shape: str
+    arcs: int
+    rcs: int
+    asked: int
+    build_s: float
+    times_s: dict[str, list[float]]
+    parallel: float
+
+    @property
+    def whole(self) -> bool:
+        """The fleet was complete when its decisions were measured."""
+        return self.asked == self.arcs
+
+    def ms(self, kind: str, share: float) -> float | None:
+        """Return a percentile in milliseconds; None: there was no such event."""
+        times_s = self.times_s.get(kind)
+        return round(percentile(times_s, share) * 1000, 3) if times_s else None
+
+    def all_ms(self, share: float) -> float | None:
+        """Return a percentile over requests, releases and slice ends."""
+        times_s = [t for kind in ("request", "release", "slice_end") for t in self.times_s.get(kind, [])]
+        return round(percentile(times_s, share) * 1000, 3) if times_s else None
+
+    def meets_aims(self) -> bool | None:
+        """Say whether the aims of this size are met; None: it has none."""
+        aims = AIMS_MS.get(self.arcs)
+        if aims is None:
+            return None
+        shares = {"p50": 0.5, "p99": 0.99}
+        reached = {name: self.all_ms(shares[name]) for name in aims}
+        return self.whole and all(ms is not None and ms < aims[name] for name, ms in reached.items())
+
+    def as_json(self) -> dict[str, object]:
+        """Return it for the JSON line."""
+        return {
+            "shape": self.shape,
+            "arcs": self.arcs,
+            "rcs": self.rcs,
+            **({} if self.whole else {"gave_up_at_arcs": self.asked}),
+            "build_s": round(self.build_s, 2),
+            "p50_ms": self.all_ms(0.5),
+            "p99_ms": self.all_ms(0.99),
+            **{kind: {"p50_ms": self.ms(kind, 0.5), "p99_ms": self.ms(kind, 0.99)} for kind in self.times_s},
+            "meets_aims": self.meets_aims(),
+        }
+
+
+def measure(of: Fleet, arcs: int, *, events: int, within_s: float, seed: int) -> Measured:
+    """Return how long decisions take in a fleet of this size.
+
+    Args:
+        of: RCs and a source of requests.
+        arcs: ARCs in the fleet.
+        events: Requests and releases to measure, each; slice ends happen meanwhile.
+        within_s: Seconds of wall time after which it gives up; half of it for building the fleet.
+        seed: Of arrivals and departures.
+    """
+    rng = Random(seed)
+    manager = ScheduleManager(grace_s=0.2, tolerance_s=0.05, mission=MISSION, mission_priority=0)
+    building = Stopwatch(manager, perf_counter() + within_s)
+    rehearsal = Rehearsal(building)
+    for rc in of.rcs:
+        rehearsal.tell(rc)
+    arrivals = sorted(rng.uniform(0.0, ARRIVALS_S) for _ in range(arcs))
+    present = [f"arc{number}" for number in range(arcs)]
+    for name, at_s in zip(present, arrivals, strict=True):
+        rehearsal.at(at_s, of.request(name))
+    try:
+        rehearsal.run(2 * ARRIVALS_S)
+    except TooSlow:
+        return _result(of, arcs, building, building, 0.0)
+    running = Stopwatch(manager, perf_counter() + within_s)
+    began_s, step_s = rehearsal.now_s, CHANGES_S / len(of.rcs)
+    rehearsal.manager = running
+    try:
+        for number in range(events):
+            present.append(f"late{number}")
+            rehearsal.tell(of.request(present[-1]))
+            rehearsal.run(rehearsal.now_s + step_s)
+            leaver = rng.choice([*rehearsal.connected] or present)
+            present.remove(leaver)
+            rehearsal.tell(Departed(leaver))
+            rehearsal.run(rehearsal.now_s + step_s)
+    except TooSlow:
+        pass
+    parallel = Timetable(rehearsal.trace, rehearsal.now_s).mean_parallel(began_s)
+    return _result(of, arcs, building, running, parallel)
+
+
+def _result(of: Fleet, arcs: int, building: Stopwatch, running: Stopwatch, parallel: float) -> Measured:
+    asked = len(building.times_s["request"])
+    build_s = sum(map(sum, building.times_s.values()))
+    times_s = {kind: times for kind, times in running.times_s.items() if kind != "other" and times}
+    return Measured(of.shape, arcs, len(of.rcs), asked, build_s, times_s, parallel)
+
+
+def table(measured: Sequence[Measured]) -> str:
+    """Return a table for people: one line a size."""
+    kinds = list(KINDS.values())
+    lines = [
+        f"{'shape':8s} {'ARCs':>6s} {'RCs':>5s} {'build s':>8s} {'at once':>8s} "
+        + " ".join(f"{kind + ' ms':>19s}" for kind in kinds)
+        + "   (median / 99th percentile)"
+    ]
+    for one in measured:
+        cells = [f"{_number(one.ms(kind, 0.5))} / {_number(one.ms(kind, 0.99))}" for kind in kinds]
+        note = "" if one.whole else f"   gave up when {one.asked} had asked"
+        lines.append(
+            f"{one.shape:8s} {one.arcs:6d} {one.rcs:5d} {one.build_s:8.2f} {one.parallel:8.1f} "
+            + " ".join(f"{cell:>19s}" for cell in cells)
+            + note
+        )
+    return "\n".join(lines)
+
+
+def _number(ms: float | None) -> str:
+    return "-" if ms is None else f"{ms:.3f}"
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--arcs", type=int, help="one size only")
+    parser.add_argument("--rcs", type=int, help="with --arcs; default: a tenth, at least 20")
+    parser.add_argument(
+        "--shape", choices=SHAPES, action="append", help="repeatable; default: uniform, with --table all"
+    )
+    parser.add_argument("--events", type=int, default=200, help="requests and releases measured, each")
+    parser.add_argument("--within", type=float, default=30.0, help="seconds for building and for measuring one size")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--table", action="store_true", help="all sizes and shapes, for people")
+    parser.add_argument("--profile", action="store_true", help="print the 25 functions most time went to, on stderr")
+    chosen = parser.parse_args()
+    sizes = SIZES if chosen.table else HEADLINE
+    if chosen.arcs is not None:
+        sizes = ((chosen.arcs, chosen.rcs or max(20, chosen.arcs // 10)),)
+    shapes = chosen.shape or (SHAPES if chosen.table else SHAPES[:1])
+    profile = cProfile.Profile()
+    if chosen.profile:
+        profile.enable()
+    measured = [
+        measure(fleet(shape, rcs, chosen.seed), arcs, events=chosen.events, within_s=chosen.within, seed=chosen.seed)
+        for shape in shapes
+        for arcs, rcs in sizes
+    ]
+    if chosen.profile:
+        profile.disable()
+        pstats.Stats(profile, stream=sys.stderr).sort_stats("tottime").print_stats(25)
+    if chosen.table:
+        print(table(measured))
+    else:
+        report(
+            "scheduler",
+            aims_ms={str(arcs): aims for arcs, aims in AIMS_MS.items()},
+            sizes=[m.as_json() for m in measured],
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Fleets for ``scheduler.py``: many ARCs that want two to four RCs each, in several shapes, from a seed.
+
+* ``uniform``: any RCs; with many ARCs nearly all of them hang together as one group.
+* ``cells``: robots in cells of eight RCs; nobody needs an RC of another cell: many small groups.
+* ``hub``: everybody needs one of a few RCs (a video frequency) beside its own: one big group with a bottleneck.
+* ``tree``: as uniform, and the owners stand in a behavior tree of three levels with priorities.
+* ``radio``: as uniform, and one of the RCs is a radio shared by streams.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from random import Random
+
+from backbone.rc_manager.decisions import RcKnown, Requested
+from backbone.rc_manager.messages import PathNode, RcUse, SchedulingRequest, Usage
+
+MISSION = "fleet"
+SHAPES = ("uniform", "cells", "hub", "tree", "radio")
+CONNECT_S, DISCONNECT_S = 0.3, 0.05  # the papers' picture settles; a radio packet stops a robot
+SLICES_S = (4.0, 5.0, 6.0)  # around the papers' 5 s; unlike ones, so that slice ends do not fall together
+CELL_RCS = 8  # chosen: two robots and their frequencies
+RCS_OF_A_HUB = 20  # chosen: RCs for each one that everybody needs
+RCS_OF_A_RADIO = 20  # chosen: RCs for each radio
+LEVELS = 3
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """RCs, and a source of requests for them.
+
+    Attributes:
+        shape: One of ``SHAPES``.
+        rcs: The RCs.
+        rng: Where chance comes from.
+    """
+
+    shape: str
+    rcs: Sequence[RcKnown]
+    rng: Random
+
+    def request(self, name: str) -> Requested:
+        """Return the request of one more ARC."""
+        uses = self._uses()
+        request = SchedulingRequest(
+            arc=name,
+            owner=f"mission_control/owner-{name}",
+            path=[PathNode(MISSION, 0), *self._place(name)],
+            console=False,
+            alternatives=[dict(uses)],
+            minimum_runtime_s=self.rng.choice(SLICES_S),
+        )
+        return Requested(request, tuple(uses))
+
+    def _place(self, name: str) -> list[PathNode]:
+        if self.shape != "tree":
+            return [PathNode(f"owner-{name}", 1)]
+        squad, team = self.rng.randrange(10), self.rng.randrange(10)
+        own = PathNode(f"owner-{name}", 1 + self.rng.randrange(LEVELS))
+        return [PathNode(f"squad{squad}", 1 + squad % LEVELS), PathNode(f"team{team}", 1 + team % LEVELS), own]
+
+    def _uses(self) -> Mapping[str, RcUse]:
+        count = self.rng.randint(2, 4)
+        units = [rc for rc in self.rcs if not rc.sharable]
+        match self.shape:
+            case "cells":
+                cells = max(1, len(units) // CELL_RCS)
+                cell = self.rng.randrange(cells)
+                return _exclusive(self.rng.sample(units[cell::cells], count))
+            case "hub":
+                hubs = max(1, len(units) // RCS_OF_A_HUB)
+                return _exclusive([self.rng.choice(units[:hubs]), *self.rng.sample(units[hubs:], count - 1)])
+            case "radio":
+                radio = self.rng.choice([rc for rc in self.rcs if rc.sharable])
+                period_s = self.rng.choice([0.05, 0.1, 0.2])
+                stream = Usage(period_s, period_s * self.rng.choice([0.02, 0.05, 0.1]), kind="drive")
+                return {**_exclusive(self.rng.sample(units, count - 1)), radio.rc: RcUse([stream])}
+            case _:
+                return _exclusive(self.rng.sample(units, count))
+
+
+def fleet(
+    shape: str, rcs: int, seed: int, *, connect_s: float = CONNECT_S, disconnect_s: float = DISCONNECT_S
+) -> Fleet:
+    """Return a fleet of this shape with so many RCs."""
+    radios = max(1, rcs // RCS_OF_A_RADIO) if shape == "radio" else 0
+    return Fleet(
+        shape,
+        [
+            RcKnown(f"rc{number}", "thing", number < radios, 1.0, connect_s, disconnect_s, True, 0)
+            for number in range(rcs)
+        ],
+        Random(f"{shape} {rcs} {seed}"),
+    )
+
+
+def _exclusive(rcs: Sequence[RcKnown]) -> dict[str, RcUse]:
+    return {rc.rc: RcUse() for rc in rcs}
