@@ -29,6 +29,7 @@ from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.rc_manager.claims import STREAMED_KINDS, scheduling_request
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     BEAT_EVERY_S,
@@ -45,8 +46,6 @@ from backbone.rc_manager.messages import (
     Leases,
     MissingRuntime,
     OpenGate,
-    PathNode,
-    RcUse,
     Scheduled,
     SchedulingRequest,
     SetIdle,
@@ -136,7 +135,7 @@ class AggregateResourceController(Component[ArcParameters]):
     accepts = OpenGate | CloseGate | AskRequest | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC it needs, one of each."""
-    sharable_roles: ClassVar[frozenset[str]] = frozenset({"command_radio"})
+    sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
     """Those of them it uses by streams instead of exclusively."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -248,20 +247,16 @@ class AggregateResourceController(Component[ArcParameters]):
     # ------------------------------------------------------------------ asking for run time
     def _make_request(self) -> SchedulingRequest:
         given = self.parameters
-        period_s, packet_time_s, deadline_s, jitter_s, kind = given.usage
-        stream = Usage(period_s, packet_time_s, deadline_s, jitter_s, kind)
-
-        def use(role: str) -> RcUse:
-            return RcUse([stream]) if role in self.sharable_roles else RcUse()
-
-        return SchedulingRequest(
-            arc=self.name,
+        return scheduling_request(
+            self.name,
+            self._sets,
             owner=self._owner,
-            path=[PathNode(name, priority) for name, priority in given.path],
-            console=given.console,
-            alternatives=[{rc: use(role) for role, rc in rcs.items()} for rcs in self._sets],
+            path=given.path,
+            streams=[Usage(*given.usage)],
+            streamed=self.sharable_roles,
             minimum_runtime_s=given.minimum_runtime_s,
             maximum_runtime_s=given.maximum_runtime_s,
+            console=given.console,
             idle=given.idle,
             stops_at_once=given.stops_at_once,
         )
