@@ -204,7 +204,7 @@ def _in_time(one: Stream, above: _Load, blocking: int) -> bool:
 
 
 def _worst_us(one: Stream, above: _Load, blocking: int, *, enough_us: int) -> int | None:
-    """Return the worst response of the stream, microseconds; if it is at most ``enough_us``, perhaps only a bound on it.
+    """Return the worst response of the stream, microseconds, or ``enough_us`` if it is not above that.
 
     Every packet of the busy period is looked at that begins when all higher streams are released at once,
     one tick after the longest lower packet began.

@@ -1,0 +1,101 @@
+"""What quicker tests than the exact one would admit to a radio, and what the exact one costs.
+
+Random sets of periodic packets, deadline at the next release. The papers' sum of shares, the Liu-Layland
+and the hyperbolic bound are right for processors that can be interrupted; a packet once begun is sent.
+Counts the sets each of them admits, and how many of those miss a deadline. Prints one JSON line.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import random
+import time
+from collections.abc import Callable, Sequence
+
+from measuring import report, summary
+
+from backbone.rc_manager.radio_admission import Stream, admissible, utilization
+
+PERIODS_S = (0.02, 0.2)  # a stick's commands to a dead man's sign of life
+SIZES = (5, 20, 100)
+SHARES = (0.3, 1.0)
+TIMED_SETS = 40
+
+
+def random_set(rng: random.Random, count: int, share: float) -> list[Stream]:
+    """Return streams in rate-monotonic order that need this share of the radio together."""
+    cuts = sorted([0.0, *(rng.random() for _ in range(count - 1)), 1.0])
+    streams = []
+    for low, high in itertools.pairwise(cuts):
+        period_us = round(1e6 * math.exp(rng.uniform(*map(math.log, PERIODS_S))))
+        streams.append(Stream(period_us, max(1, int(period_us * share * (high - low))), period_us, 0))
+    return sorted(streams)
+
+
+def sum_of_shares(streams: Sequence[Stream]) -> bool:
+    """Admit what is no more than the radio has."""
+    return admissible(streams, 1.0, "sum")
+
+
+def liu_layland(streams: Sequence[Stream]) -> bool:
+    """Admit up to n (2^(1/n) - 1)."""
+    return utilization(streams) <= len(streams) * (2 ** (1 / len(streams)) - 1)
+
+
+def hyperbolic(streams: Sequence[Stream]) -> bool:
+    """Admit while the product of 1 + share is at most 2."""
+    return math.prod(1 + one.packet_us / one.period_us for one in streams) <= 2
+
+
+TESTS: dict[str, Callable[[Sequence[Stream]], bool]] = {
+    "sum": sum_of_shares,
+    "liu_layland": liu_layland,
+    "hyperbolic": hyperbolic,
+}
+
+
+def compare(rng: random.Random, sets: int) -> dict[str, dict[str, int]]:
+    """Return for each test how many sets it admits, and how many of them miss a deadline."""
+    counts = {name: {"admitted": 0, "of_them_late": 0} for name in [*TESTS, "exact"]}
+    for _ in range(sets):
+        streams = random_set(rng, rng.randint(2, 10), rng.uniform(*SHARES))
+        in_time = admissible(streams, 1.0)
+        counts["exact"]["admitted"] += in_time
+        for name, test in TESTS.items():
+            if test(streams):
+                counts[name]["admitted"] += 1
+                counts[name]["of_them_late"] += not in_time
+    return counts
+
+
+def cost(rng: random.Random, size: int) -> dict[str, float]:
+    """Return how long one analysis of so many streams takes that are all in time: a refusal is quicker."""
+    times_s: list[float] = []
+    while len(times_s) < TIMED_SETS:
+        streams = random_set(rng, size, rng.uniform(*SHARES))
+        begun_s = time.perf_counter()
+        if admissible(streams, 1.0):
+            times_s.append(time.perf_counter() - begun_s)
+    return summary(times_s)
+
+
+def main() -> None:
+    """Compare and measure."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--sets", type=int, default=5000)
+    options.add_argument("--seed", type=int, default=1)
+    given = options.parse_args()
+    rng = random.Random(given.seed)
+    report(
+        "admission",
+        sets=given.sets,
+        seed=given.seed,
+        tests=compare(rng, given.sets),
+        one_analysis={str(size): cost(rng, size) for size in SIZES},
+    )
+
+
+if __name__ == "__main__":
+    main()
