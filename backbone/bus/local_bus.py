@@ -16,6 +16,9 @@ from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
 from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
 
+Answered = Callable[[Envelope[Any] | None], None]
+"""Takes the answer to a question, or None if the one asked died over it."""
+
 
 class LocalNetwork:
     """What the buses of one process share. One network is one mission."""
@@ -30,6 +33,27 @@ class LocalNetwork:
     def join(self, source: str, clock: Clock) -> LocalBus:
         """Return a new bus on this network that speaks as ``source``."""
         return LocalBus(self, source, clock)
+
+    # How things travel. A network on which they do not always arrive overrides these three.
+    def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
+        """Hand the question to who serves the address, and its outcome to ``answered``.
+
+        Raises:
+            NoResponder: Nobody does.
+        """
+        server = self.servers.get(address)
+        if server is None:
+            raise NoResponder(f"nobody answers at {address}")
+        answering = server.owner.start(_answer(server, asked))
+        answering.add_done_callback(lambda task: answered(_outcome(task)))
+
+    def carry_publication(self, listening: _Listening, address: str, envelope: Envelope[Any]) -> None:
+        """Hand a publication to one of those who listen."""
+        listening.deliver(address, envelope)
+
+    def carry_life(self, watching: _Watching, address: str, alive: bool) -> None:
+        """Tell one of those who watch that a token rose or fell."""
+        watching.tell(address, alive)
 
 
 class _Declared:
@@ -125,11 +149,7 @@ class LocalBus(Speaker):
         try:
             async with asyncio.timeout(within_s):
                 await asyncio.sleep(0)
-                server = self.network.servers.get(address)
-                if server is None:
-                    raise NoResponder(f"nobody answers at {address}")
-                answering = server.owner.start(_answer(server, asked))
-                answering.add_done_callback(lambda task: settle(answered, _outcome(task)))
+                self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
                 envelope = await answered
         except TimeoutError:
             raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
@@ -161,7 +181,7 @@ class LocalBus(Speaker):
         envelope = self.envelope(message)
         for listening in self.network.listeners:
             if listening.conversation == conversation and _matches(listening.pattern, address):
-                listening.deliver(address, envelope)
+                self.network.carry_publication(listening, address, envelope)
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
@@ -198,7 +218,7 @@ class LocalBus(Speaker):
         self.network.watchers.append(watching)
         for standing, tokens in self.network.tokens.items():
             if tokens:
-                watching.tell(standing, alive=True)
+                self.network.carry_life(watching, standing, alive=True)
         return watching
 
     def watch_link(self, listener: LinkListener) -> _Declared:
@@ -223,7 +243,7 @@ class LocalBus(Speaker):
 
     def _tell_watchers(self, address: str, *, alive: bool) -> None:
         for watching in list(self.network.watchers):
-            watching.tell(address, alive)
+            self.network.carry_life(watching, address, alive)
 
 
 async def _answer(server: _Server, asked: Envelope[Any]) -> Envelope[Any] | None:

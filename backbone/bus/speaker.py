@@ -26,8 +26,9 @@ class Speaker(ABC):
     def __init__(self, mission: str, source: str, clock: Clock) -> None:
         self._mission, self._source, self._clock = mission, source, clock
         self._sequence = 0
-        self._tasks: set[asyncio.Task[Any]] = set()
-        self._open_questions: set[asyncio.Future[Any]] = set()
+        # In the order in which they began, not a set's: what ends together ends in the same order in every run.
+        self._tasks: dict[asyncio.Task[Any], None] = {}
+        self._open_questions: dict[asyncio.Future[Any], None] = {}
         self._closing: asyncio.Task[None] | None = None
         self._on_bug: Callable[[BaseException], None] = _report_to_loop
         self.closed = False
@@ -79,8 +80,8 @@ class Speaker(ABC):
     def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
         """Run a coroutine as a task this bus owns until it is closed."""
         task = asyncio.get_running_loop().create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._tasks[task] = None
+        task.add_done_callback(self._forget)
         return task
 
     async def reply_to(self, question: Envelope[Any], answer: Answer) -> Envelope[Any] | None:
@@ -109,12 +110,12 @@ class Speaker(ABC):
         if self.closed:
             raise NoResponder(f"the bus of {self._source} is closed")
         answered: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
-        self._open_questions.add(answered)
+        self._open_questions[answered] = None
         return answered
 
     def end_question(self, answered: asyncio.Future[Any]) -> None:
         """Forget a question: it was answered or given up."""
-        self._open_questions.discard(answered)
+        self._open_questions.pop(answered, None)
 
     def require_open(self) -> None:
         """Raise RuntimeError if the bus is closed: declaring anything then is a bug."""
@@ -148,6 +149,9 @@ class Speaker(ABC):
     @abstractmethod
     async def leave(self) -> None:
         """Leave the network; nothing is declared any more and no task of this bus runs."""
+
+    def _forget(self, task: asyncio.Task[Any]) -> None:
+        self._tasks.pop(task, None)
 
     async def _finish(self, answering: list[asyncio.Task[Any]]) -> None:
         await asyncio.gather(*answering, return_exceptions=True)

@@ -110,7 +110,7 @@ class Component(Generic[P]):
         self._end = asyncio.Event()
         self._bug: BaseException | None = None
         self._group: asyncio.TaskGroup | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks: dict[asyncio.Task[None], None] = {}  # in the order in which they began
         self._token: Subscription | None = None
         self._news = asyncio.Event()
 
@@ -192,7 +192,7 @@ class Component(Generic[P]):
         if self._group is None:
             task.cancel()
         else:
-            self._tasks.add(task)
+            self._tasks[task] = None
             task.add_done_callback(self._task_ended)
         return task
 
@@ -318,7 +318,7 @@ class Component(Generic[P]):
         self._enter(LifeState.DRAINING)
 
     def _task_ended(self, task: asyncio.Task[None]) -> None:
-        self._tasks.discard(task)
+        self._tasks.pop(task, None)
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._group = None  # which ends its other tasks now, and must get no new ones meanwhile
             self.fail(bug)

@@ -463,10 +463,10 @@ class RcManager(Component[RcManagerParameters]):
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
         names = await self._present()
-        for name in [*self._running_rcs, *self._uses]:
+        for name in [*sorted(self._running_rcs), *self._uses]:
             if name not in names:
                 self._disappeared(name)
-        for rc in names & set(self._resources):
+        for rc in sorted(names & set(self._resources)):
             await self._meet_rc(rc)
 
     # ------------------------------------------------------------------ loops
