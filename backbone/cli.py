@@ -109,13 +109,49 @@ def read_or_exit(mission_file: Path) -> Any:
 
 
 @app.command()
-def check(mission_file: MissionFile) -> None:
+def check(
+    mission_file: MissionFile,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Also work out placement and the first minute of the schedule.")
+    ] = False,
+    for_s: Annotated[
+        float | None, typer.Option("--for", min=0.1, help="Mission seconds of the dry run; default: 60.")
+    ] = None,
+    trace: Annotated[
+        Path | None, typer.Option("--trace", help="Write the dry run's scheduling decisions, JSON lines.")
+    ] = None,
+) -> None:
     """Check a mission file whole: every fault at once as file:line:column. Starts nothing."""
+    if not dry_run and (for_s is not None or trace is not None):
+        raise typer.BadParameter("--for and --trace need --dry-run")
     description = read_or_exit(mission_file)
     say(
         f"{mission_file}: mission {description.name} is fine: {len(description.resources)} resources, "
         f"{len(description.types)} component types on {len(description.hosts)} host(s)"
     )
+    if dry_run:
+        raise typer.Exit(int(_rehearse(description, for_s, trace)))
+
+
+def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> ExitCode:
+    """Print a dry run; return how the mission would come up."""
+    from rich.console import Console
+
+    from backbone.dry_run import FIRST_MINUTE_S, dry_run
+    from backbone.dry_run_screen import screen
+
+    dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
+    Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(screen(dry))
+    if trace is not None:
+        try:
+            dry.write_trace(trace)
+        except OSError as error:
+            say(f"the trace cannot be written: {error}")
+            return ExitCode.UNEXPECTED
+    if not dry.can_come_up:
+        say(f"mission {description.name} cannot come up as it is")
+        return ExitCode.MISSION_INVALID
+    return ExitCode.DONE
 
 
 @app.command()

@@ -1,0 +1,300 @@
+"""Dry run of a mission: where its components would go, and the beginning of its master schedule.
+
+Nothing is started. Every host counts as idle and alike, every component comes up at once, every
+behavior claims its ARC at the beginning and goes on with it, no console is attached. The placer's
+and the RC manager's own deciding code is asked, so what it shows is what a mission without surprises does.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.inventory import Inventory
+from backbone.dependency_database.messages import FindRcs
+from backbone.errors import Refusal, code_of
+from backbone.mission.behavior_orders import PathStep
+from backbone.mission.model import ArcWish, Behavior, MissionDescription
+from backbone.naming import Subsystem, address
+from backbone.placer.messages import NoHost
+from backbone.placer.placement import HostView, place
+from backbone.rc_manager.claims import scheduling_request
+from backbone.rc_manager.decisions import RcKnown, Requested
+from backbone.rc_manager.messages import SchedulingRequest, Usage, Why
+from backbone.rc_manager.rehearsal import Line, Rehearsal, Timetable
+from backbone.rc_manager.schedule_manager import ScheduleManager
+from backbone.rc_manager.service import TOLERANCE_S, RcManagerParameters
+
+FIRST_MINUTE_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """One component and where it would go.
+
+    Attributes:
+        name: Its name.
+        type: Its component type.
+        host: Its host; empty: none can take it.
+        reasons: Why there, or why nowhere; one line a host.
+    """
+
+    name: str
+    type: str
+    host: str
+    reasons: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Claimed:
+    """The request of one behavior's ARC and what became of it.
+
+    Attributes:
+        arc: Name of the ARC.
+        behavior: Name of its owner.
+        priority: The owner's place in the tree, for people: ``mission:10/watch:3``.
+        rcs: The RCs chosen for it; empty: it was refused.
+        minimum_s: Shortest useful time, seconds.
+        refused: Why it can never be served; empty: it was taken.
+        turns: Grants until the end of the dry run.
+        first_grant_s: Mission time of the first; None: there was none.
+        worst_wait_s: Longest wait, one that goes on at the end included.
+        why: Where it is at the end and because of whom; None: it was refused.
+    """
+
+    arc: str
+    behavior: str
+    priority: str
+    rcs: tuple[str, ...]
+    minimum_s: float
+    refused: str
+    turns: int
+    first_grant_s: float | None
+    worst_wait_s: float
+    why: Why | None
+
+    @property
+    def never_runs(self) -> bool:
+        """It was refused, or got no turn and none can be predicted."""
+        return bool(self.refused) or (self.turns == 0 and self.why is not None and self.why.expected_start_s < 0)
+
+
+@dataclass(frozen=True, slots=True)
+class DryRun:
+    """What a mission would do.
+
+    Attributes:
+        mission: Its name.
+        placed: Its components in the order of their start.
+        claimed: The requests of its behaviors in the order of the file.
+        timetable: Who would have run when.
+        trace: Every decision, as the RC manager would record it.
+    """
+
+    mission: str
+    placed: Sequence[Placed]
+    claimed: Sequence[Claimed]
+    timetable: Timetable
+    trace: Sequence[Line]
+
+    @property
+    def can_come_up(self) -> bool:
+        """Every component has a host and no request is refused."""
+        return all(placed.host for placed in self.placed) and not any(claimed.refused for claimed in self.claimed)
+
+    def write_trace(self, file: Path) -> None:
+        """Write the trace as JSON lines.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        lines = [*self.trace, {"ev": "end", "t": self.timetable.end_s}]
+        file.write_text("".join(json.dumps(line) + "\n" for line in lines))
+
+
+def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> DryRun:
+    """Return what the mission would do from its beginning on.
+
+    Args:
+        description: The mission.
+        for_s: Mission seconds, at least 0.
+    """
+    placed = placements(description)
+    hosts = {one.name: one.host for one in placed}
+    settings = RcManagerParameters(mission=description.name, mission_priority=description.priority)
+    manager = ScheduleManager(
+        grace_s=settings.grace_s,
+        tolerance_s=TOLERANCE_S,
+        policy=settings.policy,
+        discipline=settings.discipline,
+        mission=settings.mission,
+        mission_priority=settings.mission_priority,
+    )
+    rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
+    for rc in _rcs(description, hosts):
+        rehearsal.tell(rc)
+    asked = [_ask(manager, rehearsal, claim, hosts) for claim in _claims(description)]
+    rehearsal.run(for_s)
+    timetable = Timetable(rehearsal.trace, rehearsal.now_s)
+    claimed = [_claimed(manager, timetable, one) for one in asked]
+    return DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
+
+
+# ---------------------------------------------------------------------- placement
+def placements(description: MissionDescription) -> list[Placed]:
+    """Return where each component would go, in the order of their start: hardware, then the tree with its ARCs.
+
+    A behavior is not started, and so not in the answer, if its parent has no host.
+    """
+    types = {one.name: one for one in description.types}
+    counts: Counter[str] = Counter()
+    found: list[Placed] = []
+
+    def start(kind: str, name: str, pin: str = "") -> bool:
+        found.append(_place(description, types[kind], name, pin, counts))
+        counts[found[-1].host] += 1
+        return bool(found[-1].host)
+
+    def start_branch(behavior: Behavior) -> None:
+        if not start(behavior.type, behavior.name):
+            return
+        if behavior.arc is not None:
+            start(behavior.arc.kind, _arc_name(behavior, behavior.arc))
+        for child in behavior.children:
+            start_branch(child)
+
+    for component in description.components:
+        start(component.type, component.name, component.host)
+    for resource in description.resources:
+        start(resource.type, resource.name, resource.host)
+    for behavior in description.behaviors:
+        start_branch(behavior)
+    return found
+
+
+def _place(
+    description: MissionDescription, component_type: ComponentType, name: str, pin: str, counts: Counter[str]
+) -> Placed:
+    hosts = [HostView(host.name, frozenset(host.tags), components=counts[host.name]) for host in description.hosts]
+    try:
+        choice = place(name, component_type.tags, pin, hosts)
+    except NoHost as refusal:
+        return Placed(name, component_type.name, "", (refusal.detail,))
+    return Placed(name, component_type.name, choice.host, choice.reasons)
+
+
+# ---------------------------------------------------------------------- schedule
+@dataclass(frozen=True, slots=True)
+class _Claim:
+    """What a behavior will ask for, or why it cannot even ask."""
+
+    arc: str
+    behavior: Behavior
+    path: Sequence[PathStep]
+    request: SchedulingRequest | None
+    obstacle: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A claim and what the schedule manager said to it."""
+
+    claim: _Claim
+    rcs: tuple[str, ...] = ()
+    refused: str = ""
+
+
+def requests(description: MissionDescription) -> list[SchedulingRequest]:
+    """Return the requests the ARCs of the mission's behaviors will send, parents' before their children's."""
+    return [claim.request for claim in _claims(description) if claim.request is not None]
+
+
+def _claims(description: MissionDescription) -> Iterator[_Claim]:
+    inventory = Inventory(description.resources)
+    needs = {one.name: one.needs for one in description.types}
+    for path, behavior in _walk(description.behaviors, [(description.name, description.priority)]):
+        wish = behavior.arc
+        if wish is None:
+            continue
+        arc = _arc_name(behavior, wish)
+        features = {kind: list(names) for kind, names in wish.features.items()}
+        try:
+            sets = inventory.find(FindRcs(list(needs[wish.kind]), wish.wish, features))
+        except Refusal as refusal:
+            yield _Claim(arc, behavior, path, None, _told(refusal))
+            continue
+        request = scheduling_request(
+            arc,
+            sets,
+            owner=address(Subsystem.MISSION_CONTROL, behavior.name),
+            path=path,
+            streams=[Usage(wish.period_s, wish.packet_time_s, kind=wish.kind)],
+            minimum_runtime_s=wish.minimum_runtime_s,
+            maximum_runtime_s=wish.maximum_runtime_s,
+        )
+        yield _Claim(arc, behavior, path, request)
+
+
+def _walk(behaviors: Iterable[Behavior], above: Sequence[PathStep]) -> Iterator[tuple[list[PathStep], Behavior]]:
+    for behavior in behaviors:
+        path = [*above, (behavior.name, behavior.priority)]
+        yield path, behavior
+        yield from _walk(behavior.children, path)
+
+
+def _rcs(description: MissionDescription, hosts: dict[str, str]) -> Iterator[RcKnown]:
+    for resource in description.resources:
+        yield RcKnown(
+            rc=resource.name,
+            kind=resource.type,
+            sharable=resource.sharable,
+            capacity=resource.capacity,
+            connect_s=resource.connect_s,
+            disconnect_s=resource.disconnect_s,
+            up=bool(hosts[resource.name]),
+            last_epoch=0,
+        )
+
+
+def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _Claim, hosts: dict[str, str]) -> _Asked:
+    """Let the ARC ask, if it and its behavior run."""
+    if claim.request is None:
+        return _Asked(claim, refused=claim.obstacle)
+    nowhere = [name for name, _ in claim.path[1:] if not hosts.get(name)]
+    if not hosts.get(claim.arc):
+        return _Asked(claim, refused=f"{[*nowhere, claim.arc][0]} has no host, so nobody asks")
+    try:
+        rcs = manager.choose(claim.request)
+    except Refusal as refusal:
+        return _Asked(claim, refused=_told(refusal))
+    rehearsal.tell(Requested(claim.request, rcs))
+    return _Asked(claim, rcs)
+
+
+def _claimed(manager: ScheduleManager, timetable: Timetable, asked: _Asked) -> Claimed:
+    claim, wish = asked.claim, asked.claim.behavior.arc
+    grants = [run.grant_s for run in timetable.of_arc(claim.arc) if run.grant_s is not None]
+    return Claimed(
+        arc=claim.arc,
+        behavior=claim.behavior.name,
+        priority="/".join(f"{name}:{number}" for name, number in claim.path),
+        rcs=asked.rcs,
+        minimum_s=wish.minimum_runtime_s if wish is not None else 0.0,
+        refused=asked.refused,
+        turns=len(grants),
+        first_grant_s=min(grants, default=None),
+        worst_wait_s=timetable.worst_wait_s(claim.arc),
+        why=None if asked.refused else manager.why(claim.arc, timetable.end_s),
+    )
+
+
+def _arc_name(behavior: Behavior, wish: ArcWish) -> str:
+    return f"{behavior.name}-{wish.kind}"
+
+
+def _told(refusal: Refusal) -> str:
+    return f"{refusal.detail} [{code_of(refusal)}]: {refusal.remedy}"
