@@ -198,12 +198,12 @@ class LoadPacket(Message, frozen=True):
         payload: Bytes of the robot's own protocol.
         safe_payload: What is sent last of all to this robot when the ARC is disconnected.
         robot_epoch: Of the robot RC's connection, for the audit.
-        at_once: True: once, ahead of its turn, answered when it is on the air.
-            False: at the ARC's rate from now on, until replaced.
+        at_once: True: once, in the next turn of its stream, answered when it is on the air.
+            False: at its stream's rate from now on, until replaced.
         lasts_s: With ``at_once`` False: mission seconds after which ``afterwards`` replaces it; 0: none do.
             A robot RC that hangs must not keep its robot moving through the radio.
-        afterwards: What is sent at the ARC's rate after the packet was sent at once, or has lasted its time;
-            empty: what was before.
+        afterwards: What is repeated after the packet was sent once, or has lasted its time; empty: what was before.
+        kind: Which of the ARC's streams on the radio it is sent in; if it has none of that kind: its first.
     """
 
     arc: str
@@ -215,6 +215,7 @@ class LoadPacket(Message, frozen=True):
     at_once: bool = False
     afterwards: bytes = b""
     lasts_s: float = 0.0
+    kind: str = "drive"
 
 
 class PacketLoaded(Message, frozen=True):
@@ -372,6 +373,13 @@ class ImpossibleUse(Refusal):
 
     code = "rc.impossible_use"
     remedy = "Connect with a lease and with periods that are finite and above 0."
+
+
+class NoTurnSoon(Refusal):
+    """The ARC's stream on the radio is too slow for what must be sent soon; nothing was sent; fact: ``wait_s``."""
+
+    code = "radio.no_turn_soon"
+    remedy = "Claim with a shorter period, or with a further usage for this kind of command."
 
 
 class HardwareFault(Refusal):

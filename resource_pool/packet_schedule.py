@@ -5,8 +5,10 @@ Rules of this file:
 * A packet once begun is sent (non-preemptive).
 * First the ARC of higher user priority, then the shorter period, then the name.
 * What is repeated has an age: a packet that is not loaded anew in time gives way to what comes after it.
-* Each stream has a constant interval from the first packet on; a release not served before the next one is
-  an overrun and lost.
+* Each kind of request is a stream of its own with a constant interval from its first packet on. What is to be sent
+  once and soon takes the next turn of its stream: nobody ever sends more than was admitted, so nobody else is late.
+* A request not done by its deadline, which is the next release unless the ARC named another, is an overrun. One that
+  has not even begun by then is lost.
 * An ARC's packets reach only the robots it loaded packets for; several of its robots take turns.
 
 Pure; times are mission seconds.
@@ -17,9 +19,13 @@ Source: RAM 2002, "Sharable Resources"; IROS 2001, section 4.3 (rate monotonic b
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, field, replace
 
 from backbone.rc_manager.messages import Usage
+
+MAIN_KIND = "drive"  # chosen: the stream by which a robot hears that it is not forgotten
+INSTANT_S = 1e-9  # chosen: far above the rounding of mission times, far below a packet
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +39,10 @@ class Packet:
         safe_payload: What is to be sent to it last of all.
         robot_epoch: Of the robot RC's connection.
         until_s: Mission time from which ``afterwards`` is sent in its place.
-        afterwards: See ``until_s``; empty: ``safe_payload``.
+        afterwards: See ``until_s``; empty: ``safe_payload``. For what is sent once: what is repeated from then on in
+            the ARC's main stream; empty: what was before.
+        kind: Which of the ARC's streams it belongs to; if it has none of that kind, to its first.
+        ticket: Tells packets apart that are sent once; 0: it is repeated.
     """
 
     arc: str
@@ -43,6 +52,8 @@ class Packet:
     robot_epoch: int
     until_s: float = math.inf
     afterwards: bytes = b""
+    kind: str = ""
+    ticket: int = 0
 
     def at(self, now_s: float) -> Packet:
         """Return what is to be sent at this time: itself, or what comes after it."""
@@ -53,15 +64,55 @@ class Packet:
 
 @dataclass(slots=True)
 class _Stream:
+    """Requests of one kind of one ARC; ``first_s`` is None while it has nothing to send."""
+
     usage: Usage
-    first_s: float
+    first_s: float | None = None
     releases: int = 0
-    overruns: int = 0
+    earliest_s: float = -math.inf
+    packets: dict[int, Packet] = field(default_factory=dict)
+    urgent: deque[Packet] = field(default_factory=deque)
+    turn: int = 0
     sent: int = 0
+    overruns: int = 0
+
+    @property
+    def deadline_s(self) -> float:
+        return self.usage.deadline_s or self.usage.period_s
 
     @property
     def next_release_s(self) -> float:
-        return self.first_s + self.releases * self.usage.period_s
+        return math.inf if self.first_s is None else self.first_s + self.releases * self.usage.period_s
+
+    def begin(self, now_s: float) -> None:
+        """Release from now on, but not before a period has passed since the last release."""
+        if self.first_s is None:
+            self.first_s, self.releases = max(now_s, self.earliest_s), 0
+
+    def take(self, now_s: float) -> tuple[Packet, float]:
+        """Return the packet of the release that is due, and when it was released; those before it are lost."""
+        period_s = self.usage.period_s
+        longest_s = max(self.deadline_s, period_s)
+        lost = max(0, math.floor((now_s - self.next_release_s - longest_s + INSTANT_S) / period_s) + 1)
+        self.overruns += lost
+        self.releases += lost
+        release_s = self.next_release_s
+        self.releases += 1
+        self.sent += 1
+        self.earliest_s = self.next_release_s
+        packet = self._next_packet(now_s)
+        if not self.packets and not self.urgent:
+            self.first_s = None
+        return packet, release_s
+
+    def _next_packet(self, now_s: float) -> Packet:
+        if self.urgent:
+            return self.urgent.popleft()
+        robots = sorted(self.packets)
+        robot = robots[self.turn % len(robots)]
+        self.turn += 1
+        packet = self.packets[robot] = self.packets[robot].at(now_s)
+        return packet
 
 
 @dataclass(slots=True)
@@ -70,17 +121,47 @@ class _Sender:
 
     rank: int
     streams: list[_Stream]
-    packets: dict[int, Packet] = field(default_factory=dict)
     touched: dict[int, Packet] = field(default_factory=dict)
-    turn: int = 0
+    worst_packet_s: float = 0.0
+
+    def stream_of(self, kind: str) -> _Stream:
+        return next((stream for stream in self.streams if stream.usage.kind == kind), self.streams[0])
+
+    @property
+    def main(self) -> _Stream:
+        return self.stream_of(MAIN_KIND)
 
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """One packet and how long it occupies the air, seconds."""
+    """One packet whose turn it is.
+
+    Attributes:
+        packet: To be sent.
+        air_time_s: How long it was admitted to occupy the air.
+        number: Which of the ARC's streams it belongs to; -1: none, it is a safe packet.
+        release_s: When it was due.
+    """
 
     packet: Packet
     air_time_s: float
+    number: int = -1
+    release_s: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """What was counted for one ARC since it was connected.
+
+    Attributes:
+        sent: Packets sent in its turns.
+        overruns: Requests late or lost.
+        worst_packet_s: Longest time one of its packets really occupied the air.
+    """
+
+    sent: int
+    overruns: int
+    worst_packet_s: float
 
 
 class PacketSchedule:
@@ -88,82 +169,122 @@ class PacketSchedule:
 
     def __init__(self) -> None:
         self._senders: dict[str, _Sender] = {}
+        self._told: set[tuple[str, int, str]] = set()
 
-    def connect(self, arc: str, streams: list[Usage], rank: int, now_s: float) -> None:
-        """Give the ARC its streams; their first releases come with its first packet.
+    def connect(self, arc: str, streams: list[Usage], rank: int) -> None:
+        """Give the ARC its streams; their first releases come with their first packets.
 
         Raises:
-            ValueError: A period or packet time is no span of time above 0; nothing has changed.
+            ValueError: There is none, or a period or packet time is no span of time above 0; nothing has changed.
         """
+        if not streams:
+            raise ValueError(f"{arc}: no stream of packets")
         for usage in streams:
             if not (0 < usage.period_s < math.inf and 0 < usage.packet_time_s < math.inf):
                 raise ValueError(f"{arc}: packets of {usage.packet_time_s} s every {usage.period_s} s")
-        self._senders[arc] = _Sender(rank, [_Stream(usage, now_s) for usage in streams])
+            if not 0 <= usage.deadline_s < math.inf:
+                raise ValueError(f"{arc}: a deadline of {usage.deadline_s} s")
+        self._senders[arc] = _Sender(rank, [_Stream(usage) for usage in streams])
 
     def disconnect(self, arc: str) -> list[Sending]:
         """Forget the ARC and all it loaded; return for each of its robots the packet that must be sent last."""
         sender = self._senders.pop(arc, None)
         if sender is None:
             return []
-        air_time_s = _air_time_s(sender)
+        air_time_s = max(stream.usage.packet_time_s for stream in sender.streams)
         return [
             Sending(Packet(p.arc, p.network_id, p.safe_payload, p.safe_payload, p.robot_epoch), air_time_s)
             for _, p in sorted(sender.touched.items())
         ]
 
-    def touch(self, packet: Packet) -> None:
-        """Note that the ARC speaks to this robot, so that its safe packet is owed."""
-        self._senders[packet.arc].touched[packet.network_id] = packet
-
     def load(self, packet: Packet, now_s: float) -> None:
-        """Send this packet at the ARC's rate from now on."""
-        self.touch(packet)
+        """Send this packet at its stream's rate from now on."""
         sender = self._senders[packet.arc]
-        if not sender.packets:
-            for stream in sender.streams:
-                stream.first_s = now_s
-        sender.packets[packet.network_id] = packet
+        sender.touched[packet.network_id] = packet
+        stream = sender.stream_of(packet.kind)
+        stream.packets[packet.network_id] = packet
+        stream.begin(now_s)
+        if stream is sender.main:  # it is newer than what was to be repeated after a packet that still waits
+            for other in sender.streams:
+                for place, once in enumerate(other.urgent):
+                    if once.network_id == packet.network_id:
+                        other.urgent[place] = replace(once, afterwards=b"")
 
-    def air_time_s(self, arc: str) -> float:
-        """Return how long one of the ARC's packets occupies the air."""
-        return _air_time_s(self._senders[arc])
+    def send_once(self, packet: Packet, now_s: float) -> None:
+        """Send this packet in the next turn of its stream, before what is repeated there."""
+        sender = self._senders[packet.arc]
+        sender.touched[packet.network_id] = packet
+        stream = sender.stream_of(packet.kind)
+        stream.urgent.append(packet)
+        stream.begin(now_s)
+
+    def next_turn_s(self, arc: str, kind: str, now_s: float) -> float:
+        """Return when the next turn comes of a packet of this kind that is to be sent once."""
+        stream = self._senders[arc].stream_of(kind)
+        if stream.first_s is None:
+            return max(now_s, stream.earliest_s)
+        return stream.next_release_s + len(stream.urgent) * stream.usage.period_s
 
     def next_due_s(self) -> float | None:
         """Return the earliest release of a stream that has something to send; None if there is none."""
-        releases = [s.next_release_s for sender in self._senders.values() if sender.packets for s in sender.streams]
-        return min(releases, default=None)
+        earliest_s = min((s.next_release_s for one in self._senders.values() for s in one.streams), default=math.inf)
+        return earliest_s if earliest_s < math.inf else None
 
     def take(self, now_s: float) -> Sending | None:
         """Return the packet whose turn it is, counted as sent; None if none is due."""
         due = [
             (sender.rank, stream.usage.period_s, arc, number)
             for arc, sender in self._senders.items()
-            if sender.packets
             for number, stream in enumerate(sender.streams)
-            if stream.next_release_s <= now_s
+            if stream.next_release_s <= now_s + INSTANT_S
         ]
         if not due:
             return None
         _, _, arc, number = min(due)
         sender = self._senders[arc]
         stream = sender.streams[number]
-        missed = int((now_s - stream.next_release_s) / stream.usage.period_s)
-        stream.overruns += missed
-        stream.releases += missed + 1
-        stream.sent += 1
-        robots = sorted(sender.packets)
-        robot = robots[sender.turn % len(robots)]
-        packet = sender.packets[robot] = sender.packets[robot].at(now_s)
-        sender.turn += 1
-        return Sending(packet, stream.usage.packet_time_s)
+        packet, release_s = stream.take(now_s)
+        if packet.ticket and packet.afterwards:  # what was repeated before might call it off
+            repeated = replace(packet, payload=packet.afterwards, afterwards=b"", kind=MAIN_KIND, ticket=0)
+            sender.main.packets[packet.network_id] = repeated
+            sender.main.begin(now_s)
+        return Sending(packet, stream.usage.packet_time_s, number, release_s)
 
-    def counts(self) -> dict[str, tuple[int, int]]:
-        """Return packets sent and overruns of each ARC now connected."""
+    def sent(self, sending: Sending, begun_s: float, took_s: float) -> list[str]:
+        """Take note of how long the packet really occupied the air.
+
+        Args:
+            sending: As returned by ``take``.
+            begun_s: Mission time.
+            took_s: Measured, seconds.
+
+        Returns:
+            For people: what went wrong with this stream of this ARC for the first time.
+        """
+        arc, number = sending.packet.arc, sending.number
+        sender = self._senders.get(arc)
+        if sender is None or not 0 <= number < len(sender.streams):
+            return []  # it was disconnected meanwhile
+        sender.worst_packet_s = max(sender.worst_packet_s, took_s)
+        stream = sender.streams[number]
+        what = f"{stream.usage.kind or 'its'} packets"
+        if begun_s + max(took_s, sending.air_time_s) > sending.release_s + stream.deadline_s + INSTANT_S:
+            stream.overruns += 1
+        news = []
+        if took_s > sending.air_time_s + INSTANT_S:
+            declared = f"{took_s * 1e3:.3g} ms on the air, {sending.air_time_s * 1e3:.3g} ms were declared"
+            news.append(("slow", f"{what} take {declared}: nobody's deadline on this radio is certain"))
+        if stream.overruns:
+            news.append(("late", f"{what} are not always done within {stream.deadline_s:g} s of their release"))
+        found = [(fault, line) for fault, line in news if (arc, number, fault) not in self._told]
+        self._told |= {(arc, number, fault) for fault, _ in found}
+        return [line for _, line in found]
+
+    def counts(self) -> dict[str, Count]:
+        """Return what was counted for each ARC now connected."""
         return {
-            arc: (sum(s.sent for s in sender.streams), sum(s.overruns for s in sender.streams))
+            arc: Count(
+                sum(s.sent for s in sender.streams), sum(s.overruns for s in sender.streams), sender.worst_packet_s
+            )
             for arc, sender in self._senders.items()
         }
-
-
-def _air_time_s(sender: _Sender) -> float:
-    return max((stream.usage.packet_time_s for stream in sender.streams), default=0.0)

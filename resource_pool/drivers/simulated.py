@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import msgspec
+
 from backbone.component.asking import ask_until_answered
 from backbone.errors import LinkError
 from backbone.keys import Conversation
@@ -12,6 +16,8 @@ from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed
 
+HEAD_BYTES = 3  # chosen: network id and a check sum of two bytes
+BITS_PER_BYTE = 10  # chosen: serial, with a start and a stop bit
 WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
 
 
@@ -34,19 +40,33 @@ def world_of(site: DriverSite) -> str:
     return address(Subsystem.RESOURCE_POOL, site.parameters.world)
 
 
+class RadioOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a mission may say to a simulated radio.
+
+    Attributes:
+        bits_per_s: Rate at which it sends; a packet that takes longer than its ARC declared raises an alarm.
+    """
+
+    bits_per_s: Annotated[float, msgspec.Meta(gt=0)] = 115_200.0
+
+
 class SimulatedRadio:
     """A radio whose packets the simulated world hears, in the order in which they were sent."""
 
+    options_type = RadioOptions
+
     def __init__(self, site: DriverSite) -> None:
         self._site, self._world = site, world_of(site)
+        self._bits_per_s = site.options(RadioOptions).bits_per_s
 
     async def open(self) -> None:
         """Wait for nothing: packets into a world that is not there are lost, as on the air."""
 
-    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
-        """Put the packet on the air; nobody acknowledges it, as on the air."""
+    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> float | None:
+        """Put the packet on the air; nobody acknowledges it, as on the air. Return how long its bytes take."""
         packet = RadioPacket(self._site.resource, network_id, payload, arc, robot_epoch)
         self._site.bus.publish(self._world, Conversation.COMMAND, packet)
+        return (HEAD_BYTES + len(payload)) * BITS_PER_BYTE / self._bits_per_s
 
     async def close(self) -> None:
         """Nothing is held."""

@@ -2,7 +2,8 @@
 
 Rules of this file:
 
-* One packet at a time is on the air, and each keeps it for its packet time.
+* One packet at a time is on the air, and each keeps it for its packet time, or longer if it takes longer.
+* Everything but safe packets is sent in turns that were admitted; who declared too little is told, and all others.
 * A robot an ARC spoke to hears a safe packet last. One that could not be sent is owed until it was.
 * A radio that fails while it serves its streams ends this RC; its creator starts it anew, with the device reopened.
 
@@ -12,20 +13,43 @@ Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
 from __future__ import annotations
 
 import asyncio
+import itertools
+import logging
+import math
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.errors import Refusal
+from backbone.rc_manager.messages import StaleEpoch
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import RadioDriver
 from resource_pool.holds import Hold
-from resource_pool.messages import HardwareFault, ImpossibleUse, LoadPacket, PacketLoaded
+from resource_pool.messages import (
+    DEFAULT_DRIVE_USAGE,
+    HardwareFault,
+    ImpossibleUse,
+    LoadPacket,
+    NoTurnSoon,
+    PacketLoaded,
+)
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 from resource_pool.resource_controller import RcParameters, ResourceController
 
+log = logging.getLogger(__name__)
+
+ONCE_WITHIN_S = 0.3  # chosen: a robot RC waits half a second for its packet to be sent; machine seconds
 TRANSMIT_WITHIN_S = 1.0  # chosen: hundreds of packet times; a device that takes none for so long hangs; machine seconds
+
+
+@dataclass(frozen=True, slots=True)
+class _Once:
+    """Somebody waits for this packet to be sent, or for the refusal."""
+
+    arc: str
+    on_air: asyncio.Future[None]
 
 
 class CommandRadio(ResourceController[RcParameters]):
@@ -42,7 +66,10 @@ class CommandRadio(ResourceController[RcParameters]):
         self._air = asyncio.Lock()
         self._air_free_s = 0.0
         self._loaded = asyncio.Event()
+        self._tickets = itertools.count(1)
+        self._waiting: dict[int, _Once] = {}
         self._overruns = self._sent = 0
+        self._worst_packet_s = 0.0
 
     async def connect(self) -> None:
         """Open the device."""
@@ -62,50 +89,92 @@ class CommandRadio(ResourceController[RcParameters]):
     async def connected(self, hold: Hold) -> None:
         """Give the ARC its streams."""
         try:
-            self._schedule.connect(hold.arc, hold.use.streams, hold.rank, self.clock.now_s())
+            self._schedule.connect(hold.arc, hold.use.streams or [DEFAULT_DRIVE_USAGE], hold.rank)
         except ValueError as error:
             raise ImpossibleUse(f"{self.name}: {error}") from None
 
     async def make_safe(self, hold: Hold) -> None:
         """Drop what the ARC loaded; the last its robots hear is the safe packet."""
-        sent, overruns = self._schedule.counts().get(hold.arc, (0, 0))
-        if overruns:
-            self.story.note(hold.arc, f"{overruns} of {sent + overruns} packets came too late to be sent")
-        self._overruns += overruns
+        count = self._schedule.counts().get(hold.arc)
+        if count is not None and count.overruns:
+            self.tell(hold.arc, f"{count.overruns} of its packets on {self.name} were late or lost, {count.sent} sent")
+            self._overruns += count.overruns
         self._owed += self._schedule.disconnect(hold.arc)
+        for waiting in [one for one in self._waiting.values() if one.arc == hold.arc]:
+            self._settle(waiting, StaleEpoch(f"{hold.arc} lost {self.name} before its packet's turn", epoch=hold.epoch))
         async with self._air:
             while self._owed:
                 await self._transmit(self._owed[0])
                 self._owed.popleft()
 
     async def command(self, asked: Envelope[Any]) -> Message:
-        """Load a packet, or send it at once."""
+        """Load a packet, or send it once and soon."""
         order: LoadPacket = asked.body
-        packet = Packet(order.arc, order.network_id, order.payload, order.safe_payload, order.robot_epoch)
+        self.admit(order.arc, order.epoch)
+        now_s = self.clock.now_s()
+        packet = Packet(
+            order.arc,
+            order.network_id,
+            order.payload,
+            order.safe_payload,
+            order.robot_epoch,
+            until_s=now_s + order.lasts_s if order.lasts_s > 0 else math.inf,
+            afterwards=order.afterwards,
+            kind=order.kind,
+        )
         if order.at_once:
-            async with self._air:
-                self.admit(order.arc, order.epoch)  # not earlier: it may lose the radio while the air is busy
-                self._schedule.touch(packet)
-                await self._transmit(Sending(packet, self._schedule.air_time_s(order.arc)))
-                if order.afterwards and self.holds.has(order.arc, order.epoch):
-                    self._load(replace(packet, payload=order.afterwards))
+            await self._send_once(packet)
         else:
-            self.admit(order.arc, order.epoch)
-            if order.lasts_s > 0:
-                packet = replace(packet, until_s=self.clock.now_s() + order.lasts_s, afterwards=order.afterwards)
-            self._load(packet)
+            self._schedule.load(packet, now_s)
+            self._loaded.set()
         return PacketLoaded()
 
     def statistics(self) -> dict[str, float]:
-        """Count packets and overruns, in all and of the ARCs now connected."""
+        """Count packets and overruns, in all and of the ARCs now connected, and measure packet times."""
         counts = self._schedule.counts()
-        late = {f"overruns_{arc}": float(overruns) for arc, (_, overruns) in counts.items()}
-        overruns = self._overruns + sum(overruns for _, overruns in counts.values())
-        return {**super().statistics(), "packets_sent": self._sent, "overruns": overruns, **late}
+        late = {f"overruns_{arc}": float(count.overruns) for arc, count in counts.items()}
+        worst = {f"worst_packet_s_{arc}": count.worst_packet_s for arc, count in counts.items()}
+        return {
+            **super().statistics(),
+            "packets_sent": self._sent,
+            "overruns": self._overruns + sum(count.overruns for count in counts.values()),
+            "worst_packet_s": self._worst_packet_s,
+            **late,
+            **worst,
+        }
 
-    def _load(self, packet: Packet) -> None:
-        self._schedule.load(packet, self.clock.now_s())
+    async def _send_once(self, packet: Packet) -> None:
+        """Return when the packet is on the air.
+
+        Raises:
+            NoTurnSoon: Its stream is too slow; nothing will be sent.
+            StaleEpoch: The ARC lost the radio before the packet's turn: nothing was sent.
+            HardwareFault: It was not sent.
+        """
+        wait_s = self._schedule.next_turn_s(packet.arc, packet.kind, self.clock.now_s()) - self.clock.now_s()
+        if wait_s > ONCE_WITHIN_S * self.clock.rate:
+            raise NoTurnSoon(f"{self.name}: the next turn of {packet.arc} is in {wait_s:.1f} s", wait_s=wait_s)
+        ticket = next(self._tickets)
+        waiting = self._waiting[ticket] = _Once(packet.arc, asyncio.get_running_loop().create_future())
+        self._schedule.send_once(replace(packet, ticket=ticket, until_s=math.inf), self.clock.now_s())
         self._loaded.set()
+        try:
+            await waiting.on_air
+        except StaleEpoch:
+            self.applied -= 1
+            self.refused_stale += 1
+            raise
+        finally:
+            del self._waiting[ticket]
+
+    def _settle(self, waiting: _Once | None, fault: Refusal | None = None) -> None:
+        """Let who waits for the packet know what became of it."""
+        if waiting is None or waiting.on_air.done():
+            return
+        if fault is None:
+            waiting.on_air.set_result(None)
+        else:
+            waiting.on_air.set_exception(fault)
 
     async def _send_when_due(self) -> None:
         while True:
@@ -130,8 +199,17 @@ class CommandRadio(ResourceController[RcParameters]):
         async with self._air:
             await self.clock.sleep_until_s(self._air_free_s)  # before the choice: who joins meanwhile may go first
             sending = self._schedule.take(self.clock.now_s())
-            if sending is not None:
+            if sending is None:
+                return
+            waiting = self._waiting.get(sending.packet.ticket)
+            try:
                 await self._transmit(sending)
+            except HardwareFault as fault:
+                if waiting is None:
+                    raise
+                self._settle(waiting, fault)
+            else:
+                self._settle(waiting)
 
     async def _transmit(self, sending: Sending) -> None:
         """Send the packet as soon as the air is free; the caller holds the air.
@@ -140,13 +218,20 @@ class CommandRadio(ResourceController[RcParameters]):
             HardwareFault: It was not sent.
         """
         await self.clock.sleep_until_s(self._air_free_s)
-        self._air_free_s = self.clock.now_s() + sending.air_time_s
+        begun_s = self.clock.now_s()
+        self._air_free_s = begun_s + sending.air_time_s
         packet = sending.packet
         try:
             async with asyncio.timeout(TRANSMIT_WITHIN_S):
-                await self._driver.transmit(
+                reported_s = await self._driver.transmit(
                     packet.network_id, packet.payload, arc=packet.arc, robot_epoch=packet.robot_epoch
                 )
         except TimeoutError:
             raise HardwareFault(f"{self.name} took no packet within {TRANSMIT_WITHIN_S} s") from None
+        took_s = self.clock.now_s() - begun_s if reported_s is None else reported_s
+        self._air_free_s = max(self._air_free_s, begun_s + took_s)
         self._sent += 1
+        self._worst_packet_s = max(self._worst_packet_s, took_s)
+        for news in self._schedule.sent(sending, begun_s, took_s):
+            log.warning("%s: %s", packet.arc, news)
+            self.tell(packet.arc, f"on {self.name}: {news}")

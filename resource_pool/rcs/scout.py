@@ -113,14 +113,14 @@ class Scout(ResourceController[ScoutParameters]):
             case Jump():
                 # Repeating the last drive or halt would trip the robot or call the jump off.
                 as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
-                await self._load(hold, self._protocol.jump(), at_once=True, afterwards=as_it_is)
+                await self._load(hold, self._protocol.jump(), at_once=True, afterwards=as_it_is, kind="jump")
                 self._stopped(hold)
                 return self._applied(hold, "jump", {})
             case SwitchTransmitter(on=on, frequency=frequency):
                 packet = self._protocol.transmitter(on, frequency)
                 self._frequency = frequency if on else ""
                 still = self._protocol.halt()  # repeated, so that the robot hears it is not forgotten
-                await self._load(hold, packet, at_once=True, afterwards=still)
+                await self._load(hold, packet, at_once=True, afterwards=still, kind="transmitter")
                 return self._applied(hold, "transmitter", {"on": float(on)})
 
     def statistics(self) -> dict[str, float]:
@@ -133,7 +133,14 @@ class Scout(ResourceController[ScoutParameters]):
             self._halt_at_s = None
 
     async def _load(
-        self, hold: Hold, payload: bytes, *, at_once: bool = False, afterwards: bytes = b"", lasts_s: float = 0.0
+        self,
+        hold: Hold,
+        payload: bytes,
+        *,
+        at_once: bool = False,
+        afterwards: bytes = b"",
+        lasts_s: float = 0.0,
+        kind: str = "drive",
     ) -> None:
         epoch = hold.companions.get(self._radio)
         if epoch is None:
@@ -148,6 +155,7 @@ class Scout(ResourceController[ScoutParameters]):
             at_once,
             afterwards,
             lasts_s,
+            kind,
         )
         radio = address(Subsystem.RESOURCE_POOL, self._radio)
         await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)

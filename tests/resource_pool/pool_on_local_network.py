@@ -18,6 +18,7 @@ from backbone.component.launch import Launch
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import PathNode
 from backbone.rc_manager.service import RcManager
 from backbone.wire import Envelope, Message
@@ -92,19 +93,21 @@ class WiretappedRadio(SimulatedRadio):
         self.clock = site.clock
         self.heard: list[OnAir] = []
         self.breaks = self.hangs = False
+        self.slow_s: float | None = None
         self.opened = self.closed = 0
         self.built.append(self)
 
     async def open(self) -> None:
         self.opened += 1
 
-    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
+    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> float | None:
         if self.breaks:
             raise HardwareFault("the antenna fell off")
         if self.hangs:
             await asyncio.Event().wait()
         self.heard.append(OnAir(self.clock.now_s(), network_id, payload, arc, robot_epoch))
-        await super().transmit(network_id, payload, arc=arc, robot_epoch=robot_epoch)
+        took_s = await super().transmit(network_id, payload, arc=arc, robot_epoch=robot_epoch)
+        return took_s if self.slow_s is None else self.slow_s
 
     async def close(self) -> None:
         self.closed += 1
@@ -192,6 +195,7 @@ class Pool:
     hardware: list[Resource]
     running: dict[str, Component[Any]] = field(default_factory=dict)
     lives: dict[str, asyncio.Task[None]] = field(default_factory=dict)
+    voices: dict[str, Bus] = field(default_factory=dict)
 
     @property
     def radio_driver(self) -> WiretappedRadio:
@@ -283,6 +287,21 @@ class Pool:
     def ear(self) -> Bus:
         return self.running["world"].bus
 
+    def voice(self, speaker: str) -> Bus:
+        """Return a bus on which the test speaks as this component of the resource pool."""
+        return self.voice_of(address(Subsystem.RESOURCE_POOL, speaker))
+
+    @property
+    def manager_voice(self) -> Bus:
+        """A bus on which the test speaks as the RC manager."""
+        return self.voice_of(RC_MANAGER)
+
+    def voice_of(self, source: str) -> Bus:
+        """Return a bus on which the test speaks as this component."""
+        if source not in self.voices:
+            self.voices[source] = self.network.join(source, self.clock)
+        return self.voices[source]
+
     @property
     def audit(self) -> dict[str, float]:
         return self.running["world"].statistics()
@@ -291,6 +310,8 @@ class Pool:
         for name in list(reversed(self.lives)):
             if name in self.lives:
                 await self.end(name)
+        for voice in self.voices.values():
+            await voice.close()
 
 
 @asynccontextmanager
