@@ -2,6 +2,9 @@
 
 Deliveries are separate steps of the event loop in the order in which they were said, so on a
 ``VirtualLoop`` the same program gives the same run.
+
+``LocalBus`` is a whole bus, for missions that live in one process. What neighbors in one process hand
+over to each other is the same for ``shared_bus``, whose members speak with other processes too.
 """
 
 from __future__ import annotations
@@ -25,10 +28,10 @@ class LocalNetwork:
 
     def __init__(self, mission: str = "local") -> None:
         self.mission = mission
-        self.servers: dict[str, _Server] = {}
-        self.listeners: list[_Listening] = []
-        self.tokens: dict[str, list[_Declared]] = {}
-        self.watchers: list[_Watching] = []
+        self.servers: dict[str, Serving] = {}
+        self.listeners: list[Listening] = []
+        self.tokens: dict[str, list[Declared]] = {}
+        self.watchers: list[Watching] = []
 
     def join(self, source: str, clock: Clock) -> LocalBus:
         """Return a new bus on this network that speaks as ``source``."""
@@ -47,31 +50,121 @@ class LocalNetwork:
         answering = server.owner.start(_answer(server, asked))
         answering.add_done_callback(lambda task: answered(_outcome(task)))
 
-    def carry_publication(self, listening: _Listening, address: str, envelope: Envelope[Any]) -> None:
+    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
         """Hand a publication to one of those who listen."""
         listening.deliver(address, envelope)
 
-    def carry_life(self, watching: _Watching, address: str, alive: bool) -> None:
+    def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
         """Tell one of those who watch that a token rose or fell."""
         watching.tell(address, alive)
 
 
-class _Declared:
-    """Something one bus declared; closing it takes it out of the network."""
+class Neighbor(Speaker):
+    """A speaker whose neighbors in this process are handed what it says, and hand it what they say.
 
-    def __init__(self, owner: LocalBus, take_back: Callable[[], None]) -> None:
+    Attributes:
+        network: Where its neighbors are.
+        declared: What it declared there.
+    """
+
+    network: LocalNetwork
+    declared: list[Declared]
+
+    async def ask_neighbor(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
+        """Ask whoever serves the address in this process; see ``Bus.ask``."""
+        answered = self.open_question()
+        self.asked += 1
+        asked = self.envelope(question)
+        try:
+            async with asyncio.timeout(within_s):
+                await asyncio.sleep(0)
+                self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
+                envelope = await answered
+        except TimeoutError:
+            raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
+        finally:
+            self.end_question(answered)
+        if envelope is None:
+            raise NoResponder(f"{address} died before it answered {type(question).__name__}")
+        if isinstance(envelope.body, Refused):
+            raise envelope.body.revive()
+        if not isinstance(envelope.body, reply):
+            self.unreadable += 1
+            raise MalformedMessage(f"{address} answered {type(envelope.body).__name__}, not {reply.__name__}")
+        return envelope.body
+
+    def tell_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Any]) -> None:
+        """Hand what was published to every listener in this process."""
+        for listening in self.network.listeners:
+            if listening.conversation == conversation and _matches(listening.pattern, address):
+                self.network.carry_publication(listening, address, envelope)
+
+    def serve_neighbors(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
+        """Answer questions asked in this process; of several who serve an address the latest is asked."""
+        serving = self.network.servers[address] = Serving(self, address, accepts, answer)
+        return serving
+
+    def hear_neighbors(
+        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool
+    ) -> Listening:
+        """Hear publications made in this process."""
+        listening = Listening(self, address, conversation, accepts, listener, latest)
+        self.network.listeners.append(listening)
+        return listening
+
+    def show_neighbors(self, address: str) -> Declared:
+        """Raise a token in this process."""
+        tokens = self.network.tokens.setdefault(address, [])
+
+        def fall() -> None:
+            tokens.remove(token)
+            if not tokens:
+                self._tell_watchers(address, alive=False)
+
+        token = Declared(self, fall)
+        tokens.append(token)
+        if len(tokens) == 1:
+            self._tell_watchers(address, alive=True)
+        return token
+
+    def watch_neighbors(self, address: str, listener: LifeListener) -> Watching:
+        """Watch the tokens of this process."""
+        watching = Watching(self, address, listener)
+        self.network.watchers.append(watching)
+        for standing, tokens in self.network.tokens.items():
+            if tokens:
+                self.network.carry_life(watching, standing, alive=True)
+        return watching
+
+    def take_back_from_neighbors(self) -> None:
+        """Take back everything declared in this process."""
+        for declared in list(self.declared):
+            declared.close()
+
+    def _tell_watchers(self, address: str, *, alive: bool) -> None:
+        for watching in list(self.network.watchers):
+            self.network.carry_life(watching, address, alive)
+
+
+class Declared:
+    """Something one speaker declared; closing it takes it out of the network."""
+
+    def __init__(self, owner: Neighbor, take_back: Callable[[], None]) -> None:
         self.owner, self._take_back, self.closed = owner, take_back, False
         owner.declared.append(self)
 
     def close(self) -> None:
+        """Take it back."""
         if not self.closed:
             self.closed = True
             self.owner.declared.remove(self)
             self._take_back()
 
 
-class _Server(_Declared):
-    def __init__(self, owner: LocalBus, address: str, accepts: Accepted, answer: Answer) -> None:
+class Serving(Declared):
+    """Somebody who answers at an address."""
+
+    def __init__(self, owner: Neighbor, address: str, accepts: Accepted, answer: Answer) -> None:
         super().__init__(owner, lambda: self._leave(owner.network, address))
         self.kinds, self.answer = kinds_of(accepts), answer
 
@@ -80,10 +173,12 @@ class _Server(_Declared):
             del network.servers[address]
 
 
-class _Listening(_Declared):
+class Listening(Declared):
+    """Somebody who hears a conversation."""
+
     def __init__(
         self,
-        owner: LocalBus,
+        owner: Neighbor,
         pattern: str,
         conversation: Conversation,
         accepts: Accepted,
@@ -96,6 +191,7 @@ class _Listening(_Declared):
         self.newest: dict[str, Envelope[Any]] = {}
 
     def deliver(self, address: str, envelope: Envelope[Any]) -> None:
+        """Hand it over in a step of its own."""
         loop = asyncio.get_running_loop()
         if not self.latest:
             loop.call_soon(self._hand_over, envelope)
@@ -118,12 +214,15 @@ class _Listening(_Declared):
             self.owner.unreadable += 1
 
 
-class _Watching(_Declared):
-    def __init__(self, owner: LocalBus, pattern: str, listener: LifeListener) -> None:
+class Watching(Declared):
+    """Somebody who watches tokens."""
+
+    def __init__(self, owner: Neighbor, pattern: str, listener: LifeListener) -> None:
         super().__init__(owner, lambda: owner.network.watchers.remove(self))
         self.pattern, self.listener = pattern, listener
 
     def tell(self, address: str, alive: bool) -> None:
+        """Tell the listener in a step of its own, if it asked about this address."""
         if _matches(self.pattern, address):
             asyncio.get_running_loop().call_soon(self._hand_over, address, alive)
 
@@ -132,45 +231,24 @@ class _Watching(_Declared):
             self.owner.call("", self.listener, address, alive)
 
 
-class LocalBus(Speaker):
+class LocalBus(Neighbor):
     """One component's voice and ears on a ``LocalNetwork``."""
 
     def __init__(self, network: LocalNetwork, source: str, clock: Clock) -> None:
         super().__init__(network.mission, source, clock)
         self.network = network
-        self.declared: list[_Declared] = []
+        self.declared = []
 
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer; see ``Bus.ask``."""
         _check(self.mission, address)
-        answered = self.open_question()
-        self.asked += 1
-        asked = self.envelope(question)
-        try:
-            async with asyncio.timeout(within_s):
-                await asyncio.sleep(0)
-                self.network.carry_question(address, asked, lambda outcome: settle(answered, outcome))
-                envelope = await answered
-        except TimeoutError:
-            raise ReplyTimeout(f"{address} did not answer {type(question).__name__} within {within_s:g} s") from None
-        finally:
-            self.end_question(answered)
-        if envelope is None:
-            raise NoResponder(f"{address} died before it answered {type(question).__name__}")
-        if isinstance(envelope.body, Refused):
-            raise envelope.body.revive()
-        if not isinstance(envelope.body, reply):
-            self.unreadable += 1
-            raise MalformedMessage(f"{address} answered {type(envelope.body).__name__}, not {reply.__name__}")
-        return envelope.body
+        return await self.ask_neighbor(address, question, reply, within_s=within_s)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> _Server:
+    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
         """Answer questions asked of this address; see ``Bus.serve``."""
         self.require_open()
         _check(self.mission, address)
-        server = _Server(self, address, accepts, answer)
-        self.network.servers[address] = server
-        return server
+        return self.serve_neighbors(address, accepts, answer)
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Hand the message to whoever subscribed; see ``Bus.publish``."""
@@ -178,53 +256,32 @@ class LocalBus(Speaker):
             return
         _check(self.mission, address)
         self.published += 1
-        envelope = self.envelope(message)
-        for listening in self.network.listeners:
-            if listening.conversation == conversation and _matches(listening.pattern, address):
-                self.network.carry_publication(listening, address, envelope)
+        self.tell_neighbors(address, conversation, self.envelope(message))
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
-    ) -> _Listening:
+    ) -> Listening:
         """Hear publications; see ``Bus.subscribe``."""
         self.require_open()
         _check(self.mission, address)
-        listening = _Listening(self, address, conversation, accepts, listener, latest)
-        self.network.listeners.append(listening)
-        return listening
+        return self.hear_neighbors(address, conversation, accepts, listener, latest=latest)
 
-    def declare_alive(self, address: str) -> _Declared:
+    def declare_alive(self, address: str) -> Declared:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         _check(self.mission, address)
-        tokens = self.network.tokens.setdefault(address, [])
+        return self.show_neighbors(address)
 
-        def fall() -> None:
-            tokens.remove(token)
-            if not tokens:
-                self._tell_watchers(address, alive=False)
-
-        token = _Declared(self, fall)
-        tokens.append(token)
-        if len(tokens) == 1:
-            self._tell_watchers(address, alive=True)
-        return token
-
-    def watch_alive(self, address: str, listener: LifeListener) -> _Watching:
+    def watch_alive(self, address: str, listener: LifeListener) -> Watching:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
         self.require_open()
         _check(self.mission, address)
-        watching = _Watching(self, address, listener)
-        self.network.watchers.append(watching)
-        for standing, tokens in self.network.tokens.items():
-            if tokens:
-                self.network.carry_life(watching, standing, alive=True)
-        return watching
+        return self.watch_neighbors(address, listener)
 
-    def watch_link(self, listener: LinkListener) -> _Declared:
+    def watch_link(self, listener: LinkListener) -> Declared:
         """Report the link, which inside one process is up for good."""
         self.require_open()
-        watching = _Declared(self, lambda: None)
+        watching = Declared(self, lambda: None)
 
         def hand_over() -> None:
             if not watching.closed:
@@ -235,18 +292,13 @@ class LocalBus(Speaker):
 
     def take_back(self) -> None:
         """Take back everything declared."""
-        for declared in list(self.declared):
-            declared.close()
+        self.take_back_from_neighbors()
 
     async def leave(self) -> None:
         """Leave the network, of which nothing is held any more."""
 
-    def _tell_watchers(self, address: str, *, alive: bool) -> None:
-        for watching in list(self.network.watchers):
-            self.network.carry_life(watching, address, alive)
 
-
-async def _answer(server: _Server, asked: Envelope[Any]) -> Envelope[Any] | None:
+async def _answer(server: Serving, asked: Envelope[Any]) -> Envelope[Any] | None:
     if isinstance(asked.body, server.kinds):
         return await server.owner.reply_to(asked, server.answer)
     server.owner.unreadable += 1

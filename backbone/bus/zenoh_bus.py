@@ -21,11 +21,20 @@ from typing import Any, cast
 
 import zenoh
 
-from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
+from backbone.bus.interface import (
+    Accepted,
+    Answer,
+    Clock,
+    LifeListener,
+    LinkListener,
+    Listener,
+    Reply,
+    Subscription,
+)
 from backbone.bus.speaker import Speaker, settle
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
-from backbone.wire import MalformedMessage, Message, OversizedMessage, Reader, Refused, write
+from backbone.wire import Envelope, MalformedMessage, Message, OversizedMessage, Reader, Refused, write
 
 log = logging.getLogger(__name__)
 
@@ -105,15 +114,46 @@ def _is_hub(config: zenoh.Config) -> bool:
     return bool(json.loads(config.get_json("mode")) == "router")
 
 
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Return a new session.
+
+    Raises:
+        HubUnreachable: Nobody listens where the settings say, or (for a hub) the port is taken.
+    """
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise HubUnreachable(str(error)) from error
+
+
+async def close_session(session: zenoh.Session) -> None:
+    """Close the session; return when its threads have ended."""
+    await asyncio.get_running_loop().run_in_executor(None, session.close)
+
+
 class ZenohBus(Speaker):
-    """One component's voice and ears on a Zenoh session. Open it inside a running event loop."""
+    """One component's voice and ears on a Zenoh session. Open it inside a running event loop.
+
+    Args:
+        session: Closed with the bus, unless it is ``shared``.
+        is_hub: Whether the session is the hub itself.
+        shared: Whether other buses of this process speak over the session too. What is published here then
+            reaches other processes only.
+    """
 
     def __init__(
-        self, mission: str, source: str, clock: Clock, session: zenoh.Session, *, is_hub: bool = False
+        self,
+        mission: str,
+        source: str,
+        clock: Clock,
+        session: zenoh.Session,
+        *,
+        is_hub: bool = False,
+        shared: bool = False,
     ) -> None:
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
-        self._session, self._is_hub = session, is_hub
+        self._session, self._is_hub, self._shared = session, is_hub, shared
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()
@@ -126,11 +166,7 @@ class ZenohBus(Speaker):
         Raises:
             HubUnreachable: Nobody listens where the settings say, or (for a hub) the port is taken.
         """
-        try:
-            session = zenoh.open(config)
-        except zenoh.ZError as error:
-            raise HubUnreachable(str(error)) from error
-        return cls(mission, source, clock, session, is_hub=_is_hub(config))
+        return cls(mission, source, clock, open_session(config), is_hub=_is_hub(config))
 
     @classmethod
     async def open_when_up(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -200,7 +236,7 @@ class ZenohBus(Speaker):
             raise body.revive()
         return cast("Reply", body)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> _Declared:
+    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
         """Answer questions asked of this address; see ``Bus.serve``."""
         self.require_open()
         reader = _reader(accepts)
@@ -236,11 +272,16 @@ class ZenohBus(Speaker):
     # ------------------------------------------------------------------ publications
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
         """Hand the message to whoever subscribed; see ``Bus.publish``."""
-        if self.closed:
-            return
+        if not self.closed:
+            self.send(address, conversation, message)
+
+    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
+        """Publish over the session and return what was said, in its envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
         self.published += 1
-        publisher.put(write(self.envelope(message)))
+        envelope = self.envelope(message)
+        publisher.put(write(envelope))
+        return envelope
 
     def _declare_publisher(self, address: str, conversation: Conversation) -> zenoh.Publisher:
         priority, congestion_control = _QUALITY.get(conversation, _REPEATED)
@@ -248,12 +289,13 @@ class ZenohBus(Speaker):
             key(self._mission, address, conversation),
             priority=priority,
             congestion_control=congestion_control,
+            allowed_destination=zenoh.Locality.REMOTE if self._shared else zenoh.Locality.ANY,
         )
         return publisher
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
-    ) -> _Declared:
+    ) -> Subscription:
         """Hear publications; see ``Bus.subscribe``."""
         self.require_open()
         pattern = key(self._mission, address, conversation)
@@ -261,13 +303,32 @@ class ZenohBus(Speaker):
         return self._declare(self._session.declare_subscriber(pattern, receive))
 
     # ------------------------------------------------------------------ life
-    def declare_alive(self, address: str) -> _Declared:
+    def declare_alive(self, address: str) -> Subscription:
         """Raise this component's liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         own = key(self._mission, address, Conversation.ALIVE)
         return self._declare(self._session.liveliness().declare_token(own))
 
-    def watch_alive(self, address: str, listener: LifeListener) -> _Declared:
+    async def stands(self, address: str) -> bool:
+        """Say whether the hub knows of a token at this address; without a hub it does not.
+
+        Raises:
+            NoResponder: The bus is closed already.
+        """
+        answered = self.open_question()
+        arrived = _Arrived(self, answered)
+        try:
+            self._session.liveliness().get(
+                key(self._mission, address, Conversation.ALIVE),
+                zenoh.handlers.Callback(arrived.reply, arrived.end, indirect=False),
+                timeout=LINK_LEASE_MS / 1000,
+            )
+            got = await answered
+        finally:
+            self.end_question(answered)
+        return got is not None and got.ok is not None
+
+    def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
         self.require_open()
 
@@ -311,9 +372,14 @@ class ZenohBus(Speaker):
             declared.close()
 
     async def leave(self) -> None:
-        """Close the session; return when its threads have ended."""
+        """Leave the session, which is closed unless others speak over it; return when its threads have ended."""
         self._inbox.clear()  # questions not yet begun: their askers hear that nobody answered
-        await self._loop.run_in_executor(None, self._session.close)
+        if not self._shared:
+            await close_session(self._session)
+            return
+        for publisher in self._publishers.values():
+            publisher.undeclare()  # type: ignore[no-untyped-call]
+        self._publishers.clear()
 
     # ------------------------------------------------------------------ from zenoh's threads into the loop
     def push(self, act: Callable[[Any], None], what: Any) -> None:

@@ -1,7 +1,8 @@
-"""One suite for both buses: what holds on one holds on the other.
+"""One suite for all buses: what holds on one holds on the others.
 
-The local bus runs in virtual time; the Zenoh bus runs over a real hub on the loopback interface, with
-a session for each component.
+The local bus runs in virtual time; the others run over a real hub on the loopback interface: the Zenoh
+bus with a session for each component, the shared bus with one session for all of them (neighbors), and
+with two sessions that take the components in turn (neighbors and strangers).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import uvloop
 from backbone.bus.clock import MissionClock, VirtualClock, VirtualLoop
 from backbone.bus.interface import Bus, BusStatistics, Clock, current_cause
 from backbone.bus.local_bus import LocalNetwork
+from backbone.bus.shared_bus import SharedSession
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.errors import NoResponder, Refusal, ReplyTimeout, UnknownRefusal
 from backbone.keys import Conversation
@@ -84,9 +86,9 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-@pytest.fixture(params=["local", "zenoh"])
+@pytest.fixture(params=["local", "zenoh", "shared", "shared by turns"])
 def on_bus(request: pytest.FixtureRequest) -> Runner:
-    """Return what runs a law on one of the two buses."""
+    """Return what runs a law on one of the buses."""
 
     async def on_local(law: Law) -> None:
         network = LocalNetwork("conformance")
@@ -102,10 +104,30 @@ def on_bus(request: pytest.FixtureRequest) -> Runner:
         finally:
             await hub.close()
 
+    async def on_shared(law: Law, processes: int) -> None:
+        endpoint = f"tcp/127.0.0.1:{free_port()}"
+        clock = MissionClock.started_now()
+        hub = ZenohBus.open("conformance", "backbone/hub", clock, hub_config([endpoint]))
+        sessions = [SharedSession("conformance", endpoint) for _ in range(processes)]
+        turns = itertools.cycle(sessions)
+        try:
+            await run_and_close(law, Net(lambda source, own: next(turns).join(source, own), clock))
+        finally:
+            for session in sessions:
+                await session.close()
+            await hub.close()
+
+    runs: dict[str, Any] = {
+        "local": on_local,
+        "zenoh": on_zenoh,
+        "shared": lambda law: on_shared(law, 1),
+        "shared by turns": lambda law: on_shared(law, 2),
+    }
+
     def run(law: Law) -> None:
         local = request.param == "local"
         with asyncio.Runner(loop_factory=VirtualLoop if local else uvloop.new_event_loop) as runner:
-            runner.run((on_local if local else on_zenoh)(law))
+            runner.run(runs[request.param](law))
 
     return run
 
