@@ -54,15 +54,14 @@ def choose(table: MasterSchedule, request: SchedulingRequest) -> tuple[str, ...]
 def _reluctance(table: MasterSchedule, arc: str, wish: Wish) -> tuple[bool, int, int, int]:
     """Return the key of a choice: smaller is better; equal ones are taken in the request's order."""
     present = table.arcs.get(arc)
-    others = [other for other in table.arcs.values() if other.name != arc]
     rcs = [table.rcs[rc] for rc in wish]
     return (
         present is None or present.uses.keys() != wish.keys(),
         sum(rc.failed for rc in rcs),
         sum(
-            rc in other.uses and not (use.streams and other.uses[rc].streams)
+            rc in other.uses and other.name != arc and not (use.streams and other.uses[rc].streams)
             for rc, use in wish.items()
-            for other in others
+            for other in table.arcs.values()
         ),
         sum(not rc.up for rc in rcs),
     )
@@ -80,9 +79,7 @@ def _overloaded_alone(table: MasterSchedule, wish: Wish) -> str | None:
 def _overload(table: MasterSchedule, arc: str, wish: Wish, rc: str) -> CapacityExceeded:
     demanded = _share(wish[rc].streams)
     capacity = table.rcs[rc].capacity
-    used = sum(
-        _share(other.uses[rc].streams) for other in table.arcs.values() if other.state in CONNECTED and rc in other.uses
-    )
+    used = sum(_share(other.uses[rc].streams) for other in table.rcs[rc].holders if other.state in CONNECTED)
     reason = "more than it can ever give" if demanded > capacity else "and not every packet can be in time"
     return CapacityExceeded(
         f"{arc} demands {demanded:.1%} of {rc}, {reason}: capacity {capacity:.1%}, {used:.1%} used now",

@@ -59,7 +59,7 @@ class Explanation:
     def schedule(self, now_s: float) -> Schedule:
         """Return the whole schedule."""
         groups = self._table.groups()
-        slots = {slot.arc.name: slot for group in groups for slot in self._table.plan(group, now_s)}
+        slots = {slot.arc.name: slot for group in groups for slot in self._table.slots(group, now_s)}
         arcs = list(self._table.arcs.values())
         return Schedule(
             at_s=now_s,
@@ -245,8 +245,7 @@ class Explanation:
                 return "wants no time"
 
     def _slots_beside(self, arc: ArcEntry, now_s: float) -> list[Slot]:
-        group = next((group for group in self._table.groups() if arc in group), [])
-        return self._table.plan(group, now_s)
+        return self._table.slots(self._table.group_of(arc), now_s)
 
     def _expected_s(self, arc: ArcEntry, slot: Slot | None) -> float:
         """Return when the next grant is predicted; negative: it has one, or none can be predicted."""

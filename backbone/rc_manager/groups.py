@@ -4,12 +4,19 @@ A group is a connected component of active ARCs that share any RC, sharable ones
 couples them, and not pairwise (of three ARCs of 0.4 any two fit, three do not). Groups run in
 parallel and never change each other's times.
 
+``groups`` says what they are; ``Groups`` keeps them up to date while ARCs come and go.
+
 Source: RAM 2002, "ARCs that ask for independent sets of RCs are put into different groups".
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Hashable, Mapping
+from typing import Generic, TypeVar
+
+A = TypeVar("A", bound=Hashable)
+
+SPLIT_SHARE = 8  # chosen: looking through a big group costs each of the ARCs that leave it a few steps
 
 
 def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
@@ -47,3 +54,99 @@ def groups(uses: Mapping[str, Collection[str]]) -> list[list[str]]:
     for arc in uses:
         found[group_of[arc]].append(arc)
     return found
+
+
+class Group(Generic[A]):
+    """ARCs that share RCs; a big one may fall apart a while before that is noticed."""
+
+    __slots__ = ("_left", "arcs")
+
+    def __init__(self, arcs: dict[A, None]) -> None:
+        self.arcs = arcs
+        self._left = 0
+
+    def __len__(self) -> int:
+        return len(self.arcs)
+
+    def leave(self, arc: A) -> int:
+        """Take the ARC out; return how many have left since the group was known to be one."""
+        del self.arcs[arc]
+        self._left += 1
+        return self._left
+
+
+class Groups(Generic[A]):
+    """The groups of the ARCs that are there now.
+
+    Args:
+        exact_up_to: Groups of at most this size are always exactly one group; bigger ones may be
+            several taken together until an eighth of their ARCs have left.
+    """
+
+    def __init__(self, exact_up_to: int) -> None:
+        self._exact_up_to = exact_up_to
+        self._uses: dict[A, Collection[str]] = {}
+        self._users: dict[str, dict[A, None]] = {}
+        self._of: dict[A, Group[A]] = {}
+
+    def __contains__(self, arc: A) -> bool:
+        return arc in self._of
+
+    def of(self, arc: A) -> Group[A]:
+        """Return the group of an ARC that is there."""
+        return self._of[arc]
+
+    def users(self, rc: str) -> Collection[A]:
+        """Return the ARCs that use the RC, in the order in which they came."""
+        return self._users.get(rc, {})
+
+    def all(self) -> list[Group[A]]:
+        """Return all groups, that of the ARC that came first first."""
+        return list(dict.fromkeys(self._of.values()))
+
+    def add(self, arc: A, rcs: Collection[str]) -> None:
+        """Let the ARC come; it joins the groups of all who use its RCs."""
+        self._uses[arc] = rcs
+        joined = Group({arc: None})
+        for rc in rcs:
+            users = self._users.setdefault(rc, {})
+            if users:
+                joined = self._join(joined, self._of[next(iter(users))])
+            users[arc] = None
+        joined.arcs[arc] = None
+        self._of[arc] = joined
+
+    def remove(self, arc: A) -> None:
+        """Let the ARC go; its group may fall apart."""
+        for rc in self._uses.pop(arc):
+            del self._users[rc][arc]
+        group = self._of.pop(arc)
+        left = group.leave(arc)
+        if len(group) <= self._exact_up_to or left * SPLIT_SHARE > len(group):
+            self._split(group)
+
+    def _join(self, one: Group[A], other: Group[A]) -> Group[A]:
+        if one is other:
+            return one
+        small, big = sorted((one, other), key=len)
+        big.arcs.update(small.arcs)
+        for arc in small.arcs:
+            self._of[arc] = big
+        return big
+
+    def _split(self, group: Group[A]) -> None:
+        rest = dict(group.arcs)
+        while rest:
+            reached = [next(iter(rest))]
+            part = Group({reached[0]: rest.pop(reached[0])})
+            looked: set[str] = set()
+            while reached:
+                for rc in self._uses[reached.pop()]:
+                    if rc not in looked:
+                        looked.add(rc)
+                        new = [user for user in self._users[rc] if user in rest]
+                        for user in new:
+                            part.arcs[user] = rest.pop(user)
+                        reached += new
+            for arc in part.arcs:
+                self._of[arc] = part

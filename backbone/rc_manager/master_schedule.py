@@ -4,6 +4,11 @@ Nothing here changes who holds what; the schedule manager does. Here is the *pla
 through the waiting ARCs in order and give each the earliest start at which it fits for its whole
 settling and minimum run time, without taking anything from those before it.
 
+A decision looks only at groups in which something has happened since the last one. A group of up to
+``exact_up_to`` ARCs is planned whole. In a bigger one an ARC is looked at beside those it shares RCs
+with: it lets everybody before it in order go first who may start, as far as the present holders
+tell, before it would have done. That takes nothing from anybody either, but leaves some gaps unused.
+
 Rules of this file (numbers as in docs and ``why``):
 
 * 1  All or nothing; one holder of an exclusive RC; every stream of every holder meets its deadline.
@@ -17,19 +22,23 @@ Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
 
 from __future__ import annotations
 
+import heapq
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from backbone.rc_manager.groups import groups
+from backbone.rc_manager.groups import Group, Groups
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
-from backbone.rc_manager.priority import Path, by_precedence, higher
+from backbone.rc_manager.priority import Path, by_precedence, higher, rank
 from backbone.rc_manager.radio_admission import admissible, stream
 
 INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the rounding of sums of times
 SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, but is not free yet
+
+EXACT_UP_TO = 64  # chosen: such a group is planned in a few milliseconds
 
 HOLDING = frozenset({RequestState.CONNECTING, RequestState.RUNNING, RequestState.REVOKING})
 CONNECTED = frozenset({RequestState.CONNECTING, RequestState.RUNNING})
@@ -50,6 +59,7 @@ class RcEntry:
         epoch: Largest epoch given so far, at the beginning of settling.
         granted_epoch: Largest epoch of a grant so far.
         failed: True if it went down; False if it only was not started yet.
+        holders: ARCs that hold it, settling or not yet free of it, in the order in which they got it.
     """
 
     name: str
@@ -62,6 +72,7 @@ class RcEntry:
     epoch: int
     granted_epoch: int = 0
     failed: bool = False
+    holders: dict[ArcEntry, None] = field(default_factory=dict)
 
 
 class Afterwards(Enum):
@@ -86,6 +97,9 @@ class ArcEntry:
         maximum_s: End of all extensions, counted from the grant.
         settle_s: Longest settling time of its RCs.
         release_s: Longest release time of its RCs.
+        touches: The RCs it uses, as a set of bits.
+        excludes: Those of them it uses exclusively.
+        shares: Names of those it uses by streams.
         stamp: When it became active or was last served, and which of several at that time it was.
         pledge: Set while RCs are being freed by force for it: it comes before all equals; smaller is earlier.
         state: Where it is.
@@ -94,6 +108,7 @@ class ArcEntry:
         end_s: End of its slice, while it runs.
         granted_s: When it was granted, while it runs.
         epochs: RC → epoch, while it holds them.
+        awaited: Somebody waited for the end of its slice when last looked.
         afterwards: What becomes of it once free, while it is being revoked.
         retry_s: When it asks again after it could not open; None: only when told.
         turns: Grants so far.
@@ -110,6 +125,9 @@ class ArcEntry:
     settle_s: float
     release_s: float
     since_s: float
+    touches: int
+    excludes: int
+    shares: tuple[str, ...]
     stamp: tuple[float, int] = (0.0, 0)
     pledge: int | None = None
     state: RequestState = RequestState.IDLE
@@ -117,6 +135,7 @@ class ArcEntry:
     end_s: float = 0.0
     granted_s: float = 0.0
     epochs: dict[str, int] = field(default_factory=dict)
+    awaited: bool = False
     afterwards: Afterwards = Afterwards.WAIT
     retry_s: float | None = None
     turns: int = 0
@@ -160,16 +179,8 @@ class ArcEntry:
         return self.state is RequestState.RUNNING and now_s >= self.end_s - INSTANT_S
 
 
-class Hold(NamedTuple):
-    """From when to when somebody stands in the way, as one other ARC sees it."""
-
-    arc: ArcEntry
-    start_s: float
-    end_s: float
-
-    def covers(self, moment_s: float) -> bool:
-        """Say whether it is there at this time."""
-        return self.start_s <= moment_s + INSTANT_S and self.end_s > moment_s + INSTANT_S
+Hold = tuple["ArcEntry", float, float]
+"""Who stands in the way as one other ARC sees it, from when (minus infinity: it holds its RCs) and until when."""
 
 
 class Slot(NamedTuple):
@@ -178,7 +189,7 @@ class Slot(NamedTuple):
     Attributes:
         arc: The ARC.
         start_s: When its RCs begin to settle; infinite: never, as things are.
-        against: What stood in its way when the place was found.
+        against: Who shares an RC with it and stands in its way for a time.
     """
 
     arc: ArcEntry
@@ -206,68 +217,190 @@ class MasterSchedule:
         arcs: All ARCs that asked, by name, in the order of their requests.
     """
 
-    def __init__(self, *, tolerance_s: float, strict: bool) -> None:
+    def __init__(self, *, tolerance_s: float, strict: bool, exact_up_to: int = EXACT_UP_TO) -> None:
         """Begin empty.
 
         Args:
             tolerance_s: By how much two reservations may overlap. Hand-over takes time: without it an
                 ARC never fits a gap that is exactly as long as its slice.
             strict: No ARC starts while a higher usable one of its group waits.
+            exact_up_to: Groups of at most this size are planned whole.
         """
         self.rcs: dict[str, RcEntry] = {}
         self.arcs: dict[str, ArcEntry] = {}
         self._slack_s = tolerance_s
         self._strict = strict
-        self._admitted: dict[tuple[str, frozenset[str]], bool] = {}
+        self._exact_up_to = exact_up_to
+        self._groups: Groups[ArcEntry] = Groups(exact_up_to)
+        self._bits: dict[str, int] = {}
+        self._touched: dict[ArcEntry, None] = {}
+        self._ends: list[tuple[float, int, ArcEntry]] = []
+        self._serial = itertools.count()
+        self._admitted: dict[str, dict[frozenset[ArcEntry], bool]] = {}
         self._roomy: dict[str, bool] = {}
 
-    def demand_changed(self) -> None:
-        """Forget what was worked out about sharable RCs: other ARCs, capacities or priorities count now."""
-        self._admitted.clear()
-        self._roomy.clear()
+    # Who is there, and what changed.
+
+    def add_rc(self, rc: RcEntry) -> None:
+        """Take in an RC."""
+        self._bits[rc.name] = 1 << len(self._bits)
+        self.rcs[rc.name] = rc
+
+    def make_arc(
+        self, request: SchedulingRequest, uses: Mapping[str, RcUse], place: tuple[str, ...], path: Path, now_s: float
+    ) -> ArcEntry:
+        """Take in an ARC, idle, and return its entry; all RCs of ``uses`` are known."""
+        rcs = [self.rcs[rc] for rc in uses]
+        shares = tuple(rc.name for rc in rcs if rc.sharable and uses[rc.name].streams)
+        arc = ArcEntry(
+            request=request,
+            uses=uses,
+            place_in_tree=place,
+            path=path,
+            minimum_s=request.minimum_runtime_s,
+            maximum_s=max(request.minimum_runtime_s, request.maximum_runtime_s),
+            settle_s=max((rc.connect_s for rc in rcs), default=0.0),
+            release_s=max((rc.disconnect_s for rc in rcs), default=0.0),
+            since_s=now_s,
+            touches=sum(self._bits[rc.name] for rc in rcs),
+            excludes=sum(self._bits[rc.name] for rc in rcs if rc.name not in shares),
+            shares=shares,
+        )
+        self.arcs[arc.name] = arc
+        return arc
+
+    def forget_arc(self, arc: ArcEntry) -> None:
+        """Take out an ARC that holds nothing."""
+        self.enter(arc, RequestState.IDLE, arc.since_s)
+        del self.arcs[arc.name]
+
+    def enter(self, arc: ArcEntry, state: RequestState, now_s: float) -> None:
+        """Let the ARC come to this state; those it shares RCs with are looked at again."""
+        was_active, held = arc.active, arc.holds
+        arc.state, arc.since_s = state, now_s
+        if arc.active and not was_active:
+            self._groups.add(arc, arc.uses)
+            self._demand_changed(arc.shares)
+        if held != arc.holds:
+            for rc in arc.uses:
+                if held:
+                    del self.rcs[rc].holders[arc]
+                else:
+                    self.rcs[rc].holders[arc] = None
+        if state is RequestState.WAITING:
+            for holder in [holder for rc in arc.uses for holder in self.rcs[rc].holders]:
+                if holder.state is RequestState.RUNNING:
+                    self._await_end(holder)
+        self.touch(arc)
+        if was_active and not arc.active:
+            for rc in arc.uses:
+                self._touched.update(dict.fromkeys(self._groups.users(rc)))
+            self._groups.remove(arc)
+            self._touched.pop(arc, None)
+            self._demand_changed(arc.shares)
+
+    def touch(self, arc: ArcEntry) -> None:
+        """Have the ARC and those beside it looked at again: something about it changed."""
+        self._touched[arc] = None
+
+    def touch_users(self, rc: str) -> None:
+        """Have all who use the RC looked at again."""
+        self._demand_changed([rc])
+        self._touched.update(dict.fromkeys(self._groups.users(rc)))
+
+    def touch_all(self) -> None:
+        """Have everybody looked at again, and forget what was worked out about sharable RCs."""
+        self._demand_changed([*self.rcs])
+        self._touched.update(dict.fromkeys(arc for arc in self.arcs.values() if arc.active))
+
+    def end_at(self, arc: ArcEntry, end_s: float) -> None:
+        """Let the slice of a running ARC end then."""
+        arc.end_s, arc.awaited = end_s, False
+        if self._somebody_waits_for(arc):
+            self._await_end(arc)
+        self.touch(arc)
+
+    def _somebody_waits_for(self, holder: ArcEntry) -> bool:
+        return any(user.state is RequestState.WAITING for rc in holder.uses for user in self._groups.users(rc))
+
+    def _await_end(self, arc: ArcEntry) -> None:
+        if not arc.awaited:
+            arc.awaited = True
+            heapq.heappush(self._ends, (arc.end_s, next(self._serial), arc))
+
+    def next_end_s(self, now_s: float) -> float | None:
+        """Return when the next slice ends that somebody waits for; those that have ended are looked at again."""
+        while self._ends:
+            end_s, _, arc = self._ends[0]
+            stands = arc.state is RequestState.RUNNING and arc.end_s == end_s
+            wanted = stands and self._somebody_waits_for(arc)
+            if wanted and end_s > now_s + INSTANT_S:
+                return end_s
+            heapq.heappop(self._ends)
+            if stands:
+                arc.awaited = wanted
+            if wanted:
+                self.touch(arc)
+        return None
+
+    def _demand_changed(self, rcs: Iterable[str]) -> None:
+        """Forget what was worked out about these sharable RCs: other ARCs, capacities or priorities count now."""
+        for rc in rcs:
+            self._admitted.pop(rc, None)
+            self._roomy.pop(rc, None)
 
     # What fits together (rule 1).
 
     def fits(self, arc: ArcEntry, others: Iterable[ArcEntry]) -> bool:
         """Say whether the ARC can hold all its RCs together with these others."""
-        users: dict[str, list[ArcEntry]] = {rc: [arc] for rc in arc.uses}
+        beside = []
         for other in others:
-            for rc in arc.uses.keys() & other.uses.keys():
-                users[rc].append(other)
-        return all(self._can_share(rc, of_rc) for rc, of_rc in users.items())
+            common = arc.touches & other.touches
+            if common:
+                if common & (arc.excludes | other.excludes):
+                    return False
+                beside.append(other)
+        return all(self._can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares)
 
     def usable(self, arc: ArcEntry) -> bool:
         """Say whether it could run if nobody else were there: its RCs are up and can serve it."""
         return all(self.rcs[rc].up for rc in arc.uses) and self.fits(arc, ())
 
     def _can_share(self, rc: str, users: Sequence[ArcEntry]) -> bool:
-        if not self.rcs[rc].sharable or not all(user.uses[rc].streams for user in users):
-            return len(users) == 1
         return self._has_room_for_all(rc) or self._admissible(rc, users)
 
     def _has_room_for_all(self, rc: str) -> bool:
         """Say whether the whole active demand fits at once (rule 15): then no part of it need be looked at."""
         if rc not in self._roomy:
-            users = [arc for arc in self.arcs.values() if arc.active and rc in arc.uses]
-            self._roomy[rc] = all(user.uses[rc].streams for user in users) and self._admissible(rc, users)
+            users = [*self._groups.users(rc)]
+            self._roomy[rc] = all(rc in user.shares for user in users) and self._admissible(rc, users)
         return self._roomy[rc]
 
     def _admissible(self, rc: str, users: Sequence[ArcEntry]) -> bool:
-        key = (rc, frozenset(user.name for user in users))
-        if key not in self._admitted:
+        known = self._admitted.setdefault(rc, {})
+        key = frozenset(users)
+        if key not in known:
             streams = [
                 (user, stream(usage), number) for user in users for number, usage in enumerate(user.uses[rc].streams)
             ]
             ranked = by_precedence(streams, lambda s: s[0].path, lambda s: (s[1].period_us, s[0].name, s[2]))
-            self._admitted[key] = admissible([packets for _, packets, _ in ranked], self.rcs[rc].capacity)
-        return self._admitted[key]
+            known[key] = admissible([packets for _, packets, _ in ranked], self.rcs[rc].capacity)
+        return known[key]
 
     # Order and plan (rules 2, 3, 4).
 
     def groups(self) -> list[list[ArcEntry]]:
-        """Return the active ARCs, group by group."""
-        found = groups({arc.name: arc.uses.keys() for arc in self.arcs.values() if arc.active})
-        return [[self.arcs[name] for name in group] for group in found]
+        """Return the active ARCs, group by group, in the order of their requests."""
+        found = [self._groups.of(arc) for arc in self.arcs.values() if arc.active]
+        members: dict[Group[ArcEntry], list[ArcEntry]] = {group: [] for group in found}
+        for arc in self.arcs.values():
+            if arc.active:
+                members[self._groups.of(arc)].append(arc)
+        return list(members.values())
+
+    def group_of(self, arc: ArcEntry) -> Sequence[ArcEntry]:
+        """Return the ARC's group; nobody if it is not active."""
+        return [*self._groups.of(arc).arcs] if arc in self._groups else []
 
     def in_order(self, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
         """Return ARCs of one group in the order of rule 2."""
@@ -285,12 +418,24 @@ class MasterSchedule:
             slack_s: By how much an ARC may overlap those before it, but not by more than half its slice;
                 None: by the tolerance of this run.
         """
+        queued = self.in_order([arc for arc in group if arc.queued])
+        return self._plan(queued, group, now_s, handed_over=handed_over, slack_s=slack_s)
+
+    def _plan(
+        self,
+        queued: Sequence[ArcEntry],
+        group: Sequence[ArcEntry],
+        now_s: float,
+        *,
+        handed_over: bool = False,
+        slack_s: float | None = None,
+    ) -> list[Slot]:
         forgiven_s = self._slack_s if slack_s is None else slack_s
         holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
         slots: list[Slot] = []
-        for arc in self.in_order([arc for arc in group if arc.queued]):
+        for arc in queued:
             against = self._against(arc, holders, slots, now_s)
-            from_s = self.free_s(arc, now_s) if arc in holders else now_s
+            from_s = self.free_s(arc, now_s) if arc.holds and not handed_over else now_s
             start_s = self._earliest_s(arc, from_s, against, forgiven_s) if self.usable(arc) else math.inf
             slots.append(Slot(arc, start_s, against))
         return slots
@@ -299,10 +444,9 @@ class MasterSchedule:
         """Return until when the holder stands in the way of the ARC."""
         if holder.state is RequestState.REVOKING:
             return self.free_s(holder, now_s)
-        if higher(arc.path, holder.path):
-            return now_s
-        if higher(holder.path, arc.path):
-            return math.inf
+        before = rank(holder.path, arc.path)
+        if before:
+            return math.inf if before > 0 else now_s
         if holder.state is RequestState.CONNECTING:  # its slice begins with its grant: it cannot be over yet
             return max(now_s + SOON_S, holder.began_s + holder.length_s)
         return max(now_s, holder.end_s)
@@ -312,54 +456,113 @@ class MasterSchedule:
         return max(now_s + SOON_S, revoked.since_s + revoked.release_s)
 
     def _against(self, arc: ArcEntry, holders: Iterable[ArcEntry], slots: Iterable[Slot], now_s: float) -> list[Hold]:
-        """Return everybody who shares an RC with the ARC and stands in its way for a time."""
-        holds = [
-            Hold(holder, -math.inf, self.stands_until_s(holder, arc, now_s))
-            for holder in holders
-            if holder is not arc and _share_rc(holder, arc)
-        ]
-        holds += [
-            Hold(slot.arc, slot.start_s, math.inf if higher(slot.arc.path, arc.path) else slot.end_s)
-            for slot in slots
-            if slot.start_s < math.inf and _share_rc(slot.arc, arc)
-        ]
-        return [hold for hold in holds if hold.end_s > now_s + INSTANT_S]
+        touches, soon_s = arc.touches, now_s + INSTANT_S
+        against = []
+        for holder in holders:
+            if holder.touches & touches and holder is not arc:
+                until_s = self.stands_until_s(holder, arc, now_s)
+                if until_s > soon_s:
+                    against.append((holder, -math.inf, until_s))
+        for other, start_s, _ in slots:
+            if other.touches & touches and start_s < math.inf:
+                against.append((other, start_s, start_s + other.length_s))
+        return against
 
     def _earliest_s(self, arc: ArcEntry, from_s: float, against: Sequence[Hold], forgiven_s: float) -> float:
-        """Return the first time from which the ARC fits for its whole length; infinite if there is none."""
+        """Return the first time from which the ARC fits for its whole length; infinite if there is none.
+
+        A higher ARC stays once it runs: whoever is found to overlap its slot can start only never.
+        """
         length_s = arc.length_s - min(forgiven_s, arc.minimum_s / 2)
-        times = sorted({from_s, *(hold.end_s for hold in against if from_s < hold.end_s < math.inf)})
+        start_s = from_s
+        for other, begin_s, end_s in sorted(against, key=_begin_s):
+            if begin_s >= start_s + length_s - INSTANT_S:
+                break
+            if end_s > start_s + INSTANT_S and arc.touches & other.touches & (arc.excludes | other.excludes):
+                if end_s == math.inf or (begin_s > -math.inf and higher(other.path, arc.path)):
+                    return math.inf
+                start_s = end_s
+        if start_s == math.inf or all(self._has_room_for_all(rc) for rc in arc.shares):
+            return start_s
+        return self._earliest_in_a_crowd_s(arc, start_s, length_s, against)
+
+    def _earliest_in_a_crowd_s(self, arc: ArcEntry, from_s: float, length_s: float, against: Sequence[Hold]) -> float:
+        """Return the first time from which also the sharable RCs have room for the ARC's streams."""
+        lasting = [
+            (other, begin_s, math.inf if begin_s > -math.inf and higher(other.path, arc.path) else end_s)
+            for other, begin_s, end_s in against
+        ]
+        times = sorted({from_s, *(end_s for _, _, end_s in lasting if from_s < end_s < math.inf)})
         return next(
-            (time_s for time_s in times if self._fits_between(arc, time_s, time_s + length_s, against)), math.inf
+            (time_s for time_s in times if self._fits_between(arc, time_s, time_s + length_s, lasting)), math.inf
         )
 
     def _fits_between(self, arc: ArcEntry, start_s: float, end_s: float, against: Sequence[Hold]) -> bool:
         met = meeting(against, start_s, end_s)
-        moments = {start_s, *(hold.start_s for hold in met if hold.start_s > start_s)}
-        return all(self.fits(arc, [hold.arc for hold in met if hold.covers(moment)]) for moment in moments)
+        moments = {start_s, *(begin_s for _, begin_s, _ in met if begin_s > start_s)}
+        return all(
+            self.fits(
+                arc,
+                [
+                    other
+                    for other, begin_s, over_s in met
+                    if begin_s <= moment_s + INSTANT_S and over_s > moment_s + INSTANT_S
+                ],
+            )
+            for moment_s in moments
+        )
 
     # Whose time has come (rules 3, 4, 8).
 
     def due(self, now_s: float) -> Turn | None:
-        """Return the first ARC in order whose time is now, and who must go for it; None if nobody's is."""
-        for group in self.groups():
-            turn = self._due_in(group, now_s) if any(arc.state is RequestState.WAITING for arc in group) else None
+        """Return an ARC whose time is now, and who must go for it; None if nobody's is.
+
+        Looks where something changed since nobody's time was; asked again after the turn was carried out.
+        """
+        while self._touched:
+            arc = next(iter(self._touched))
+            turn, looked_at = self._due_near(arc, now_s)
             if turn is not None:
                 return turn
+            for one in looked_at:
+                self._touched.pop(one, None)
         return None
 
+    def forgotten(self, now_s: float) -> ArcEntry | None:
+        """Return an ARC whose time is now in a group that is planned whole, wherever that is; for checks."""
+        for group in self.groups():
+            turn = self._due_in(group, now_s) if len(group) <= self._exact_up_to else None
+            if turn is not None:
+                return turn.arc
+        return None
+
+    def _due_near(self, arc: ArcEntry, now_s: float) -> tuple[Turn | None, Iterable[ArcEntry]]:
+        """Return the turn of somebody near the ARC, and all who were looked at."""
+        if arc not in self._groups:
+            return None, [arc]
+        group = self._groups.of(arc).arcs
+        if len(group) <= self._exact_up_to:
+            return self._due_in([*group], now_s), group
+        return self._due_beside(arc, now_s), [arc]
+
     def _due_in(self, group: Sequence[ArcEntry], now_s: float) -> Turn | None:
-        slots = self.plan(group, now_s)
-        starting = _starting(slots, now_s)
+        """Return whose time is now in a group that is planned whole."""
+        possible = {arc for arc in group if arc.state is RequestState.WAITING and self._could_start(arc, now_s)}
+        if not possible:
+            return None
+        queued = self.in_order([arc for arc in group if arc.queued])
+        while queued[-1] not in possible:
+            queued.pop()  # who comes after them changes nothing for them
+        starting = _starting(self._plan(queued, group, now_s), now_s)
         if not starting:
             return None
         # A slice is ended only for who fits without forgiveness, however early the hand-overs under way may end:
         # else it might be ended for a gap that closes meanwhile.
-        exact = _starting(self.plan(group, now_s, slack_s=0.0), now_s)
-        certain = _starting(self.plan(group, now_s, slack_s=0.0, handed_over=True), now_s)
+        exact = _starting(self._plan(queued, group, now_s, slack_s=0.0), now_s)
+        certain = _starting(self._plan(queued, group, now_s, slack_s=0.0, handed_over=True), now_s)
         pending: list[ArcEntry] = []
-        for arc in [slot.arc for slot in slots if slot.arc.state is RequestState.WAITING]:
-            if self._must_let_higher_go_first(arc, group):
+        for arc in queued:
+            if arc.state is not RequestState.WAITING or self._must_let_higher_go_first(arc, group):
                 continue
             if arc in starting or (arc in exact and arc in certain):
                 in_the_way = self._in_the_way(arc, pending, group, now_s)
@@ -371,6 +574,73 @@ class MasterSchedule:
                 pending.append(arc)
         return None
 
+    def _could_start(self, arc: ArcEntry, now_s: float) -> bool:
+        """Say whether, of those it cannot share with, nobody holds an RC of it for longer than until now."""
+        return all(
+            holder is arc or self.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S or self.fits(arc, [holder])
+            for rc in arc.uses
+            for holder in self.rcs[rc].holders
+        )
+
+    # Whose time has come in a group that is too big to be planned whole.
+
+    def _due_beside(self, touched: ArcEntry, now_s: float) -> Turn | None:
+        """Return the first in order near the ARC whose time is now."""
+        candidates = [arc for arc in self._near(touched, now_s) if self._could_start(arc, now_s) and self.usable(arc)]
+        for arc in self.in_order(candidates):
+            others = self._beside(arc)
+            if self._must_let_higher_go_first(arc, self._groups.of(arc).arcs):
+                continue
+            if any(self._must_let_go_first(arc, other, now_s) for other in others if other.queued):
+                continue
+            in_the_way = self._in_the_way(arc, [], others, now_s)
+            if in_the_way or self.fits(arc, [other for other in others if other.holds]):
+                return Turn(arc, in_the_way)
+        return None
+
+    def _near(self, touched: ArcEntry, now_s: float) -> Iterable[ArcEntry]:
+        """Return the waiting ARCs for which it matters what happened to this one.
+
+        That is who shares an RC with it, and who shares one with those: they may have let them go first.
+        """
+        near = {touched: None} | dict.fromkeys(self._beside(touched))
+        rcs = {rc for arc in near if arc.queued for rc in arc.uses} | set(touched.uses)
+        for rc in sorted(rcs):
+            if self.rcs[rc].sharable or all(holder.served(now_s) for holder in self.rcs[rc].holders):
+                near |= dict.fromkeys(self._groups.users(rc))
+        return [arc for arc in near if arc.state is RequestState.WAITING]
+
+    def _beside(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the others that use an RC of this one."""
+        beside = dict.fromkeys(user for rc in arc.uses for user in self._groups.users(rc))
+        beside.pop(arc, None)
+        return [*beside]
+
+    def _must_let_go_first(self, arc: ArcEntry, other: ArcEntry, now_s: float) -> bool:
+        """Say whether the other comes before it and may start before it would have done."""
+        if not self._comes_before(other, arc) or not self.usable(other) or self.fits(arc, [other]):
+            return False
+        ends = [
+            self.stands_until_s(h, other, now_s) for rc in other.uses for h in self.rcs[rc].holders if h is not other
+        ]
+        length_s = arc.length_s - min(self._slack_s, arc.minimum_s / 2)
+        return max([now_s, *ends]) < now_s + length_s - INSTANT_S
+
+    def _comes_before(self, other: ArcEntry, arc: ArcEntry) -> bool:
+        """Say whether of two that compete the other is the first in order."""
+        if higher(other.path, arc.path):
+            return True
+        return not higher(arc.path, other.path) and self._precedence(other) < self._precedence(arc)
+
+    def _precedence(self, arc: ArcEntry) -> tuple[tuple[float, int], ...]:
+        """Return the key by which equals beside each other go in order: none before a higher one it competes with.
+
+        Without that they could wait for each other in a circle, as being equal is not transitive.
+        """
+        above = [other for other in self._beside(arc) if other.queued and higher(other.path, arc.path)]
+        own = (arc.seniority,)
+        return max([own, *((*self._precedence(other), arc.seniority) for other in above)])
+
     def _in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
     ) -> list[ArcEntry]:
@@ -379,9 +649,11 @@ class MasterSchedule:
         Those who only wait for RCs that are being freed (``pending``) count as if they had started:
         else the room made here is theirs in a moment and both would displace each other again and again.
         """
-        holders = [holder for holder in group if holder.state in CONNECTED and _share_rc(holder, arc)]
+        holders = [holder for holder in group if holder.state in CONNECTED and holder.touches & arc.touches]
         movable = [holder for holder in holders if self.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S]
-        staying = [holder for holder in holders if holder not in movable] + [p for p in pending if _share_rc(p, arc)]
+        staying = [holder for holder in holders if holder not in movable] + [
+            p for p in pending if p.touches & arc.touches
+        ]
         return self.left_over(arc, staying, movable)
 
     def left_over(self, arc: ArcEntry, staying: Sequence[ArcEntry], movable: Sequence[ArcEntry]) -> list[ArcEntry]:
@@ -409,37 +681,60 @@ class MasterSchedule:
             for other in group
         )
 
-    def next_end_s(self, now_s: float) -> float | None:
-        """Return when the next slice ends that somebody may wait for; None: no decision is due without an event."""
-        ends = [
-            holder.end_s
-            for group in self.groups()
-            if any(arc.state is RequestState.WAITING for arc in group)
-            for holder in group
-            if holder.state is RequestState.RUNNING and holder.end_s > now_s + INSTANT_S
-        ]
-        return min(ends, default=None)
-
     def blockers(self, slot: Slot, now_s: float) -> list[ArcEntry]:
         """Return the ARCs because of which the ARC cannot start now, those that alone suffice first."""
-        met = [hold.arc for hold in meeting(slot.against, now_s, now_s + slot.arc.length_s - self._slack_s)]
+        met = [other for other, _, _ in meeting(slot.against, now_s, now_s + slot.arc.length_s - self._slack_s)]
+        if not met and len(self._groups.of(slot.arc)) > self._exact_up_to:
+            return [
+                other
+                for other in self._beside(slot.arc)
+                if other.queued and self._must_let_go_first(slot.arc, other, now_s)
+            ]
         alone = [other for other in met if not self.fits(slot.arc, [other])]
         return alone or met
 
     def slot_of(self, arc: ArcEntry, now_s: float) -> Slot | None:
         """Return the place of the ARC in the plan; None if it is not queued."""
-        group = next((group for group in self.groups() if arc in group), [])
-        return next((slot for slot in self.plan(group, now_s) if slot.arc is arc), None)
+        if not arc.queued:
+            return None
+        group = self.group_of(arc)
+        if len(group) > self._exact_up_to:
+            return self._estimate(arc, now_s)
+        return next(slot for slot in self.plan(group, now_s) if slot.arc is arc)
+
+    def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+        """Return the place of every queued ARC of a group, in order; of a big group an estimate."""
+        if len(group) <= self._exact_up_to:
+            return self.plan(group, now_s)
+        return [self._estimate(arc, now_s) for arc in self.in_order([arc for arc in group if arc.queued])]
+
+    def _estimate(self, arc: ArcEntry, now_s: float) -> Slot:
+        """Return where the ARC will be if at each of its RCs all those before it take one turn after the other."""
+        holds = [
+            (holder, -math.inf, self.stands_until_s(holder, arc, now_s))
+            for holder in dict.fromkeys(holder for rc in arc.uses for holder in self.rcs[rc].holders)
+            if holder is not arc and not self.fits(arc, [holder])
+        ]
+        if not self.usable(arc):
+            return Slot(arc, math.inf, holds)
+        before = {
+            other: other.length_s
+            for other in self._beside(arc)
+            if other.queued and self._comes_before(other, arc) and not self.fits(arc, [other])
+        }
+        turns_s = [sum(before.get(user, 0.0) for user in self._groups.users(rc)) for rc in arc.uses]
+        start_s = max([now_s, *(end_s for _, _, end_s in holds)]) + max(turns_s)
+        return Slot(arc, start_s, [hold for hold in holds if hold[2] > now_s + INSTANT_S])
 
 
 def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
     """Return the holds that overlap this span."""
-    return [hold for hold in holds if hold.start_s < end_s - INSTANT_S and hold.end_s > start_s + INSTANT_S]
+    return [hold for hold in holds if hold[1] < end_s - INSTANT_S and hold[2] > start_s + INSTANT_S]
+
+
+def _begin_s(hold: Hold) -> float:
+    return hold[1]
 
 
 def _starting(slots: Iterable[Slot], now_s: float) -> set[ArcEntry]:
     return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
-
-
-def _share_rc(a: ArcEntry, b: ArcEntry) -> bool:
-    return not a.uses.keys().isdisjoint(b.uses.keys())

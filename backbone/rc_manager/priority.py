@@ -34,34 +34,58 @@ def higher(a: Path, b: Path) -> bool:
         >>> higher((("m", 0), ("watch", 5)), scout1)  # a parent's own request goes before its children's
         True
     """
+    return rank(a, b) > 0
+
+
+def rank(a: Path, b: Path) -> int:
+    """Return 1 if ``a`` goes strictly before ``b``, -1 if ``b`` goes before ``a``, 0 if neither does."""
     for (name_a, number_a), (name_b, number_b) in zip(a, b, strict=False):
         if name_a != name_b:
-            return number_a > number_b
-    return len(a) < len(b)
+            return (number_a > number_b) - (number_a < number_b)
+    return (len(a) < len(b)) - (len(a) > len(b))
 
 
 def by_precedence(items: Sequence[T], path: Callable[[T], Path], key: Callable[[T], Any]) -> list[T]:
     """Return the items in order: again and again the one of the smallest key that no remaining one is higher than.
 
     Sorting by (level, key) would be shorter and wrong: equality is not transitive, there are no levels.
+    Each branch of the tree has an order of its own; equal siblings' orders are merged by what each has first.
+
+    Args:
+        items: In any order.
+        path: Of an item; a node has the same number in all of them.
+        key: Of an item; of two with the same key the one that is first in ``items`` comes first.
     """
-    paths = [path(item) for item in items]
-    below = [[j for j, other in enumerate(paths) if higher(one, other)] for one in paths]
-    superiors = [0] * len(items)
-    for inferiors in below:
-        for j in inferiors:
-            superiors[j] += 1
-    free = [(key(item), i) for i, item in enumerate(items) if superiors[i] == 0]
-    heapq.heapify(free)
-    taken: list[T] = []
-    while free:
-        _, i = heapq.heappop(free)
-        taken.append(items[i])
-        for j in below[i]:
-            superiors[j] -= 1
-            if superiors[j] == 0:
-                heapq.heappush(free, (key(items[j]), j))
-    return taken
+    root = _Branch()
+    for place, item in enumerate(items):
+        branch = root
+        for node in path(item):
+            branch = branch.children.get(node) or branch.children.setdefault(node, _Branch())
+        branch.own.append((key(item), place))
+    return [items[place] for _, place in root.in_order()]
+
+
+class _Branch:
+    """A node of the tree that is being ordered: keys and places of its own items, and its children."""
+
+    __slots__ = ("children", "own")
+
+    def __init__(self) -> None:
+        self.own: list[tuple[Any, int]] = []
+        self.children: dict[tuple[str, int], _Branch] = {}
+
+    def in_order(self) -> list[tuple[Any, int]]:
+        ordered = sorted(self.own)
+        by_number: dict[int, list[_Branch]] = {}
+        for (_, number), child in self.children.items():
+            by_number.setdefault(number, []).append(child)
+        for number in sorted(by_number, reverse=True):
+            equals = by_number[number]
+            leaves = sorted(one for child in equals if not child.children for one in child.own)
+            orders = [leaves, *(child.in_order() for child in equals if child.children)]
+            # Not sorted each: merging takes the smaller of the first ones again and again, which is what is wanted.
+            ordered += heapq.merge(*orders) if len(orders) > 1 else leaves
+        return ordered
 
 
 class PriorityTree:
@@ -76,18 +100,25 @@ class PriorityTree:
         self._numbers: dict[tuple[str, ...], int] = {(mission,): priority}
         self._set: dict[str, int] = {}
 
-    def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[str, ...]:
-        """Take note of the nodes on this way and return their names, root first."""
+    def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[tuple[str, ...], bool]:
+        """Take note of the nodes on this way.
+
+        Returns:
+            Their names, root first, and whether a node known before has another number now.
+        """
         way = list(nodes)
         if console:
             way = [PathNode(CONSOLE + node.name, node.priority) for node in way]
         elif not way or way[0].name != self._mission:
             way.insert(0, PathNode(self._mission, self._numbers[self._mission,]))
         names: tuple[str, ...] = ()
+        renumbered = False
         for node in way:
             names = (*names, node.name)
-            self._numbers[names] = self._set.get(node.name.removeprefix(CONSOLE), node.priority)
-        return names
+            number = self._set.get(node.name.removeprefix(CONSOLE), node.priority)
+            renumbered |= self._numbers.setdefault(names, number) != number
+            self._numbers[names] = number
+        return names, renumbered
 
     def path(self, names: tuple[str, ...]) -> Path:
         """Return the way with its present numbers."""

@@ -119,6 +119,7 @@ class ScheduleManager:
         self._traced_rcs: set[str] = set()
         self._traced_nodes: dict[tuple[str, ...], int] = {}
         self._replaced_by: dict[str, Requested] = {}
+        self._retrying: dict[str, ArcEntry] = {}
         self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
 
     # Events in, instructions out.
@@ -139,6 +140,7 @@ class ScheduleManager:
         self._told = []
         self._take_note(event)
         self._retry()
+        self._table.next_end_s(self._now_s)
         while turn := self._table.due(self._now_s):
             self._give(turn)
         self._set_alarm(rang=isinstance(event, Woken))
@@ -208,10 +210,8 @@ class ScheduleManager:
         """Return the ARC's place by user priority among the holders of each sharable RC it uses."""
 
         def place(rc: str) -> int:
-            return sum(
-                rc in other.uses and other.state in CONNECTED and higher(other.path, arc.path)
-                for other in self._table.arcs.values()
-            )
+            holders = self._table.rcs[rc].holders
+            return sum(other.state in CONNECTED and higher(other.path, arc.path) for other in holders)
 
         return {rc: place(rc) for rc in arc.uses if self._table.rcs[rc].sharable}
 
@@ -220,7 +220,7 @@ class ScheduleManager:
         deadline_s = self._grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self._swap_out(arc, why, by)
         arc.afterwards = afterwards
-        slot = self._table.slot_of(arc, self._now_s)
+        slot = self._table.slot_of(arc, self._now_s) if afterwards is Afterwards.WAIT else None
         expected_s = slot.start_s + arc.settle_s if slot is not None and slot.start_s < math.inf else -1.0
         self._tell(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, expected_s))
 
@@ -237,9 +237,9 @@ class ScheduleManager:
         if arc is None or arc.state is not RequestState.CONNECTING:
             return
         arc.granted_s = self._now_s
-        arc.end_s = self._now_s + arc.minimum_s
         arc.turns += 1
         self._enter(arc, RequestState.RUNNING)
+        self._table.end_at(arc, self._now_s + arc.minimum_s)
         newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._table.rcs[rc].granted_epoch}
         for rc, epoch in newest.items():
             self._table.rcs[rc].granted_epoch = epoch
@@ -257,6 +257,7 @@ class ScheduleManager:
             self._swap_out(arc, "failed", "")
             arc.afterwards = Afterwards.IDLE
             arc.retry_s = self._now_s + RETRY_S
+            self._retrying[name] = arc
         self._freed(name)
 
     def _freed(self, name: str) -> None:
@@ -277,8 +278,8 @@ class ScheduleManager:
                 self._forget(arc)
 
     def _forget(self, arc: ArcEntry) -> None:
-        del self._table.arcs[arc.name]
-        self._table.demand_changed()
+        self._retrying.pop(arc.name, None)
+        self._table.forget_arc(arc)
         successor = self._replaced_by.pop(arc.name, None)
         if successor is not None:
             self._requested(successor)
@@ -311,19 +312,8 @@ class ScheduleManager:
         for rc in event.rcs:
             self._introduce(rc)
         place_in_tree = self._note_nodes(request)
-        rcs = [self._table.rcs[rc] for rc in event.rcs]
-        arc = ArcEntry(
-            request=request,
-            uses=_chosen(request, event.rcs),
-            place_in_tree=place_in_tree,
-            path=self._tree.path(place_in_tree),
-            minimum_s=request.minimum_runtime_s,
-            maximum_s=max(request.minimum_runtime_s, request.maximum_runtime_s),
-            settle_s=max((rc.connect_s for rc in rcs), default=0.0),
-            release_s=max((rc.disconnect_s for rc in rcs), default=0.0),
-            since_s=self._now_s,
-        )
-        self._table.arcs[arc.name] = arc
+        uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
+        arc = self._table.make_arc(request, uses, place_in_tree, path, self._now_s)
         self._record(self._request_line(arc), f"asked by {request.owner}")
         if not request.idle:
             self._queue(arc)
@@ -352,7 +342,6 @@ class ScheduleManager:
         arc.pledge = None
         arc.retry_s = None
         self._enter(arc, RequestState.WAITING)
-        self._table.demand_changed()
 
     def _adopted(self, event: Adopted) -> None:
         """Let an ARC run on that an earlier RC manager granted its RCs.
@@ -381,8 +370,8 @@ class ScheduleManager:
         self._record(trace.grant(self._now_s, arc.name, arc.epochs), why)
         arc.turns = 1
         arc.began_s = arc.granted_s = event.granted_s
-        arc.end_s = self._now_s + arc.minimum_s
         self._enter(arc, RequestState.RUNNING)
+        self._table.end_at(arc, self._now_s + arc.minimum_s)
 
     def _wanted(self, name: str) -> None:
         arc = self._table.arcs.get(name)
@@ -406,6 +395,7 @@ class ScheduleManager:
                 self._record(trace.about("idle", self._now_s, name), "it wants no time now")
             if arc.afterwards is not Afterwards.GONE:
                 arc.afterwards = Afterwards.IDLE
+                self._table.touch(arc)
         elif arc.state is not RequestState.IDLE:
             self._record(trace.about("idle", self._now_s, name), "it wants no time now")
             if arc.state is RequestState.WAITING:
@@ -431,6 +421,7 @@ class ScheduleManager:
             self._forget(arc)
         elif arc.state is RequestState.REVOKING:
             arc.afterwards = Afterwards.GONE
+            self._table.touch(arc)
         else:
             self._revoke(arc, why, "", Afterwards.GONE)
 
@@ -442,6 +433,7 @@ class ScheduleManager:
         if not 0 < minimum_s <= maximum_s < math.inf:
             return  # no slice can be planned for such times; the old ones hold on
         arc.minimum_s, arc.maximum_s = minimum_s, maximum_s
+        self._table.touch(arc)
         self._record(trace.runtime(self._now_s, name, minimum_s, maximum_s), "from the next slice on")
 
     def _extended(self, name: str, until_s: float) -> None:
@@ -450,19 +442,23 @@ class ScheduleManager:
             return
         until_s = min(until_s, arc.granted_s + arc.maximum_s)
         if until_s > arc.end_s:
-            arc.end_s = until_s
+            self._table.end_at(arc, until_s)
             self._record(trace.extend(self._now_s, name, until_s), "it asked to go on (rule 14)")
 
     def _retry(self) -> None:
-        for arc in [*self._table.arcs.values()]:
-            if arc.state is RequestState.IDLE and arc.retry_s is not None and arc.retry_s <= self._now_s:
+        for arc in [*self._retrying.values()]:
+            if arc.retry_s is None:
+                del self._retrying[arc.name]
+            elif arc.state is RequestState.IDLE and arc.retry_s <= self._now_s:
+                del self._retrying[arc.name]
                 self._wanted(arc.name)
 
     # Priorities.
 
     def _note_nodes(self, request: SchedulingRequest) -> tuple[str, ...]:
-        names = self._tree.place(request.path, console=request.console)
-        self._renumber()
+        names, renumbered = self._tree.place(request.path, console=request.console)
+        if renumbered:
+            self._renumber()
         self._introduce_nodes(names)
         return names
 
@@ -475,7 +471,7 @@ class ScheduleManager:
     def _renumber(self) -> None:
         for arc in self._table.arcs.values():
             arc.path = self._tree.path(arc.place_in_tree)
-        self._table.demand_changed()
+        self._table.touch_all()
 
     def _introduce_nodes(self, names: tuple[str, ...]) -> None:
         """Bring new nodes and new numbers on this way into the trace, parents first."""
@@ -493,15 +489,17 @@ class ScheduleManager:
     def _rc_known(self, event: RcKnown) -> None:
         known = self._table.rcs.get(event.rc)
         if known is None:
-            self._table.rcs[event.rc] = RcEntry(
-                event.rc,
-                event.kind,
-                event.sharable,
-                event.capacity,
-                event.connect_s,
-                event.disconnect_s,
-                event.up,
-                event.last_epoch,
+            self._table.add_rc(
+                RcEntry(
+                    event.rc,
+                    event.kind,
+                    event.sharable,
+                    event.capacity,
+                    event.connect_s,
+                    event.disconnect_s,
+                    event.up,
+                    event.last_epoch,
+                )
             )
             if event.up:
                 self._introduce(event.rc)
@@ -538,6 +536,7 @@ class ScheduleManager:
             return
         rc.up = False
         rc.failed = True
+        self._table.touch_users(name)
         self._record(trace.rc_state(self._now_s, name, up=False), "it does not answer")
         for arc in [*self._table.arcs.values()]:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
@@ -554,6 +553,7 @@ class ScheduleManager:
             return
         rc.up = True
         rc.failed = False
+        self._table.touch_users(name)
         if name in self._traced_rcs:
             self._record(trace.rc_state(self._now_s, name, up=True), "it answers")
         self._introduce(name)
@@ -563,7 +563,7 @@ class ScheduleManager:
         if rc is None or rc.capacity == capacity:
             return
         rc.capacity = capacity
-        self._table.demand_changed()
+        self._table.touch_users(name)
         if name in self._traced_rcs:
             self._record(trace.rc_capacity(self._now_s, name, capacity))
         for holder in self._table.overloading(name):
@@ -642,7 +642,8 @@ class ScheduleManager:
             for arc in connected:
                 others = [other for other in connected if other is not arc]
                 self._promise(self._table.fits(arc, others), f"{rc.name} serves all its holders in time", connected)
-        self._promise(self._table.due(self._now_s) is None, "nobody's turn is forgotten", ())
+        forgotten = self._table.forgotten(self._now_s)
+        self._promise(forgotten is None, f"nobody's turn is forgotten, but {forgotten and forgotten.name}'s", ())
 
     def _check_arc(self, arc: ArcEntry) -> None:
         wholly = arc.epochs.keys() == arc.uses.keys() if arc.holds else not arc.epochs
@@ -664,8 +665,7 @@ class ScheduleManager:
         return self._table.arcs[arc]
 
     def _enter(self, arc: ArcEntry, state: RequestState) -> None:
-        arc.state = state
-        arc.since_s = self._now_s
+        self._table.enter(arc, state, self._now_s)
 
     def _next(self) -> int:
         self._count += 1
@@ -680,7 +680,7 @@ class ScheduleManager:
 
     def _set_alarm(self, *, rang: bool) -> None:
         """Ask to be woken when the next decision can be due without an event."""
-        retries = [arc.retry_s for arc in self._table.arcs.values() if arc.retry_s is not None]
+        retries = [arc.retry_s for arc in self._retrying.values() if arc.retry_s is not None]
         slice_end_s = self._table.next_end_s(self._now_s)
         wake_s = min([*retries, *([slice_end_s] if slice_end_s is not None else [])], default=None)
         if rang or wake_s != self._wake_s:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.rc_manager.groups import groups
+from backbone.rc_manager.groups import Groups, groups
 
 uses = st.dictionaries(st.text("abcdefgh", min_size=1, max_size=1), st.sets(st.integers(1, 8).map(str), max_size=3))
 
@@ -44,3 +44,26 @@ def test_three_scouts_on_one_video_frequency_are_one_group():
         ["left", "right", "console"],
         ["arm"],
     ]
+
+
+@given(st.lists(st.tuples(st.sampled_from("abcdefgh"), st.sets(st.integers(1, 8).map(str), max_size=3)), max_size=40))
+def test_groups_that_are_kept_up_to_date_are_the_groups_of_those_that_are_there(steps):
+    """Each step lets an ARC come with its RCs, or go if it is there."""
+    kept: Groups[str] = Groups(exact_up_to=8)
+    lazy: Groups[str] = Groups(exact_up_to=0)
+    there: dict[str, set[str]] = {}
+    for arc, rcs in steps:
+        if arc in there:
+            del there[arc]
+            kept.remove(arc)
+            lazy.remove(arc)
+        else:
+            there[arc] = rcs
+            kept.add(arc, rcs)
+            lazy.add(arc, rcs)
+        wanted = {frozenset(group) for group in groups(there)}
+        assert {frozenset(group.arcs) for group in kept.all()} == wanted
+        assert all(any(group <= set(big.arcs) for big in lazy.all()) for group in wanted)
+        assert sorted(arc for big in lazy.all() for arc in big.arcs) == sorted(there)
+        for rc in map(str, range(1, 9)):
+            assert set(kept.users(rc)) == {arc for arc, wants in there.items() if rc in wants}

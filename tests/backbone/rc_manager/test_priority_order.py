@@ -77,15 +77,15 @@ def test_equality_is_not_transitive():
 
 def test_a_number_set_by_the_operator_outlives_what_later_requests_say():
     tree = PriorityTree("m", 3)
-    names = tree.place([PathNode("m", 3), PathNode("a", 1)], console=False)
+    names, _ = tree.place([PathNode("m", 3), PathNode("a", 1)], console=False)
     tree.change("a", 9)
-    assert tree.place([PathNode("m", 3), PathNode("a", 1)], console=False) == names
+    assert tree.place([PathNode("m", 3), PathNode("a", 1)], console=False) == (names, False)
     assert tree.path(names) == (("m", 3), ("a", 9))
 
 
 def test_a_console_is_no_node_of_the_tree_even_if_it_has_the_name_of_one():
     tree = PriorityTree("m", 3)
-    console = tree.path(tree.place([PathNode("m", 5)], console=True))
-    behavior = tree.path(tree.place([PathNode("m", 3), PathNode("a", 1)], console=False))
+    console = tree.path(tree.place([PathNode("m", 5)], console=True)[0])
+    behavior = tree.path(tree.place([PathNode("m", 3), PathNode("a", 1)], console=False)[0])
     assert higher(console, behavior)
     assert not higher(behavior, console)
