@@ -68,6 +68,7 @@ from resource_pool.messages import (
     Jump,
     NoSuchAction,
     Noted,
+    NotFromYou,
     NotMySet,
     NotYours,
     Release,
@@ -103,6 +104,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         wish: Kind of RC → name.
         features: Kind of RC → features.
         usage: Period, packet time, deadline, jitter (seconds) and kind of what is sent on the radio.
+        further_usages: The same for each further kind of request.
         idle: True: no time is wanted yet.
         stops_at_once: True: nothing must be brought to rest at the end of a slice.
     """
@@ -115,6 +117,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     wish: dict[str, str] = {}
     features: dict[str, list[str]] = {}
     usage: tuple[float, float, float, float, str] = (0.05, 0.002, 0.0, 0.0, "drive")
+    further_usages: list[tuple[float, float, float, float, str]] = []
     idle: bool = False
     stops_at_once: bool = False
 
@@ -216,6 +219,8 @@ class AggregateResourceController(Component[ArcParameters]):
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Obey the RC manager about the gate, and the owner about everything else."""
         match asked.body:
+            case OpenGate() | CloseGate() | AskRequest() if asked.source != RC_MANAGER:
+                raise NotFromYou(f"{self.name} does not take {type(asked.body).__name__} from {asked.source}")
             case OpenGate() as order:
                 return await self._open(order)
             case CloseGate() as order:
@@ -252,7 +257,7 @@ class AggregateResourceController(Component[ArcParameters]):
             self._sets,
             owner=self._owner,
             path=given.path,
-            streams=[Usage(*given.usage)],
+            streams=[Usage(*usage) for usage in (given.usage, *given.further_usages)],
             streamed=self.sharable_roles,
             minimum_runtime_s=given.minimum_runtime_s,
             maximum_runtime_s=given.maximum_runtime_s,

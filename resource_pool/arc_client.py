@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -121,7 +121,7 @@ class ArcClient:
         maximum_runtime_s: float = 0.0,
         wish: dict[str, str] | None = None,
         features: dict[str, list[str]] | None = None,
-        usage: Usage = DEFAULT_DRIVE_USAGE,
+        usage: Usage | Sequence[Usage] = DEFAULT_DRIVE_USAGE,
         console: bool = False,
         idle: bool = False,
         stops_at_once: bool = False,
@@ -140,7 +140,8 @@ class ArcClient:
             maximum_runtime_s: End of extensions; 0: the minimum.
             wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
             features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
-            usage: How often commands are sent on the radio.
+            usage: How often commands are sent on the radio; several: one for each kind of command, ``drive`` among
+                them. A kind of its own for ``jump`` or ``transmitter`` lets those go while ``drive`` is slow.
             console: True for consoles.
             idle: True to want no time yet.
             stops_at_once: True if nothing must be brought to rest at the end of a slice: ``arc_suspending``
@@ -337,12 +338,21 @@ def claim_parameters(
     maximum_runtime_s: float = 0.0,
     wish: dict[str, str] | None = None,
     features: dict[str, list[str]] | None = None,
-    usage: Usage = DEFAULT_DRIVE_USAGE,
+    usage: Usage | Sequence[Usage] = DEFAULT_DRIVE_USAGE,
     console: bool = False,
     idle: bool = False,
     stops_at_once: bool = False,
 ) -> dict[str, Any]:
-    """Return the parameters an ARC is started with for this owner; see ``ArcClient.claim``."""
+    """Return the parameters an ARC is started with for this owner; see ``ArcClient.claim``.
+
+    Raises:
+        ValueError: No usage is given, or two of one kind.
+    """
+    usages = [usage] if isinstance(usage, Usage) else list(usage)
+    kinds = {one.kind for one in usages}
+    if not usages or len(kinds) < len(usages):
+        raise ValueError(f"{owner} claims with usages of the kinds {[one.kind for one in usages]}")
+    first, *further = ([one.period_s, one.packet_time_s, one.deadline_s, one.jitter_s, one.kind] for one in usages)
     return {
         "owner": owner,
         "path": [[node.name, node.priority] for node in path],
@@ -351,7 +361,8 @@ def claim_parameters(
         "maximum_runtime_s": maximum_runtime_s,
         "wish": wish or {},
         "features": features or {},
-        "usage": [usage.period_s, usage.packet_time_s, usage.deadline_s, usage.jitter_s, usage.kind],
+        "usage": first,
+        "further_usages": further,
         "idle": idle,
         "stops_at_once": stops_at_once,
     }

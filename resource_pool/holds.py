@@ -87,10 +87,14 @@ class HoldTable:
             raise Held(f"{self._rc} is held by {others[0]}", holder=others[0])
         return self._holds.get(hold.arc)
 
+    def find(self, arc: str, epoch: int) -> Hold | None:
+        """Return the ARC's hold of this epoch, if it is the present one."""
+        hold = self._holds.get(arc)
+        return hold if hold is not None and hold.epoch == epoch else None
+
     def has(self, arc: str, epoch: int) -> bool:
         """Say whether the ARC holds the RC under this epoch."""
-        hold = self._holds.get(arc)
-        return hold is not None and hold.epoch == epoch
+        return self.find(arc, epoch) is not None
 
     def disconnect(self, arc: str, epoch: int) -> Hold | None:
         """End the ARC's hold if it is of this epoch or an older one; return what was ended."""

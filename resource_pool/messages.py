@@ -368,6 +368,20 @@ class NotYours(Refusal):
     remedy = "Claim an ARC of your own."
 
 
+class NotFromYou(Refusal):
+    """Only the RC manager gives and takes RCs; only who holds one commands it. Nothing changed."""
+
+    code = "rc.not_from_you"
+    remedy = "Claim an ARC and command through it; the RC manager connects its RCs when its turn comes."
+
+
+class NeedsRestart(Refusal):
+    """The parameter exists, but what runs cannot take it over. Nothing changed."""
+
+    code = "rc.needs_restart"
+    remedy = "Change it in the mission file; it counts from the component's next start on."
+
+
 class ImpossibleUse(Refusal):
     """An RC cannot be held like that."""
 

@@ -13,7 +13,7 @@ import asyncio
 import logging
 import math
 import types
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -22,6 +22,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     AskRc,
@@ -35,9 +36,9 @@ from backbone.rc_manager.messages import (
     StaleEpoch,
 )
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import DriverSite, build_driver
+from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver
 from resource_pool.holds import Hold, HoldTable
-from resource_pool.messages import HardwareFault, ImpossibleUse
+from resource_pool.messages import HardwareFault, ImpossibleUse, NeedsRestart, NotFromYou
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +61,7 @@ class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
     driver: str = "simulated"
     sharable: bool = False
-    capacity: float = 1.0
+    capacity: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0
     links: dict[str, list[str]] = {}
     world: str = "world"
     options: dict[str, Any] = {}
@@ -74,9 +75,11 @@ class ResourceController(Component[R], Generic[R]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RcParameters
     commands: ClassVar[types.UnionType | type[Any] | None] = None
-    """Questions this kind of RC answers besides those of the RC manager."""
+    """Questions this kind of RC answers besides those of the RC manager; each has the fields ``arc`` and ``epoch``."""
     driver_kind: ClassVar[str] = ""
     """Kind of driver it is built on; empty: it has none, and so no driver's options."""
+    driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
+    """Parameters its driver takes over while it runs, if it can."""
     accepts: ClassVar[types.UnionType | type[Any] | None] = Connect | Disconnect | AskRc
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -88,9 +91,11 @@ class ResourceController(Component[R], Generic[R]):
         super().__init__(_sort_out_options(launch, self.parameters_type) if self.driver_kind else launch, bus, clock)
         first_epoch = int(clock.now_s() * EPOCHS_PER_S)
         self.holds = HoldTable(self.name, sharable=self.parameters.sharable, last_epoch=first_epoch)
-        self.applied = self.refused_stale = 0
+        self.applied = self.refused_stale = self.refused_strangers = 0
         self._connects = self._lease_ends = self._faults = 0
         self._unsafe: dict[str, Hold] = {}
+        self._in_force = self.parameters
+        self._drivers: list[Any] = []
         self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
 
@@ -111,6 +116,10 @@ class ResourceController(Component[R], Generic[R]):
         """Carry out one of ``commands``. Call ``admit`` first: it refuses what is not of the present hold."""
         return await super().answer(asked)
 
+    def may_command(self, source: str, hold: Hold, order: Any) -> bool:  # noqa: ARG002
+        """Say whether a command under this hold may come from there: it is the ARC that holds the RC."""
+        return source == address(Subsystem.RESOURCE_POOL, hold.arc)
+
     # ------------------------------------------------------------------ for derived classes
     def driver_site(self) -> DriverSite:
         """Return what a driver of this RC may use."""
@@ -125,7 +134,9 @@ class ResourceController(Component[R], Generic[R]):
             UnknownDriver: There is none.
             WrongParameter: It does not understand its options.
         """
-        return build_driver(self.driver_kind, name or self.parameters.driver, self.driver_site())
+        driver = build_driver(self.driver_kind, name or self.parameters.driver, self.driver_site())
+        self._drivers.append(driver)
+        return driver
 
     def admit(self, arc: str, epoch: int) -> Hold:
         """Return the hold under which the command may be carried out, and count it.
@@ -187,6 +198,8 @@ class ResourceController(Component[R], Generic[R]):
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Connect, disconnect, tell who holds, or carry out a command."""
         match asked.body:
+            case Connect() | Disconnect() if asked.source != RC_MANAGER:
+                raise self._stranger(asked.source, f"{type(asked.body).__name__} {asked.body.arc}")
             case Connect() as order:
                 return await self._connect(order, asked.stamp_s)
             case Disconnect(arc=arc, epoch=epoch, reason=reason):
@@ -198,7 +211,31 @@ class ResourceController(Component[R], Generic[R]):
             case AskRc():
                 return self.rc_state()
             case _:
+                self._check_speaker(asked)
                 return await self.command(asked)
+
+    def parameters_changed(self) -> None:
+        """Take over capacity, and what the driver can take over; the RC manager hears of it as news.
+
+        Raises:
+            NeedsRestart: What runs cannot take it over.
+            WrongParameter: The driver does not understand its options.
+        """
+        before, now = self._in_force, self.parameters
+        changed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)}
+        for_driver = changed & self.driver_parameters
+        fixed = changed - self.driver_parameters - {"capacity"}
+        unable = [driver for driver in self._drivers if not isinstance(driver, AdjustableDriver)]
+        if fixed or (for_driver and (unable or not self._drivers)):
+            raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed or for_driver))} while it runs")
+        if for_driver:
+            site = self.driver_site()
+            for driver in self._drivers:
+                site.options(getattr(driver, "options_type", NoOptions))
+            for driver in self._drivers:
+                driver.adjust(site)
+        self._in_force = now
+        self.changed()
 
     def publish_news(self) -> None:
         """Publish also who holds the resource."""
@@ -210,10 +247,28 @@ class ResourceController(Component[R], Generic[R]):
         return {
             "applied": self.applied,
             "refused_stale": self.refused_stale,
+            "refused_strangers": self.refused_strangers,
             "connects": self._connects,
             "lease_ends": self._lease_ends,
             "safety_faults": self._faults,
         }
+
+    def _check_speaker(self, asked: Envelope[Any]) -> None:
+        """Refuse a command that is of a present hold but not from who has it; one of no present hold is stale anyway.
+
+        Raises:
+            NotFromYou: It is such a command.
+        """
+        order = asked.body
+        hold = self.holds.find(order.arc, order.epoch)
+        if hold is not None and not self.may_command(asked.source, hold, order):
+            raise self._stranger(asked.source, f"{type(order).__name__} for {order.arc}")
+
+    def _stranger(self, source: str, what: str) -> NotFromYou:
+        """Count and note who wanted what is not theirs; return the refusal."""
+        self.refused_strangers += 1
+        self.story.note(self.name, f"{source} was refused: {what}")
+        return NotFromYou(f"{self.name} does not take {what} from {source}", source=source)
 
     async def _connect(self, order: Connect, given_s: float) -> Connected:
         if not 0 < order.lease_s < math.inf:

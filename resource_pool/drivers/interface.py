@@ -9,7 +9,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import msgspec
 
@@ -83,6 +83,18 @@ class RadioDriver(Protocol):
         """Let go of the device. When: once, last."""
 
 
+@runtime_checkable
+class AdjustableDriver(Protocol):
+    """A driver that need not be built anew when its options, or those parameters of its RC it uses, change."""
+
+    def adjust(self, site: DriverSite) -> None:
+        """Take over ``site.parameters``, whose options were checked, from the next packet or picture on.
+
+        Raises:
+            Refusal: It cannot; nothing has changed.
+        """
+
+
 @dataclass(frozen=True)
 class Picture:
     """What a grabber took.
@@ -145,8 +157,16 @@ class RobotProtocol(Protocol):
 BUILT_IN: Mapping[str, Mapping[str, str]] = {
     "radio": {"simulated": "resource_pool.drivers.simulated:SimulatedRadio"},
     "robot": {"simulated": "resource_pool.drivers.simulated:SimulatedScoutProtocol"},
+    "video_frequency": {"simulated": "resource_pool.drivers.interface:NoDevice"},
     "framegrabber": {"simulated": "resource_pool.drivers.simulated_video:SimulatedFramegrabber"},
 }
+
+
+class NoDevice:
+    """For resources that are a right and no device: there is nothing to drive."""
+
+    def __init__(self, site: DriverSite) -> None:
+        self._site = site
 
 
 def build_driver(kind: str, name: str, site: DriverSite) -> Any:

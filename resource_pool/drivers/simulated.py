@@ -59,6 +59,10 @@ class SimulatedRadio:
         self._site, self._world = site, world_of(site)
         self._bits_per_s = site.options(RadioOptions).bits_per_s
 
+    def adjust(self, site: DriverSite) -> None:
+        """Send at the new rate from the next packet on."""
+        self._bits_per_s = site.options(RadioOptions).bits_per_s
+
     async def open(self) -> None:
         """Wait for nothing: packets into a world that is not there are lost, as on the air."""
 

@@ -39,6 +39,10 @@ class SimulatedFramegrabber:
         self._next_s = 0.0
         self._pause_s = 1.0 / site.parameters.frame_rate_hz
 
+    def adjust(self, site: DriverSite) -> None:
+        """Take pictures at the new rate from the next one on."""
+        self._pause_s = 1.0 / site.parameters.frame_rate_hz
+
     async def open(self) -> None:
         """Fetch the world's model and open the renderer, or the painter where there is no OpenGL."""
         run = asyncio.get_running_loop().run_in_executor

@@ -23,6 +23,7 @@ from typing import Any
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
+from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import StaleEpoch
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import RadioDriver
@@ -128,6 +129,11 @@ class CommandRadio(ResourceController[RcParameters]):
             self._schedule.load(packet, now_s)
             self._loaded.set()
         return PacketLoaded()
+
+    def may_command(self, source: str, hold: Hold, order: LoadPacket) -> bool:
+        """Say whether a packet may come from there: from a robot that is connected to the same ARC as the radio."""
+        robot = component_of(source)
+        return source == address(Subsystem.RESOURCE_POOL, robot) and hold.companions.get(robot) == order.robot_epoch
 
     def statistics(self) -> dict[str, float]:
         """Count packets and overruns, in all and of the ARCs now connected, and measure packet times."""

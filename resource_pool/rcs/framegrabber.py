@@ -51,6 +51,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
     parameters_type = FramegrabberParameters
     commands = Tune
     driver_kind = "framegrabber"
+    driver_parameters = frozenset({"options", "frame_rate_hz"})
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

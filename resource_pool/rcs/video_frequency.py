@@ -8,8 +8,16 @@ Source: IROS 2001, section 2.
 
 from __future__ import annotations
 
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
 from resource_pool.resource_controller import RcParameters, ResourceController
 
 
 class VideoFrequency(ResourceController[RcParameters]):
     """The right to transmit on one frequency."""
+
+    driver_kind = "video_frequency"
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self.make_driver()

@@ -34,7 +34,7 @@ async def granted(pool: Pool, **more: Any) -> tuple[Owner, ArcClient]:
 
 
 async def asked_for(pool: Pool, arc: ArcClient) -> CurrentRequest:
-    return await pool.ear.ask(arc.address, AskRequest(), CurrentRequest, within_s=1)
+    return await pool.manager_voice.ask(arc.address, AskRequest(), CurrentRequest, within_s=1)
 
 
 def test_the_owner_hears_that_its_lease_is_over_when_the_rc_manager_is_gone(local_mission: Any) -> None:
@@ -107,7 +107,7 @@ def test_an_arc_that_heard_no_renewal_asks_anew_where_the_rc_manager_still_lives
             running = pool.running[arc.arc]
             epochs = {rc: epoch + 100 for rc, epoch in (await arc.state()).epochs.items()}
             # Epochs the RC manager never gave are never renewed: to the ARC it looks as if every renewal were lost.
-            await pool.ear.ask(arc.address, OpenGate(epochs, 0.0, 0.0), GateOpen, within_s=1)
+            await pool.manager_voice.ask(arc.address, OpenGate(epochs, 0.0, 0.0), GateOpen, within_s=1)
             await pool.clock.sleep_s(4.0)
             assert owner.heard()[-2:] == ["Suspended", "Resumed"]
             assert (await arc.drive(1.0, 1.0)).rc == "scout1"

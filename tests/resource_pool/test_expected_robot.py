@@ -22,8 +22,8 @@ def test_a_picture_of_another_robot_is_not_delivered_and_one_of_unknown_origin_i
             grabber = address(Subsystem.RESOURCE_POOL, "grabber")
             heard: list[Frame] = []
             pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
-            await pool.ear.ask(grabber, Connect("one", 1, 2.0, RcUse(), {}), Connected, within_s=1)
-            await pool.ear.ask(grabber, Tune("one", 1, "video", "scout1"), Applied, within_s=1)
+            await pool.manager_voice.ask(grabber, Connect("one", 1, 2.0, RcUse(), {}), Connected, within_s=1)
+            await pool.voice("one").ask(grabber, Tune("one", 1, "video", "scout1"), Applied, within_s=1)
             driver = pool.grabber_driver
             assert driver.deliver is not None
             driver.deliver(replace(driver.picture(), robot="scout2"))

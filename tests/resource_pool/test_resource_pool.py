@@ -65,11 +65,11 @@ async def state_of(pool: Pool, rc: str) -> RcState:
 
 async def connect(pool: Pool, rc: str, arc: str, epoch: int, **more: Any) -> None:
     given = {"lease_s": 2.0, "use": RcUse(), "companions": {}} | more
-    await pool.ear.ask(at(rc), Connect(arc, epoch, **given), Connected, within_s=1)
+    await pool.manager_voice.ask(at(rc), Connect(arc, epoch, **given), Connected, within_s=1)
 
 
 async def disconnect(pool: Pool, rc: str, arc: str, epoch: int) -> None:
-    await pool.ear.ask(at(rc), Disconnect(arc, epoch), Disconnected, within_s=1)
+    await pool.manager_voice.ask(at(rc), Disconnect(arc, epoch), Disconnected, within_s=1)
 
 
 async def connect_robot(pool: Pool, arc: str, epoch: int, scout: str = "scout1", period_s: float = 0.05) -> None:
@@ -80,7 +80,7 @@ async def connect_robot(pool: Pool, arc: str, epoch: int, scout: str = "scout1",
 
 
 async def command(pool: Pool, arc: str, epoch: int, what: Any, scout: str = "scout1") -> Applied:
-    return await pool.ear.ask(at(scout), CommandScout(arc, epoch, what), Applied, within_s=1)
+    return await pool.voice(arc).ask(at(scout), CommandScout(arc, epoch, what), Applied, within_s=1)
 
 
 # ---------------------------------------------------------------------- driving
@@ -212,7 +212,7 @@ def test_a_stale_command_is_refused_counted_and_not_applied(local_mission: Any) 
             assert (await state_of(pool, "scout1")).applied == 1
             packet = LoadPacket("one", 1, 1, encode_drive(9.0, 9.0), encode_safe(), 1)
             with pytest.raises(StaleEpoch):
-                await pool.ear.ask(at("radio"), packet, PacketLoaded, within_s=1)
+                await pool.voice("scout1").ask(at("radio"), packet, PacketLoaded, within_s=1)
             await pool.clock.sleep_s(0.3)
             assert encode_drive(9.0, 9.0) not in {heard.payload for heard in pool.radio_driver.heard}
 
@@ -494,10 +494,10 @@ def test_a_close_during_the_preparation_wins(local_mission: Any) -> None:
             epochs = {"scout1": 1, "radio": 1, "video": 1}
             await connect_robot(pool, arc.arc, 1)
             opening = asyncio.create_task(
-                pool.ear.ask(arc.address, OpenGate(epochs, 0.5, 10.0), GateOpen, within_s=2), name="opening"
+                pool.manager_voice.ask(arc.address, OpenGate(epochs, 0.5, 10.0), GateOpen, within_s=2), name="opening"
             )
             await pool.clock.sleep_s(0.2)
-            await pool.ear.ask(arc.address, CloseGate("higher", "console", 0.0, -1.0), GateClosed, within_s=1)
+            await pool.manager_voice.ask(arc.address, CloseGate("higher", "console", 0.0, -1.0), GateClosed, within_s=1)
             with pytest.raises(SwappedOut):
                 await opening
             await pool.clock.sleep_s(0.2)
@@ -515,7 +515,7 @@ def test_an_order_to_open_for_a_set_that_was_never_asked_for_is_refused(local_mi
             arc = await waiting_arc(pool, "drive")
             for epochs in ({}, {"scout2": 1}, {"scout1": 1, "radio": 1, "bridge": 1}):
                 with pytest.raises(Refusal) as refused:
-                    await pool.ear.ask(arc.address, OpenGate(epochs, 0.0, 10.0), GateOpen, within_s=2)
+                    await pool.manager_voice.ask(arc.address, OpenGate(epochs, 0.0, 10.0), GateOpen, within_s=2)
                 assert refused.value.code == "arc.not_my_set"
             assert pool.is_alive(arc.arc)
             await pool.kill(arc.arc)
@@ -538,7 +538,7 @@ def test_a_preparation_that_outlasts_the_rc_managers_patience_does_not_open(loca
             radio.serve(at("radio"), LoadPacket, never)
             order = OpenGate({"scout1": 1, "radio": 1, "video": 1}, 0.0, 10.0)
             with pytest.raises(Refusal):
-                await pool.ear.ask(arc.address, order, GateOpen, within_s=1.0)
+                await pool.manager_voice.ask(arc.address, order, GateOpen, within_s=1.0)
             assert not (await arc.state()).granted
             assert "could not be prepared" in (await arc.state()).reason
             await radio.close()
@@ -555,7 +555,7 @@ def test_a_radio_that_breaks_refuses_what_is_to_be_sent_at_once(local_mission: A
             pool.radio_driver.breaks = True
             packet = LoadPacket("one", 1, 1, b"J", encode_safe(), 1, at_once=True)
             with pytest.raises(HardwareFault):
-                await pool.ear.ask(at("radio"), packet, PacketLoaded, within_s=1)
+                await pool.voice("scout1").ask(at("radio"), packet, PacketLoaded, within_s=1)
             assert pool.is_alive("radio")
             pool.radio_driver.breaks = False
 
@@ -717,7 +717,7 @@ def test_no_picture_arrives_after_the_disconnection_even_if_the_driver_goes_on(l
             heard: list[Frame] = []
             pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
             await connect(pool, "grabber", "one", 1)
-            await pool.ear.ask(at("grabber"), Tune("one", 1, "video"), Applied, within_s=1)
+            await pool.voice("one").ask(at("grabber"), Tune("one", 1, "video"), Applied, within_s=1)
             driver = pool.grabber_driver
             late = driver.deliver
             late(driver.picture())
@@ -739,7 +739,7 @@ def test_garbled_and_silent_pictures_are_counted_and_not_delivered(local_mission
             heard: list[Frame] = []
             pool.ear.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda e: heard.append(e.body))
             await connect(pool, "grabber", "one", 1)
-            await pool.ear.ask(at("grabber"), Tune("one", 1, "video"), Applied, within_s=1)
+            await pool.voice("one").ask(at("grabber"), Tune("one", 1, "video"), Applied, within_s=1)
             driver = pool.grabber_driver
             for transmitters in (0, 2, 1, 3, -1, 0):
                 driver.deliver(driver.picture(transmitters))
@@ -760,7 +760,7 @@ def test_a_frequency_the_framegrabber_does_not_receive_is_refused(local_mission:
         async with a_pool(local_mission, ["grabber"], manager=False) as pool:
             await connect(pool, "grabber", "one", 1)
             with pytest.raises(Refusal) as refused:
-                await pool.ear.ask(at("grabber"), Tune("one", 1, "elsewhere"), Applied, within_s=1)
+                await pool.voice("one").ask(at("grabber"), Tune("one", 1, "elsewhere"), Applied, within_s=1)
             assert refused.value.code == "framegrabber.frequency"
             assert pool.grabber_driver.deliver is None
 
