@@ -8,7 +8,7 @@ Source: RAM 2002, "The RC Scheduler"; fencing by epoch after ARCHITECTURE's rule
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from backbone.rc_manager.messages import Held, RcUse, StaleEpoch
 
@@ -120,13 +120,18 @@ class HoldTable:
             )
         return hold
 
-    def renew(self, arc: str, epoch: int, until_s: float) -> bool:
-        """Let the hold of this epoch last until then at least; return whether there is one."""
+    def renew(self, arc: str, epoch: int, until_s: float, rank: int = -1) -> bool:
+        """Let the hold of this epoch last until then at least, with this rank unless it is negative.
+
+        Returns:
+            Whether there is such a hold.
+        """
         hold = self._holds.get(arc)
         if hold is None or hold.epoch != epoch:
             return False
-        if until_s > hold.lease_until_s:
-            self._holds[arc] = Hold(arc, epoch, hold.since_s, until_s, hold.use, hold.companions, hold.rank)
+        self._holds[arc] = replace(
+            hold, lease_until_s=max(until_s, hold.lease_until_s), rank=hold.rank if rank < 0 else rank
+        )
         return True
 
     def expire(self, now_s: float) -> list[Hold]:

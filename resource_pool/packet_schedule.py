@@ -186,6 +186,11 @@ class PacketSchedule:
                 raise ValueError(f"{arc}: a deadline of {usage.deadline_s} s")
         self._senders[arc] = _Sender(rank, [_Stream(usage) for usage in streams])
 
+    def rank(self, arc: str, rank: int) -> None:
+        """Give the ARC, if it is connected, another place by user priority; 0 goes first."""
+        if arc in self._senders:
+            self._senders[arc].rank = rank
+
     def disconnect(self, arc: str) -> list[Sending]:
         """Forget the ARC and all it loaded; return for each of its robots the packet that must be sent last."""
         sender = self._senders.pop(arc, None)

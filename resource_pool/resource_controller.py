@@ -116,6 +116,9 @@ class ResourceController(Component[R], Generic[R]):
         """Carry out one of ``commands``. Call ``admit`` first: it refuses what is not of the present hold."""
         return await super().answer(asked)
 
+    def ranked(self, arc: str, epoch: int) -> None:
+        """Take over the rank of this hold, if it is the present one. When: with each renewal."""
+
     def may_command(self, source: str, hold: Hold, order: Any) -> bool:  # noqa: ARG002
         """Say whether a command under this hold may come from there: it is the ARC that holds the RC."""
         return source == address(Subsystem.RESOURCE_POOL, hold.arc)
@@ -334,7 +337,8 @@ class ResourceController(Component[R], Generic[R]):
         leases: Leases = envelope.body
         for lease in leases.leases:
             if lease.rc == self.name:
-                self.holds.renew(lease.arc, lease.epoch, envelope.stamp_s + leases.lease_s)
+                self.holds.renew(lease.arc, lease.epoch, envelope.stamp_s + leases.lease_s, lease.rank)
+                self.ranked(lease.arc, lease.epoch)
 
 
 def _sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:

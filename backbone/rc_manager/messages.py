@@ -305,11 +305,20 @@ class RcState(Message, frozen=True):
 
 
 class Lease(Message, frozen=True):
-    """One renewed hold."""
+    """One renewed hold.
+
+    Attributes:
+        rc: The RC.
+        arc: Who holds it.
+        epoch: Of the connection.
+        rank: Place by user priority among those who hold a sharable RC now, 0 first; negative: as it was. It changes
+            when others come and go, and with every change of priority.
+    """
 
     rc: str
     arc: str
     epoch: int
+    rank: int = -1
 
 
 class Leases(Message, frozen=True):

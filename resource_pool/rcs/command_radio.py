@@ -130,6 +130,12 @@ class CommandRadio(ResourceController[RcParameters]):
             self._loaded.set()
         return PacketLoaded()
 
+    def ranked(self, arc: str, epoch: int) -> None:
+        """Let the ARC's packets go first that is higher now."""
+        hold = self.holds.find(arc, epoch)
+        if hold is not None:
+            self._schedule.rank(arc, hold.rank)
+
     def may_command(self, source: str, hold: Hold, order: LoadPacket) -> bool:
         """Say whether a packet may come from there: from a robot that is connected to the same ARC as the radio."""
         robot = component_of(source)

@@ -12,11 +12,14 @@ from pool_on_local_network import Pool, a_pool
 from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.keys import Conversation
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     Connect,
     Connected,
     Disconnect,
     Disconnected,
+    Lease,
+    Leases,
     RcUse,
     StaleEpoch,
     Usage,
@@ -177,5 +180,30 @@ def test_who_loses_the_radio_before_its_packets_turn_is_told_that_nothing_was_se
             assert [heard.payload for heard in pool.radio_driver.heard] == [b"D", b"S"]
             found = await statistics(pool)
             assert (found["applied"], found["refused_stale"]) == (1, 1)
+
+    run_virtual(main())
+
+
+def test_an_arc_that_others_come_before_gives_way_to_them_from_its_next_renewal_on(local_mission: Any) -> None:
+    """Who was alone when it was connected has rank 0; that must not last."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"], manager=False) as pool:
+            await connect(pool, "low", 1, Usage(0.05, 0.02, kind="drive"))
+            await connect(pool, "high", 2, Usage(0.1, 0.02, kind="drive"), robot="scout2")
+            await asyncio.gather(load(pool, "low", 1, b"L"), load(pool, "high", 2, b"H", "scout2"))
+            await pool.clock.sleep_s(0.49)
+            begun_s = pool.radio_driver.heard[0].at_s
+            firsts = []
+            for ranks in ({}, {"low": 1, "high": 0}, {"low": -1, "high": -1}):
+                leases = [Lease("radio", arc, 1 + (arc == "high"), rank) for arc, rank in ranks.items()]
+                pool.manager_voice.publish(RC_MANAGER, Conversation.LEASES, Leases(leases, 60.0))
+                heard = len(pool.radio_driver.heard)
+                await pool.clock.sleep_s(1.0)
+                # Both are released at once every 0.1 s.
+                both = [p for p in pool.radio_driver.heard[heard:] if round((p.at_s - begun_s) * 1e6) % 100_000 == 0]
+                assert len(both) == 10
+                firsts.append({packet.payload for packet in both})
+            assert firsts == [{b"L"}, {b"H"}, {b"H"}]
 
     run_virtual(main())
