@@ -252,9 +252,9 @@ def solver_table(compared: Sequence[Any]) -> str:
                 continue
             most = "" if outcome.proven else f" (≤ {outcome.at_most:.1f})"
             cells.append(f"{f'{outcome.at_once:.1f}{most}':>18s} {outcome.load:5.0%} {outcome.slices_per_h:8.0f}")
-        price = 1 - one.bound.at_once / one.free.at_once
         lines.append(
-            f"{one.shape:8s} {one.arcs:5d} {one.rcs:4d} {' '.join(cells)}  {one.free.never:12d}  {price:17.0%}"
+            f"{one.shape:8s} {one.arcs:5d} {one.rcs:4d} {' '.join(cells)}"
+            f"  {one.free.never:12d}  {one.price_of_fairness:17.0%}"
         )
     return "\n".join(lines)
 
