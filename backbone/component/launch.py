@@ -24,6 +24,8 @@ class Launch(Message, frozen=True):
         parameters: Values for the class's ``Parameters``.
         requester: Address of whoever asked for it.
         run_directory: Folder of the mission's files on this host; gone when the mission has ended.
+        process: Name of the process it shares with other components; empty: a process of its own. Without a
+            class path this is the launch of the shared process itself, and ``requester`` its creator.
     """
 
     mission: str
@@ -38,6 +40,12 @@ class Launch(Message, frozen=True):
     parameters: dict[str, Any] = {}
     requester: str = ""
     run_directory: str = ""
+    process: str = ""
+
+    @property
+    def is_shared_process(self) -> bool:
+        """Whether this starts a process for components to come, and no component."""
+        return bool(self.process) and not self.class_path
 
     @property
     def address(self) -> str:

@@ -9,6 +9,7 @@ import logging
 import os
 import signal
 import sys
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import uvloop
@@ -46,6 +47,21 @@ def load_class(class_path: str) -> type[Component[Any]]:
 
 def run_process(launch: Launch) -> int:
     """Become the component and return the process's exit code."""
+
+    def begin() -> Coroutine[Any, Any, None]:
+        component_class = load_class(launch.class_path)
+        component_class.before_bus(launch)
+        return _live(component_class, launch)
+
+    return run_to_end(launch, begin)
+
+
+def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -> int:
+    """Run what ``begin`` returns in an event loop of this process and return the process's exit code.
+
+    Args:
+        begin: Called before there is a loop.
+    """
     faulthandler.enable()
     logging.basicConfig(
         level=os.environ.get("SCOUT_LOG", "INFO"),
@@ -54,20 +70,31 @@ def run_process(launch: Launch) -> int:
         force=True,
     )
     try:
-        component_class = load_class(launch.class_path)
-        component_class.before_bus(launch)
+        work = begin()
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(_live(component_class, launch))
-    except Refusal as refusal:
-        logging.getLogger(__name__).error("%s: %s", refusal.code, refusal)
-        return EXIT_REFUSED
-    except BackboneError as error:
-        logging.getLogger(__name__).error("%s: %s", type(error).__name__, error)
-        return EXIT_NO_HUB
-    except BaseException:
-        logging.getLogger(__name__).exception("%s ended by a bug", launch.address)
-        return EXIT_BUG
+            runner.run(work)
+    except BaseException as error:
+        return exit_code_of(error, launch.address)
     return 0
+
+
+def exit_code_of(error: BaseException, address: str) -> int:
+    """Log why a component ended and return the exit code that says so.
+
+    Args:
+        error: What its life ended with.
+    """
+    log = logging.getLogger(__name__)
+    match error:
+        case Refusal():
+            log.error("%s ended: %s: %s", address, error.code, error)
+            return EXIT_REFUSED
+        case BackboneError():
+            log.error("%s ended: %s: %s", address, type(error).__name__, error)
+            return EXIT_NO_HUB
+        case _:
+            log.error("%s ended by a bug", address, exc_info=error)
+            return EXIT_BUG
 
 
 async def _live(component_class: type[Component[Any]], launch: Launch) -> None:

@@ -47,6 +47,7 @@ class Spawn(Message, frozen=True):
         ready_within_s: Seconds of the machine until its liveliness token must stand.
         pinned: True if it may run on this host only. Kept here, with the tags, for a placer that lost its memory.
         tags: Tags its host must have.
+        process: Name of the process it shares with others on its host; empty: a process of its own.
     """
 
     subsystem: Subsystem
@@ -59,6 +60,7 @@ class Spawn(Message, frozen=True):
     ready_within_s: float = 20.0
     pinned: bool = False
     tags: list[str] = []
+    process: str = ""
 
 
 class Spawned(Message, frozen=True):
@@ -70,6 +72,9 @@ class Spawned(Message, frozen=True):
 
 class EndProcess(Message, frozen=True):
     """End a component's whole process tree: ask, then SIGTERM, then SIGKILL.
+
+    One that shares its process is asked, then told to end, and the others stay; if that does not help,
+    the process is killed, and the others are restarted by their policies.
 
     Attributes:
         name: The component.

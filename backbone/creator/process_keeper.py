@@ -1,21 +1,37 @@
 """Keeps processes: joins supervision, which decides, with a zygote, which forks, and a bus, which tells readiness.
 
-Used by creators for what the placer orders and by the launcher for the core services.
+Components that share a process are admitted to it over the bus instead of being forked; ``shared_processes``
+decides about that. Used by creators for what the placer orders and by the launcher for the core services.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
 import signal
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import Any, Protocol, assert_never
 
+import msgspec
+
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
+from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
+from backbone.component.membership import (
+    PROCESSES,
+    Admit,
+    Admitted,
+    AwaitEnd,
+    EndMember,
+    MemberEnded,
+    MemberEnding,
+    process_address,
+    read_process_address,
+)
 from backbone.component.messages import Stop, Stopping
 from backbone.creator.messages import (
     EndProcess,
@@ -26,6 +42,18 @@ from backbone.creator.messages import (
     RestartPolicy,
     Spawn,
     StartFailed,
+)
+from backbone.creator.shared_processes import (
+    AdmitMember,
+    EndMemberAlone,
+    ForkProcess,
+    MemberGone,
+    MemberNotStarted,
+    MemberRuns,
+    ProcessesWakeAt,
+    ProcessInstruction,
+    SharedProcesses,
+    SignalProcess,
 )
 from backbone.creator.supervision import (
     AskToStop,
@@ -43,8 +71,8 @@ from backbone.creator.supervision import (
 )
 from backbone.creator.zygote import NoProcess
 from backbone.creator.zygote_process import log_path
-from backbone.errors import BackboneError
-from backbone.naming import component_of
+from backbone.errors import BackboneError, Refusal
+from backbone.naming import IllegalName, Subsystem, component_of
 
 log = logging.getLogger(__name__)
 
@@ -52,6 +80,8 @@ LAST_LINES = 20
 _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
 HUB_READY_S = 20.0  # chosen: like Spawn.ready_within_s
 OVERLAP_S = 0.3  # chosen: ten times what a component that obeys takes; who takes longer holds nobody up
+ADMIT_EACH_S = 1.0  # chosen: a thousand times what an answer takes
+AWAIT_EACH_S = 60.0  # chosen: the question stands until the member ends; renewed in case an answer was lost
 _DEFAULTS = EndProcess("")
 
 
@@ -90,20 +120,23 @@ class ProcessKeeper:
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         self._zygote, self._clock = zygote, clock or MissionClock.started_now()
         self._bus: Bus | None = None
-        self._supervision = Supervision()
+        self._supervision, self._shared = Supervision(), SharedProcesses()
         self._kept: dict[str, _Kept] = {}
         self._failures: dict[str, StartFailed] = {}
         self._starting: dict[str, list[asyncio.Future[int]]] = {}
         self._ending: dict[str, list[asyncio.Future[ProcessEnded]]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._alarm: asyncio.Task[None] | None = None
+        self._shared_alarm: asyncio.Task[None] | None = None
+        self._talks: dict[int, set[asyncio.Task[None]]] = {}
         self._is_closing = False
-        zygote.on_exit = lambda pid, returncode: self._do(self._supervision.exited(pid, returncode, self._now_s()))
+        zygote.on_exit = self._exited
 
     def use(self, bus: Bus) -> None:
         """Hear of readiness, and ask processes to stop, over this bus from now on."""
         self._bus = bus
         bus.watch_alive("*/*", self._token_changed)
+        bus.watch_alive(PROCESSES, self._process_token_changed)
 
     # Start
     async def start(
@@ -241,6 +274,23 @@ class ProcessKeeper:
         if stands and kept is not None and kept.launch.address == address:
             self._do(self._supervision.ready(name))
 
+    def _process_token_changed(self, address: str, stands: bool) -> None:
+        try:
+            host, process, pid = read_process_address(address)
+        except IllegalName as illegal:  # a stranger's token must not end the creator
+            log.info("ignored: %s", illegal.detail)
+            return
+        if stands and any((k.launch.host, k.launch.process) == (host, process) for k in self._kept.values()):
+            self._do_shared(self._shared.serving(process, pid, self._now_s()))
+
+    def _exited(self, pid: int, returncode: int) -> None:
+        if not self._shared.has(pid):
+            self._do(self._supervision.exited(pid, returncode, self._now_s()))
+            return
+        for talk in self._talks.pop(pid, set()):
+            talk.cancel()
+        self._do_shared(self._shared.exited(pid, returncode))
+
     async def _fork(self, launch: Launch, forked: asyncio.Future[int] | None) -> None:
         name = launch.name
         try:
@@ -253,6 +303,44 @@ class ProcessKeeper:
         if forked is not None and not forked.done():
             forked.set_result(pid)
         self._do(self._supervision.forked(name, pid, self._now_s()))
+
+    async def _fork_process(self, process: str, member: Launch) -> None:
+        launch = msgspec.structs.replace(
+            member,
+            subsystem=Subsystem.BACKBONE,
+            name=process,
+            type="shared_process",
+            class_path="",
+            parameters={},
+            requester="" if self._bus is None else self._bus.source,
+        )
+        try:
+            pid = await self._zygote.fork(launch)
+        except NoProcess as error:
+            self._do_shared(self._shared.fork_failed(process, str(error)))
+            return
+        self._do_shared(self._shared.forked(process, pid, self._now_s()))
+
+    async def _share_life(self, bus: Bus, at: str, launch: Launch, life: int) -> None:
+        """Have the component admitted and wait for its end; cancelled when the process ends."""
+        try:
+            await ask_until_answered(
+                bus, self._clock, at, Admit(launch, life), Admitted, each_s=ADMIT_EACH_S, within_s=math.inf
+            )
+        except Refusal as refusal:
+            self._do_shared(self._shared.refused(life, str(refusal), self._now_s()))
+            return
+        self._do_shared(self._shared.admitted(life))
+        ended = await ask_until_answered(
+            bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
+        )
+        self._do_shared(self._shared.member_ended(life, ended.exit_code, self._now_s()))
+
+    async def _end_member(self, bus: Bus, at: str, life: int) -> None:
+        try:
+            await bus.ask(at, EndMember(life), MemberEnding, within_s=ADMIT_EACH_S)
+        except BackboneError as error:  # supervision's next step is to kill the process
+            log.info("%s did not take the order to end a member: %s", at, error)
 
     async def _ask_to_stop(self, kept: _Kept, within_s: float) -> None:
         try:
@@ -267,14 +355,22 @@ class ProcessKeeper:
         await self._clock.sleep_until_s(at_s * self._clock.rate)
         self._do(self._supervision.woken(self._now_s()))
 
+    async def _ring_shared(self, at_s: float) -> None:
+        await self._clock.sleep_until_s(at_s * self._clock.rate)
+        self._do_shared(self._shared.woken(self._now_s()))
+
     # Instructions
     def _do(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
         for instruction in instructions:
             match instruction:
+                case Fork(name=name) if process := self._kept[name].launch.process:
+                    self._do_shared(self._shared.wanted(name, process, self._now_s()))
                 case Fork(name=name):
                     self._task(self._fork(self._kept[name].launch, forked), f"fork {name}")
                 case AskToStop(name=name, within_s=within_s):
                     self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
+                case Signal(name=name, number=number) if self._kept[name].launch.process:
+                    self._do_shared(self._shared.signalled(name, number))
                 case Signal(name=name, pid=pid, number=number):
                     log.info("%s to %s, pid %d", number.name, name, pid)
                     self._zygote.kill(pid, number)
@@ -303,6 +399,45 @@ class ProcessKeeper:
             self._kept = {one.name: self._kept[one.name] for one in self._supervision}
             self.on_changed()
 
+    def _do_shared(self, instructions: list[ProcessInstruction]) -> None:
+        for instruction in instructions:
+            match instruction:
+                case ForkProcess(process=process, name=name):
+                    self._task(self._fork_process(process, self._kept[name].launch), f"fork {process}")
+                case AdmitMember(process=process, pid=pid, name=name, life=life):
+                    launch = self._kept[name].launch
+                    at = process_address(launch.host, process, pid)
+                    self._talk(pid, self._share_life(self._required_bus(), at, launch, life), f"life of {name}")
+                case EndMemberAlone(process=process, pid=pid, name=name, life=life):
+                    at = process_address(self._kept[name].launch.host, process, pid)
+                    self._talk(pid, self._end_member(self._required_bus(), at, life), f"end {name}")
+                case SignalProcess(process=process, pid=pid, number=number):
+                    log.info("%s to shared process %s, pid %d", number.name, process, pid)
+                    self._zygote.kill(pid, number)
+                case MemberRuns(name=name, pid=pid):
+                    self._do(self._supervision.forked(name, pid, self._now_s()))
+                case MemberNotStarted(name=name, why=why):
+                    self._do(self._supervision.fork_failed(name, why, self._now_s()))
+                case MemberGone(name=name, returncode=returncode, how=how):
+                    self._do(self._supervision.left(name, returncode, how, self._now_s()))
+                case ProcessesWakeAt(at_s=at_s):
+                    if self._shared_alarm is not None and self._shared_alarm is not asyncio.current_task():
+                        self._shared_alarm.cancel()
+                    self._shared_alarm = self._task(self._ring_shared(at_s), "shared processes' alarm")
+                case _:
+                    assert_never(instruction)
+
+    def _required_bus(self) -> Bus:
+        if self._bus is None:
+            raise RuntimeError("a shared process serves before there is a bus to hear of it")
+        return self._bus
+
+    def _talk(self, pid: int, work: Coroutine[Any, Any, None], name: str) -> None:
+        """Do what ends with the shared process it is about."""
+        talks, talk = self._talks.setdefault(pid, set()), self._task(work, name)
+        talks.add(talk)
+        talk.add_done_callback(talks.discard)
+
     def _set_alarm(self, at_s: float) -> None:
         if self._alarm is not None and self._alarm is not asyncio.current_task():
             self._alarm.cancel()
@@ -327,7 +462,9 @@ class ProcessKeeper:
 
     def _last_lines(self, name: str) -> list[str]:
         kept = self._kept.get(name)
-        return last_lines(kept.launch.run_directory, name) if kept is not None and kept.launch.run_directory else []
+        if kept is None or not kept.launch.run_directory:
+            return []
+        return last_lines(kept.launch.run_directory, kept.launch.process or name)
 
 
 @dataclass
@@ -359,6 +496,7 @@ def _as_spawn(launch: Launch, policy: RestartPolicy, ready_within_s: float) -> S
         launch.requester,
         policy,
         ready_within_s,
+        process=launch.process,
     )
 
 

@@ -137,6 +137,7 @@ class Creator(Component[CreatorParameters]):
             class_path=order.class_path,
             parameters=order.parameters,
             requester=order.requester,
+            process=order.process,
         )
         try:
             pid = await self._keeper.start(launch, order.policy, order.ready_within_s, order)

@@ -6,7 +6,7 @@ happened and when, and does what it is told, in order. Times are seconds of the 
 Rules:
 
 * Of one name there is never more than one process: a name is forked again only after its last process
-  was reported as ended.
+  was reported as ended. Which of them share one is decided in ``shared_processes``; here each is alone.
 * In no window of a policy are there more restarts than its limit.
 * A process is dead when the zygote says so, never because its liveliness token fell: when the hub
   dies, all tokens fall and everybody lives. A token that rises means ready, nothing else.
@@ -264,12 +264,23 @@ class Supervision:
         """Take note that nothing is left of this process.
 
         Args:
+            pid: Of a process nobody shares.
             returncode: Exit code, or the number of the signal that killed it, negative.
         """
         one = next((each for each in self if each.pid == pid), None)
         if one is None:
             return []
         return self._and_wake(self._gone(one, one.failure or describe(returncode), returncode, now_s))
+
+    def left(self, name: str, returncode: int, how: str, now_s: float) -> list[Instruction]:
+        """Take note that nothing is left of this component, which shared its process.
+
+        Args:
+            returncode: What a process of its own would have ended with.
+            how: For people.
+        """
+        one = self._all[name]
+        return self._and_wake(self._gone(one, one.failure or how, returncode, now_s))
 
     def ask_failed(self, name: str, now_s: float) -> list[Instruction]:
         """Take note that it could not be asked to stop; it gets SIGTERM unless it is just about to leave."""

@@ -35,6 +35,7 @@ import msgspec
 
 from backbone.component.launch import Launch
 from backbone.component.process import EXIT_BUG, run_process
+from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
 from backbone.wire import Message
 
@@ -259,7 +260,7 @@ class _ZygoteProcess:
             os.environ[process_table.MARK] = str(os.getpid())
             process_table.set_title(launch.name)
             _redirect(launch)
-            code = run_process(launch)
+            code = run_shared_process(launch) if launch.is_shared_process else run_process(launch)
         except BaseException:
             traceback.print_exc()
         finally:

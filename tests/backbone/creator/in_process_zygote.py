@@ -1,4 +1,4 @@
-"""A zygote's twin for virtual time: components run as tasks of one loop, and die as told."""
+"""A zygote's twin for virtual time: components and shared processes run as tasks of one loop, and die as told."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ from backbone.bus.clock import VirtualClock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
+from backbone.component.messages import Stop
 from backbone.component.process import EXIT_BUG, EXIT_REFUSED, load_class
+from backbone.component.shared_process import SharedProcess
 from backbone.creator.zygote import NoProcess
 from backbone.errors import Refusal
+from backbone.keys import Conversation
 
 
 class InProcessZygote:
     """Runs each component as a task; its pid is a number that only grows.
 
     Attributes:
-        lives: Components that run, by pid.
+        lives: Components and shared processes that run, by pid.
         forked: Names in the order in which they were forked.
         refuses: Why there is no further process; empty: there is one.
     """
@@ -28,7 +31,7 @@ class InProcessZygote:
     def __init__(self, network: LocalNetwork) -> None:
         self.on_exit: Callable[[int, int], None] = lambda _pid, _returncode: None
         self.on_lost: Callable[[], None] = lambda: None
-        self.lives: dict[int, Component[Any]] = {}
+        self.lives: dict[int, Component[Any] | SharedProcess] = {}
         self.forked: list[str] = []
         self.refuses = ""
         self._network, self._next_pid = network, 1000
@@ -40,10 +43,14 @@ class InProcessZygote:
         await asyncio.sleep(0)
         clock = VirtualClock()
         self._next_pid += 1
-        pid, kind = self._next_pid, load_class(launch.class_path)
+        pid = self._next_pid
         self.forked.append(launch.name)
-        self.lives[pid] = component = kind(launch, self._network.join(launch.address, clock), clock)
-        self._tasks[pid] = task = asyncio.create_task(component.run(), name=launch.name)
+        if launch.is_shared_process:
+            self.lives[pid] = SharedProcess(launch, self._network.join, clock, pid)
+        else:
+            kind = load_class(launch.class_path)
+            self.lives[pid] = kind(launch, self._network.join(launch.address, clock), clock)
+        self._tasks[pid] = task = asyncio.create_task(self.lives[pid].run(), name=launch.name)
         task.add_done_callback(lambda done: self._ended(pid, done))
         return pid
 
@@ -94,8 +101,26 @@ class Leaver(Component[NoParameters]):
         self.end("its work is done")
 
 
+class Failing(Component[NoParameters]):
+    """Is ready, and fails as soon as it hears of a publication under its address."""
+
+    async def connect(self) -> None:
+        self.bus.subscribe(self.address, Conversation.COMMAND, Stop, self._fail_on)
+
+    def _fail_on(self, heard: object) -> None:
+        raise RuntimeError("the bug of the sample")
+
+
 class Broken(Component[NoParameters]):
     """Ends by a bug before it is ready."""
 
     async def connect(self) -> None:
         raise RuntimeError("the bug of the sample")
+
+
+class Forker(Component[NoParameters]):
+    """Has something to do before there is a bus."""
+
+    @classmethod
+    def before_bus(cls, launch: Launch) -> None:
+        raise AssertionError("called although there is a bus")

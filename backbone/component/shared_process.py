@@ -1,0 +1,206 @@
+"""A process that several components share: it begins empty, its creator admits its members.
+
+Each member is a component like any other, with a bus, a token and a story of its own; what they share is
+the event loop, the session to the hub and the pid. A member that ends, also by a bug, leaves the others
+alone. Who blocks the event loop blocks them all, and is ended with all of them.
+
+SIGTERM ends all members in good order, the last admitted first, and then the process.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus, Clock
+from backbone.bus.shared_bus import SharedSession
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.component.membership import (
+    Admit,
+    Admitted,
+    AlreadyMember,
+    AwaitEnd,
+    EndMember,
+    MemberEnded,
+    MemberEnding,
+    NeedsOwnProcess,
+    NotAMember,
+    NotItsCreator,
+    ProcessQuestion,
+    process_address,
+)
+from backbone.component.process import exit_code_of, load_class, run_to_end
+from backbone.wire import Envelope, Message
+
+
+@dataclass
+class _Member:
+    """One life in this process.
+
+    Attributes:
+        component: None until its class is loaded.
+        ended: Its exit code, as soon as there is one.
+        end_reason: Why it is to end; empty: it is not.
+    """
+
+    launch: Launch
+    component: Component[Any] | None = None
+    ended: asyncio.Future[int] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
+    end_reason: str = ""
+
+    def end(self, reason: str) -> None:
+        """Have it leave in good order, at once or as soon as it can be told."""
+        self.end_reason = self.end_reason or reason
+        if self.component is not None:
+            self.component.end(reason)
+
+
+class SharedProcess:
+    """The members of this process and the answers to its creator.
+
+    Args:
+        launch: Of the process itself; see ``Launch.process``.
+        join: Returns a bus for a source; all of them are neighbors.
+        clock: The mission's time, for all members.
+        pid: The process, as its creator knows it.
+    """
+
+    def __init__(self, launch: Launch, join: Callable[[str, Clock], Bus], clock: Clock, pid: int) -> None:
+        self.address = process_address(launch.host, launch.process, pid)
+        self._launch, self._join, self._clock = launch, join, clock
+        self._members: dict[int, _Member] = {}
+        self._lives: dict[int, asyncio.Task[None]] = {}
+        self._end = asyncio.Event()
+        self._bug: BaseException | None = None
+
+    async def run(self) -> None:
+        """Answer the creator until told to end; when this returns, every member has left.
+
+        Cancelled, it dies as if it were killed, and its members with it.
+
+        Raises:
+            BaseException: The bug in this file that ended it.
+        """
+        bus = self._join(self.address, self._clock)
+        bus.on_bug = self._fail
+        try:
+            bus.serve(self.address, ProcessQuestion, self._answer)
+            bus.declare_alive(self.address)
+            await self._end.wait()
+            for life in reversed(self._lives):
+                self._members[life].end("its process ends")
+            await asyncio.gather(*self._lives.values())
+        finally:
+            lives = list(self._lives.values())
+            for task in lives:
+                task.cancel()
+            await asyncio.gather(*lives, return_exceptions=True)
+            await bus.close()
+        if self._bug is not None:
+            raise self._bug
+
+    def end(self, _reason: str = "") -> None:
+        """Have all members leave in good order; ``run`` returns when that is done."""
+        self._end.set()
+
+    # ------------------------------------------------------------------ questions
+    async def _answer(self, asked: Envelope[Any]) -> Message:
+        if asked.source != self._launch.requester:
+            raise NotItsCreator(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
+        question: Admit | AwaitEnd | EndMember = asked.body
+        match question:
+            case Admit(launch=launch, life=life):
+                self._admit(launch, life)
+                return Admitted()
+            case AwaitEnd(life=life):
+                return MemberEnded(life, await asyncio.shield(self._member(life).ended))
+            case EndMember(life=life):
+                self._member(life).end(f"told by {asked.source}")
+                return MemberEnding()
+
+    def _member(self, life: int) -> _Member:
+        member = self._members.get(life)
+        if member is None:
+            raise NotAMember(f"no life {life} was begun in {self.address}", life=life)
+        return member
+
+    # ------------------------------------------------------------------ members
+    def _admit(self, launch: Launch, life: int) -> None:
+        if life in self._members:  # the answer was lost
+            return
+        for other in self._lives:
+            if self._members[other].launch.name == launch.name:
+                raise AlreadyMember(f"{launch.name} lives in {self.address} as life {other}", life=other)
+        member = self._members[life] = _Member(launch)
+        if self._end.is_set():
+            member.end("its process ends")
+        self._lives[life] = asyncio.create_task(self._live(member, life), name=launch.name)
+
+    async def _live(self, member: _Member, life: int) -> None:
+        exit_code = 0
+        try:
+            await self._live_as(member)
+        except Exception as error:  # as at the end of a process of its own
+            exit_code = exit_code_of(error, member.launch.address)
+        del self._lives[life]
+        member.component = None
+        member.ended.set_result(exit_code)
+
+    async def _live_as(self, member: _Member) -> None:
+        launch = member.launch
+        component_class = await _load(launch.class_path)
+        if member.end_reason:
+            return
+        bus = self._join(launch.address, self._clock)
+        try:
+            component = component_class(launch, bus, self._clock)
+        except BaseException:
+            await bus.close()
+            raise
+        member.component = component
+        await component.run()
+
+    def _fail(self, bug: BaseException) -> None:
+        self._bug = self._bug or bug
+        self.end()
+
+
+def run_shared_process(launch: Launch) -> int:
+    """Become the shared process of this launch and return the process's exit code."""
+    return run_to_end(launch, lambda: _live(launch))
+
+
+async def _live(launch: Launch) -> None:
+    session = SharedSession(launch.mission, launch.endpoint)
+    try:
+        clock = MissionClock(launch.clock_origin_monotonic_s, launch.clock_rate)
+        shared = SharedProcess(launch, session.join, clock, os.getpid())
+        for number in (signal.SIGTERM, signal.SIGINT):
+            asyncio.get_running_loop().add_signal_handler(number, shared.end)
+        await shared.run()
+    finally:
+        await session.close()
+
+
+async def _load(class_path: str) -> type[Component[Any]]:
+    """Return the class without holding up the other members while its module is imported.
+
+    Raises:
+        WrongClassPath: There is none.
+        NeedsOwnProcess: It must not share a process.
+    """
+    if class_path.partition(":")[0] in sys.modules:
+        found = load_class(class_path)
+    else:
+        found = await asyncio.to_thread(load_class, class_path)
+    for hook in ("before_bus", "open_bus"):
+        if getattr(found, hook).__func__ is not getattr(Component, hook).__func__:
+            raise NeedsOwnProcess(f"{class_path} has a {hook} of its own", class_path=class_path)
+    return found

@@ -1,0 +1,314 @@
+"""Shared processes: which one is forked when, who is admitted to it, and when it ends.
+
+Events go in, instructions come out, as for ``supervision``, which decides about each component and knows
+nothing of this: to it an admission is a fork, and the end of a membership the end of a process. Times are
+seconds of the machine on one clock.
+
+Rules:
+
+* Of one shared process there is never more than one pid: it is forked again only after the last one was
+  reported as ended.
+* Whoever is wanted is answered by exactly one ``MemberRuns`` or ``MemberNotStarted``, and whoever runs by
+  exactly one ``MemberGone``, when nothing of it is left.
+* A process nobody lives in is ended. Its last member is gone only when the process is.
+* What cannot be ended alone is ended with its process: a member that must be killed, and a process that
+  does not serve or does not admit in time. All who lived in it are gone then, each to be restarted by its
+  own policy; who was only to be admitted when it was ended is admitted to its successor.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from backbone.creator.supervision import TERM_S, describe
+
+SERVES_WITHIN_S = 10.0  # chosen: half of what its first member has; opening a session takes 15 ms, or 5 s in vain
+ADMITS_WITHIN_S = 5.0  # chosen: an answer takes a millisecond; whose loop is blocked that long holds nobody's lease
+NEVER_S = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class ForkProcess:
+    """Have the process running, on the terms of this member; report ``forked`` or ``fork_failed``."""
+
+    process: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class AdmitMember:
+    """Have the process admit the member; report ``admitted`` and later ``member_ended``, or ``refused``."""
+
+    process: str
+    pid: int
+    name: str
+    life: int
+
+
+@dataclass(frozen=True, slots=True)
+class EndMemberAlone:
+    """Have the process end this member in good order."""
+
+    process: str
+    pid: int
+    name: str
+    life: int
+
+
+@dataclass(frozen=True, slots=True)
+class SignalProcess:
+    """Send the signal to everything that belongs to the process."""
+
+    process: str
+    pid: int
+    number: signal.Signals
+
+
+@dataclass(frozen=True, slots=True)
+class MemberRuns:
+    """It was admitted and lives in this process."""
+
+    name: str
+    pid: int
+
+
+@dataclass(frozen=True, slots=True)
+class MemberNotStarted:
+    """It does not live, and will not by this order."""
+
+    name: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class MemberGone:
+    """It lived, and nothing of it is left.
+
+    Attributes:
+        returncode: Its own exit code, or that of its process.
+        how: For people.
+    """
+
+    name: str
+    returncode: int
+    how: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessesWakeAt:
+    """Report ``woken`` at this time at the latest; replaces what earlier answers said."""
+
+    at_s: float
+
+
+ProcessInstruction = (
+    ForkProcess
+    | AdmitMember
+    | EndMemberAlone
+    | SignalProcess
+    | MemberRuns
+    | MemberNotStarted
+    | MemberGone
+    | ProcessesWakeAt
+)
+
+
+class _Phase(StrEnum):
+    FORKING = "forking"  # ordered, no pid yet
+    STARTING = "starting"  # runs, cannot be asked yet
+    SERVING = "serving"
+    ENDING = "ending"  # signalled
+
+
+class _Place(StrEnum):
+    WAITING = "waiting"  # for the process to serve
+    ADMITTING = "admitting"  # asked for, not answered
+    LIVING = "living"
+    DONE = "done"  # to be reported when the process is gone
+
+
+@dataclass
+class _Member:
+    name: str
+    place: _Place = _Place.WAITING
+    life: int = 0
+    deadline_s: float = NEVER_S
+    report: MemberGone | MemberNotStarted | None = None
+
+
+@dataclass
+class _Process:
+    name: str
+    phase: _Phase = _Phase.FORKING
+    pid: int = 0
+    serving_pid: int = 0
+    deadline_s: float = NEVER_S
+    failure: str = ""
+    members: dict[str, _Member] = field(default_factory=dict)
+
+
+class SharedProcesses:
+    """All shared processes of one keeper."""
+
+    def __init__(self) -> None:
+        self._all: dict[str, _Process] = {}
+        self._last_life = 0
+
+    def has(self, pid: int) -> bool:
+        """Say whether this is a shared process."""
+        return any(process.pid == pid for process in self._all.values())
+
+    # Orders
+    def wanted(self, name: str, process: str, now_s: float) -> list[ProcessInstruction]:
+        """Begin to have the component live in this process; it must not be living in any."""
+        one = self._all.get(process)
+        if one is None:
+            one = self._all[process] = _Process(process)
+            one.members[name] = _Member(name)
+            return self._and_wake([ForkProcess(process, name)])
+        one.members[name] = _Member(name)
+        return self._and_wake(self._admit_waiting(one, now_s) if one.phase is _Phase.SERVING else [])
+
+    def signalled(self, name: str, number: signal.Signals) -> list[ProcessInstruction]:
+        """Begin to end a member that runs: by SIGKILL with its process, by any other signal alone."""
+        for one in self._all.values():
+            member = one.members.get(name)
+            if member is None or member.place is not _Place.LIVING:
+                continue
+            if number is signal.SIGKILL:
+                return self._and_wake(self._kill(one))
+            return [EndMemberAlone(one.name, one.pid, name, member.life)]
+        return []
+
+    # What happened
+    def forked(self, process: str, pid: int, now_s: float) -> list[ProcessInstruction]:
+        """Take note that it runs."""
+        one = self._all[process]
+        one.phase, one.pid, one.deadline_s = _Phase.STARTING, pid, now_s + SERVES_WITHIN_S
+        return self.serving(process, pid, now_s) if one.serving_pid == pid else self._and_wake([])
+
+    def fork_failed(self, process: str, why: str) -> list[ProcessInstruction]:
+        """Take note that there is no process."""
+        one = self._all.pop(process)
+        return self._and_wake([MemberNotStarted(member.name, why) for member in one.members.values()])
+
+    def serving(self, process: str, pid: int, now_s: float) -> list[ProcessInstruction]:
+        """Take note that it can be asked; of no meaning for others than the one that is starting."""
+        one = self._all.get(process)
+        if one is None:
+            return []
+        one.serving_pid = pid
+        if one.phase is not _Phase.STARTING or one.pid != pid:
+            return []
+        one.phase, one.deadline_s = _Phase.SERVING, NEVER_S
+        return self._and_wake(self._admit_waiting(one, now_s))
+
+    def admitted(self, life: int) -> list[ProcessInstruction]:
+        """Take note that this life has begun."""
+        for one, member in self._everybody():
+            if member.life == life and member.place is _Place.ADMITTING:
+                member.place, member.deadline_s = _Place.LIVING, NEVER_S
+                return self._and_wake([MemberRuns(member.name, one.pid)])
+        return []
+
+    def refused(self, life: int, why: str, now_s: float) -> list[ProcessInstruction]:
+        """Take note that this life was not begun."""
+        for one, member in self._everybody():
+            if member.life == life and member.place is _Place.ADMITTING:
+                return self._leaves(one, member, MemberNotStarted(member.name, why), now_s)
+        return []
+
+    def member_ended(self, life: int, exit_code: int, now_s: float) -> list[ProcessInstruction]:
+        """Take note that this life has ended."""
+        for one, member in self._everybody():
+            if member.life == life and member.place is _Place.LIVING:
+                return self._leaves(one, member, MemberGone(member.name, exit_code, describe(exit_code)), now_s)
+        return []
+
+    def exited(self, pid: int, returncode: int) -> list[ProcessInstruction]:
+        """Take note that nothing is left of this process."""
+        one = next((process for process in self._all.values() if process.pid == pid), None)
+        if one is None:
+            return []
+        del self._all[one.name]
+        how = f"its process {one.name}: {one.failure or describe(returncode)}"
+        was_ended = one.phase is _Phase.ENDING and not one.failure
+        told: list[ProcessInstruction] = []
+        left: dict[str, _Member] = {}
+        for member in one.members.values():
+            if member.report is not None:
+                told.append(member.report)
+            elif member.place is _Place.LIVING:
+                told.append(MemberGone(member.name, returncode, how))
+            elif was_ended:
+                left[member.name] = _Member(member.name)
+            else:
+                told.append(MemberNotStarted(member.name, how))
+        if left:
+            self._all[one.name] = _Process(one.name, members=left)
+            told.append(ForkProcess(one.name, next(iter(left))))
+        return self._and_wake(told)
+
+    def woken(self, now_s: float) -> list[ProcessInstruction]:
+        """Do what is due by now."""
+        told: list[ProcessInstruction] = []
+        for one in list(self._all.values()):
+            if one.deadline_s <= now_s:
+                if one.phase is _Phase.STARTING:
+                    one.failure = f"did not serve within {SERVES_WITHIN_S:g} s"
+                told += self._kill(one)
+            for member in one.members.values():
+                if member.deadline_s <= now_s:
+                    why = f"its process {one.name} did not admit it within {ADMITS_WITHIN_S:g} s"
+                    member.place, member.deadline_s = _Place.DONE, NEVER_S
+                    member.report = MemberNotStarted(member.name, why)
+                    told += self._kill(one)
+        return self._and_wake(told)
+
+    # Steps
+    def _admit_waiting(self, one: _Process, now_s: float) -> list[ProcessInstruction]:
+        told: list[ProcessInstruction] = []
+        for member in one.members.values():
+            if member.place is _Place.WAITING:
+                self._last_life += 1
+                member.place, member.life = _Place.ADMITTING, self._last_life
+                member.deadline_s = now_s + ADMITS_WITHIN_S
+                told.append(AdmitMember(one.name, one.pid, member.name, member.life))
+        return told
+
+    def _leaves(
+        self, one: _Process, member: _Member, report: MemberGone | MemberNotStarted, now_s: float
+    ) -> list[ProcessInstruction]:
+        """Report a member that left, at once while others stay, else with the process, which ends."""
+        if any(other is not member and other.report is None for other in one.members.values()):
+            del one.members[member.name]
+            return self._and_wake([report])
+        member.place, member.report, member.deadline_s = _Place.DONE, report, NEVER_S
+        if one.phase is _Phase.ENDING:
+            return self._and_wake([])
+        one.phase, one.deadline_s = _Phase.ENDING, now_s + TERM_S
+        return self._and_wake([SignalProcess(one.name, one.pid, signal.SIGTERM)])
+
+    def _kill(self, one: _Process) -> list[ProcessInstruction]:
+        one.phase, one.deadline_s = _Phase.ENDING, NEVER_S
+        return [SignalProcess(one.name, one.pid, signal.SIGKILL)]
+
+    def _everybody(self) -> Iterator[tuple[_Process, _Member]]:
+        for one in self._all.values():
+            for member in one.members.values():
+                yield one, member
+
+    def _and_wake(self, told: list[ProcessInstruction]) -> list[ProcessInstruction]:
+        at_s = min(
+            (
+                deadline_s
+                for one in self._all.values()
+                for deadline_s in (one.deadline_s, *(member.deadline_s for member in one.members.values()))
+            ),
+            default=NEVER_S,
+        )
+        return told if at_s == NEVER_S else [*told, ProcessesWakeAt(at_s)]
