@@ -5,9 +5,8 @@ through the waiting ARCs in order and give each the earliest start at which it f
 settling and minimum run time, without taking anything from those before it.
 
 A decision looks only at groups in which something has happened since the last one. A group of up to
-``exact_up_to`` ARCs is planned whole. In a bigger one an ARC is looked at beside those it shares RCs
-with: it lets everybody before it in order go first who may start, as far as the present holders
-tell, before it would have done. That takes nothing from anybody either, but leaves some gaps unused.
+``exact_up_to`` ARCs is planned whole. In a bigger one each RC is reserved for the first in line at it
+only: an ARC starts if it is done before those would start, and may overtake who stands further back.
 
 Rules of this file (numbers as in docs and ``why``):
 
@@ -39,6 +38,7 @@ INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the r
 SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, but is not free yet
 
 EXACT_UP_TO = 64  # chosen: such a group is planned in a few milliseconds
+LOOK_AHEAD = 3  # chosen: how many first ones may wait for each other before the present holders alone tell
 
 HOLDING = frozenset({RequestState.CONNECTING, RequestState.RUNNING, RequestState.REVOKING})
 CONNECTED = frozenset({RequestState.CONNECTING, RequestState.RUNNING})
@@ -233,9 +233,12 @@ class MasterSchedule:
         self._exact_up_to = exact_up_to
         self._groups: Groups[ArcEntry] = Groups(exact_up_to)
         self._bits: dict[str, int] = {}
-        self._touched: dict[ArcEntry, None] = {}
+        self._touched: dict[str, None] = {}
+        self._candidates: dict[ArcEntry, None] = {}
+        self._busy = 0
         self._ends: list[tuple[float, int, ArcEntry]] = []
         self._serial = itertools.count()
+        self._firsts: dict[str, ArcEntry | None] = {}
         self._admitted: dict[str, dict[frozenset[ArcEntry], bool]] = {}
         self._roomy: dict[str, bool] = {}
 
@@ -287,35 +290,38 @@ class MasterSchedule:
                     del self.rcs[rc].holders[arc]
                 else:
                     self.rcs[rc].holders[arc] = None
+        self._busy = self._busy | arc.excludes if arc.holds else self._busy & ~(arc.excludes if held else 0)
         if state is RequestState.WAITING:
             for holder in [holder for rc in arc.uses for holder in self.rcs[rc].holders]:
                 if holder.state is RequestState.RUNNING:
                     self._await_end(holder)
         self.touch(arc)
         if was_active and not arc.active:
-            for rc in arc.uses:
-                self._touched.update(dict.fromkeys(self._groups.users(rc)))
             self._groups.remove(arc)
-            self._touched.pop(arc, None)
             self._demand_changed(arc.shares)
 
     def touch(self, arc: ArcEntry) -> None:
-        """Have the ARC and those beside it looked at again: something about it changed."""
-        self._touched[arc] = None
+        """Have all who use an RC of the ARC looked at again: something about it changed."""
+        self._touched.update(dict.fromkeys(arc.uses))
+        for rc in arc.uses:
+            self._firsts.pop(rc, None)
 
-    def touch_users(self, rc: str) -> None:
-        """Have all who use the RC looked at again."""
+    def rc_changed(self, rc: str) -> None:
+        """Have all who use the RC looked at again: its state or capacity changed."""
         self._demand_changed([rc])
-        self._touched.update(dict.fromkeys(self._groups.users(rc)))
+        self._touched[rc] = None
+        self._firsts.clear()
 
-    def touch_all(self) -> None:
-        """Have everybody looked at again, and forget what was worked out about sharable RCs."""
+    def priorities_changed(self) -> None:
+        """Have everybody looked at again."""
         self._demand_changed([*self.rcs])
-        self._touched.update(dict.fromkeys(arc for arc in self.arcs.values() if arc.active))
+        self._touched.update(dict.fromkeys(self.rcs))
+        self._firsts.clear()
 
     def end_at(self, arc: ArcEntry, end_s: float) -> None:
         """Let the slice of a running ARC end then."""
         arc.end_s, arc.awaited = end_s, False
+        self._busy |= arc.excludes
         if self._somebody_waits_for(arc):
             self._await_end(arc)
         self.touch(arc)
@@ -340,6 +346,7 @@ class MasterSchedule:
             if stands:
                 arc.awaited = wanted
             if wanted:
+                self._busy &= ~arc.excludes
                 self.touch(arc)
         return None
 
@@ -520,13 +527,19 @@ class MasterSchedule:
         Looks where something changed since nobody's time was; asked again after the turn was carried out.
         """
         while self._touched:
-            arc = next(iter(self._touched))
-            turn, looked_at = self._due_near(arc, now_s)
+            rc = next(iter(self._touched))
+            users = self._groups.users(rc)
+            group = self._groups.of(next(iter(users))).arcs if users else {}
+            if len(group) > self._exact_up_to:
+                del self._touched[rc]
+                self._candidates.update(dict.fromkeys(self._near(rc)))
+                continue
+            turn = self._due_in([*group], now_s)
             if turn is not None:
                 return turn
-            for one in looked_at:
-                self._touched.pop(one, None)
-        return None
+            for looked_at in {rc, *(used for arc in group for used in arc.uses)}:
+                self._touched.pop(looked_at, None)
+        return self._due_beside_others(now_s)
 
     def forgotten(self, now_s: float) -> ArcEntry | None:
         """Return an ARC whose time is now in a group that is planned whole, wherever that is; for checks."""
@@ -535,15 +548,6 @@ class MasterSchedule:
             if turn is not None:
                 return turn.arc
         return None
-
-    def _due_near(self, arc: ArcEntry, now_s: float) -> tuple[Turn | None, Iterable[ArcEntry]]:
-        """Return the turn of somebody near the ARC, and all who were looked at."""
-        if arc not in self._groups:
-            return None, [arc]
-        group = self._groups.of(arc).arcs
-        if len(group) <= self._exact_up_to:
-            return self._due_in([*group], now_s), group
-        return self._due_beside(arc, now_s), [arc]
 
     def _due_in(self, group: Sequence[ArcEntry], now_s: float) -> Turn | None:
         """Return whose time is now in a group that is planned whole."""
@@ -584,30 +588,33 @@ class MasterSchedule:
 
     # Whose time has come in a group that is too big to be planned whole.
 
-    def _due_beside(self, touched: ArcEntry, now_s: float) -> Turn | None:
-        """Return the first in order near the ARC whose time is now."""
-        candidates = [arc for arc in self._near(touched, now_s) if self._could_start(arc, now_s) and self.usable(arc)]
-        for arc in self.in_order(candidates):
-            others = self._beside(arc)
+    def _due_beside_others(self, now_s: float) -> Turn | None:
+        """Return a candidate whose time is now; the others are candidates no more."""
+        while self._candidates:
+            arc, _ = self._candidates.popitem()
+            if not (arc.state is RequestState.WAITING and self._could_start(arc, now_s) and self.usable(arc)):
+                continue
+            if self._is_in_the_way_of_a_first(arc, now_s):
+                continue
             if self._must_let_higher_go_first(arc, self._groups.of(arc).arcs):
                 continue
-            if any(self._must_let_go_first(arc, other, now_s) for other in others if other.queued):
-                continue
+            others = self._beside(arc)
             in_the_way = self._in_the_way(arc, [], others, now_s)
             if in_the_way or self.fits(arc, [other for other in others if other.holds]):
                 return Turn(arc, in_the_way)
         return None
 
-    def _near(self, touched: ArcEntry, now_s: float) -> Iterable[ArcEntry]:
-        """Return the waiting ARCs for which it matters what happened to this one.
+    def _near(self, rc: str) -> Iterable[ArcEntry]:
+        """Return the waiting ARCs for which it matters what happened to this RC.
 
-        That is who shares an RC with it, and who shares one with those: they may have let them go first.
+        That is who uses it, and who shares an RC with those: they may have let them go first.
         """
-        near = {touched: None} | dict.fromkeys(self._beside(touched))
-        rcs = {rc for arc in near if arc.queued for rc in arc.uses} | set(touched.uses)
-        for rc in sorted(rcs):
-            if self.rcs[rc].sharable or all(holder.served(now_s) for holder in self.rcs[rc].holders):
-                near |= dict.fromkeys(self._groups.users(rc))
+        users = self._groups.users(rc)
+        others = dict.fromkeys(other for arc in users if arc.queued for other in arc.uses)
+        near = dict.fromkeys(users)
+        for other in others:
+            if not self._busy & self._bits[other]:
+                near.update(dict.fromkeys(arc for arc in self._groups.users(other) if not arc.touches & self._busy))
         return [arc for arc in near if arc.state is RequestState.WAITING]
 
     def _beside(self, arc: ArcEntry) -> list[ArcEntry]:
@@ -616,30 +623,44 @@ class MasterSchedule:
         beside.pop(arc, None)
         return [*beside]
 
-    def _must_let_go_first(self, arc: ArcEntry, other: ArcEntry, now_s: float) -> bool:
-        """Say whether the other comes before it and may start before it would have done."""
-        if not self._comes_before(other, arc) or not self.usable(other) or self.fits(arc, [other]):
-            return False
-        ends = [
-            self.stands_until_s(h, other, now_s) for rc in other.uses for h in self.rcs[rc].holders if h is not other
-        ]
-        length_s = arc.length_s - min(self._slack_s, arc.minimum_s / 2)
-        return max([now_s, *ends]) < now_s + length_s - INSTANT_S
+    def _is_in_the_way_of_a_first(self, arc: ArcEntry, now_s: float) -> bool:
+        """Say whether, if it started, it would take time from another that is first in line at one of its RCs."""
+        end_s = now_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
+        firsts = dict.fromkeys(self._first_in_line(rc) for rc in arc.uses)
+        return any(
+            first is not arc and not self.fits(arc, [first]) and self._reserved_s(first, now_s, (arc,)) < end_s
+            for first in firsts
+            if first is not None
+        )
 
-    def _comes_before(self, other: ArcEntry, arc: ArcEntry) -> bool:
-        """Say whether of two that compete the other is the first in order."""
-        if higher(other.path, arc.path):
-            return True
-        return not higher(arc.path, other.path) and self._precedence(other) < self._precedence(arc)
+    def _first_in_line(self, rc: str) -> ArcEntry | None:
+        """Return the first in order of those queued for the RC; None if nobody is."""
+        if rc not in self._firsts:
+            queued = [user for user in self._groups.users(rc) if user.queued and self.usable(user)]
+            self._firsts[rc] = self.in_order(queued)[0] if queued else None
+        return self._firsts[rc]
 
-    def _precedence(self, arc: ArcEntry) -> tuple[tuple[float, int], ...]:
-        """Return the key by which equals beside each other go in order: none before a higher one it competes with.
+    def _reserved_s(self, arc: ArcEntry, now_s: float, behind: tuple[ArcEntry, ...]) -> float:
+        """Return from when its RCs are reserved for the ARC: when its holders go and others first in line have run.
 
-        Without that they could wait for each other in a circle, as being equal is not transitive.
+        Args:
+            arc: First in line at an RC.
+            now_s: From when on.
+            behind: Those that asked for this: they do not wait for themselves, though being equal is not transitive.
         """
-        above = [other for other in self._beside(arc) if other.queued and higher(other.path, arc.path)]
-        own = (arc.seniority,)
-        return max([own, *((*self._precedence(other), arc.seniority) for other in above)])
+        holders = dict.fromkeys(holder for rc in arc.uses for holder in self.rcs[rc].holders)
+        ends = [self.stands_until_s(h, arc, now_s) for h in holders if h is not arc and not self.fits(arc, [h])]
+        start_s = max([now_s, *ends])
+        if len(behind) > LOOK_AHEAD:
+            return start_s
+        for rc in arc.uses:
+            first = self._first_in_line(rc)
+            if first is None or first is arc or first in behind or self.fits(arc, [first]):
+                continue
+            first_s = self._reserved_s(first, now_s, (*behind, arc))
+            if first_s < start_s + arc.length_s - INSTANT_S:
+                start_s = math.inf if higher(first.path, arc.path) else max(start_s, first_s + first.length_s)
+        return start_s
 
     def _in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
@@ -675,7 +696,7 @@ class MasterSchedule:
             (kept if self._can_share(rc, [*kept, holder]) else left).append(holder)
         return left[::-1]
 
-    def _must_let_higher_go_first(self, arc: ArcEntry, group: Sequence[ArcEntry]) -> bool:
+    def _must_let_higher_go_first(self, arc: ArcEntry, group: Iterable[ArcEntry]) -> bool:
         return self._strict and any(
             other.state is RequestState.WAITING and higher(other.path, arc.path) and self.usable(other)
             for other in group
@@ -685,11 +706,8 @@ class MasterSchedule:
         """Return the ARCs because of which the ARC cannot start now, those that alone suffice first."""
         met = [other for other, _, _ in meeting(slot.against, now_s, now_s + slot.arc.length_s - self._slack_s)]
         if not met and len(self._groups.of(slot.arc)) > self._exact_up_to:
-            return [
-                other
-                for other in self._beside(slot.arc)
-                if other.queued and self._must_let_go_first(slot.arc, other, now_s)
-            ]
+            firsts = dict.fromkeys(self._first_in_line(rc) for rc in slot.arc.uses)
+            return [first for first in firsts if first is not None and first is not slot.arc]
         alone = [other for other in met if not self.fits(slot.arc, [other])]
         return alone or met
 
@@ -720,7 +738,9 @@ class MasterSchedule:
         before = {
             other: other.length_s
             for other in self._beside(arc)
-            if other.queued and self._comes_before(other, arc) and not self.fits(arc, [other])
+            if other.queued
+            and rank(other.path, arc.path) >= (other.seniority >= arc.seniority)
+            and not self.fits(arc, [other])
         }
         turns_s = [sum(before.get(user, 0.0) for user in self._groups.users(rc)) for rc in arc.uses]
         start_s = max([now_s, *(end_s for _, _, end_s in holds)]) + max(turns_s)

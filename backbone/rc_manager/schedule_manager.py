@@ -471,7 +471,7 @@ class ScheduleManager:
     def _renumber(self) -> None:
         for arc in self._table.arcs.values():
             arc.path = self._tree.path(arc.place_in_tree)
-        self._table.touch_all()
+        self._table.priorities_changed()
 
     def _introduce_nodes(self, names: tuple[str, ...]) -> None:
         """Bring new nodes and new numbers on this way into the trace, parents first."""
@@ -536,7 +536,7 @@ class ScheduleManager:
             return
         rc.up = False
         rc.failed = True
-        self._table.touch_users(name)
+        self._table.rc_changed(name)
         self._record(trace.rc_state(self._now_s, name, up=False), "it does not answer")
         for arc in [*self._table.arcs.values()]:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
@@ -553,7 +553,7 @@ class ScheduleManager:
             return
         rc.up = True
         rc.failed = False
-        self._table.touch_users(name)
+        self._table.rc_changed(name)
         if name in self._traced_rcs:
             self._record(trace.rc_state(self._now_s, name, up=True), "it answers")
         self._introduce(name)
@@ -563,7 +563,7 @@ class ScheduleManager:
         if rc is None or rc.capacity == capacity:
             return
         rc.capacity = capacity
-        self._table.touch_users(name)
+        self._table.rc_changed(name)
         if name in self._traced_rcs:
             self._record(trace.rc_capacity(self._now_s, name, capacity))
         for holder in self._table.overloading(name):
