@@ -202,8 +202,8 @@ class Launcher(Component[NoParameters]):
     # ------------------------------------------------------------------ start
     async def _start_mission(self) -> None:
         description = self._description
-        hardware = [Start(c.type, c.name, c.parameters, c.host) for c in description.components]
-        hardware += [Start(r.type, r.name, r.rc_parameters(), r.host) for r in description.resources]
+        hardware = [Start(c.type, c.name, c.parameters, c.host, process=c.process) for c in description.components]
+        hardware += [Start(r.type, r.name, r.rc_parameters(), r.host, process=r.process) for r in description.resources]
         async with self._step(
             "simulated world and resource controllers" if description.components else "resource controllers"
         ):

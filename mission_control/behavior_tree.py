@@ -53,6 +53,7 @@ class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         parameters: Its own parameters.
         arc: What it claims, if anything.
         children: Nodes it starts.
+        process: Name of the process it shares with others; empty: a process of its own.
     """
 
     type: str
@@ -61,6 +62,7 @@ class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: dict[str, Any] = {}
     arc: ArcNeed | None = None
     children: list[BehaviorNode] = []
+    process: str = ""
 
     def order(self, parent_path: Sequence[PathStep]) -> Start:
         """Return the order that starts this node under a parent with that path."""

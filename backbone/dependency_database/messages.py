@@ -26,6 +26,7 @@ class Resource(Message, frozen=True):
         features: What it has, for wishes (``camera``).
         links: Names of other resources it can only be used with, by kind
             (a framegrabber's ``video_frequency``, a scout's ``command_radio``).
+        process: Name of the process its RC shares with others; empty: a process of its own.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Resource(Message, frozen=True):
     parameters: dict[str, Any] = {}
     features: list[str] = []
     links: dict[str, list[str]] = {}
+    process: str = ""
 
     def rc_parameters(self) -> dict[str, Any]:
         """Return the parameters its RC is launched with: driver, sharing and links, then its own."""

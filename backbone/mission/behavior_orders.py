@@ -42,7 +42,7 @@ def behavior_order(node: Mapping[str, Any], parent_path: Sequence[PathStep]) -> 
     """Return the order that starts one node of the tree.
 
     Args:
-        node: ``type``, ``name``, ``priority``, ``parameters``, ``arc``, ``children``.
+        node: ``type``, ``name``, ``priority``, ``parameters``, ``arc``, ``children``, ``process``.
         parent_path: Names and priorities from the mission's root to the parent.
 
     Raises:
@@ -58,7 +58,7 @@ def behavior_order(node: Mapping[str, Any], parent_path: Sequence[PathStep]) -> 
         raise ReservedParameter(f"{node['name']}: parameter {taken[0]!r}", behavior=node["name"], parameter=taken[0])
     path = [[name, priority] for name, priority in (*parent_path, (node["name"], node["priority"]))]
     tree = {"path": path, "arc": node.get("arc"), "children": list(node.get("children", ()))}
-    return Start(node["type"], node["name"], {**own, **tree})
+    return Start(node["type"], node["name"], {**own, **tree}, process=node.get("process", ""))
 
 
 def _node(behavior: Behavior) -> dict[str, Any]:

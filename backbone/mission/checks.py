@@ -16,6 +16,7 @@ from backbone.creator.messages import creator_name
 from backbone.mission.behavior_checks import check_behaviors
 from backbone.mission.class_paths import class_path_fault
 from backbone.mission.document import Element
+from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, told, told_names
 from backbone.mission.tables import (
     CORE_SERVICES,
@@ -51,6 +52,7 @@ def check(root: Element, report: Report) -> None:
         _check_resources(tables, report)
         check_behaviors(tables, report)
     _check_component_names(tables, report)
+    check_processes(tables, {*CORE_SERVICES, LAUNCHER, *(creator_name(host) for host in tables.hosts)}, report)
 
 
 # ---------------------------------------------------------------------- hosts and core services

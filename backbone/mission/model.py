@@ -43,12 +43,14 @@ class Component(_Part):
         name: Its name.
         host: Where; empty: the placer decides.
         parameters: Values for the class's parameters.
+        process: Name of the process it shares with others; empty: a process of its own.
     """
 
     type: str
     name: str
     host: str = ""
     parameters: dict[str, Any] = {}
+    process: str = ""
 
 
 class ArcWish(_Part):
@@ -83,6 +85,7 @@ class Behavior(_Part):
         parameters: Values for the class's parameters.
         arc: The ARC it needs, if any.
         children: Nodes its parent starts.
+        process: Name of the process it shares with others; empty: a process of its own.
     """
 
     type: str
@@ -91,6 +94,7 @@ class Behavior(_Part):
     parameters: dict[str, Any] = {}
     arc: ArcWish | None = None
     children: tuple[Behavior, ...] = ()
+    process: str = ""
 
 
 class MissionDescription(_Part):

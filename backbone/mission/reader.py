@@ -93,6 +93,7 @@ def _resource(resource: Element, tables: Tables) -> Resource:
         parameters={**({} if world is None else {WORLD: world.text("name")}), **parameters(resource)},
         features=resource.words("features"),
         links=links,
+        process=resource.text("process"),
     )
 
 
@@ -102,6 +103,7 @@ def _world(world: Element, tables: Tables) -> Component:
         name=world.text("name"),
         host=world.text("host"),
         parameters={**parameters(world), WORLD: _world_content(world, tables)},
+        process=world.text("process"),
     )
 
 
@@ -160,6 +162,7 @@ def _behavior(behavior: Element) -> Behavior:
         parameters=parameters(behavior),
         arc=None if arc is None else _arc(arc),
         children=tuple(_behavior(child) for child in behavior.all("behavior")),
+        process=behavior.text("process"),
     )
 
 

@@ -20,6 +20,7 @@ class Start(Message, frozen=True):
         parameters: Values for its ``Parameters``.
         host: Must run there; empty: wherever tags and load say.
         tags: Tags the host must have, besides the type's own.
+        process: Name of the process it shares with others, which are on the same host then; empty: its own.
     """
 
     type: str
@@ -27,6 +28,7 @@ class Start(Message, frozen=True):
     parameters: dict[str, Any] = {}
     host: str = ""
     tags: list[str] = []
+    process: str = ""
 
 
 class Started(Message, frozen=True):

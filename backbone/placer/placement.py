@@ -3,6 +3,7 @@
 Rules:
 
 * A host must be there (its creator lives), be the one asked for if one is, and have every tag needed.
+* Those who share a process go where the first of them is, unless another host is asked for.
 * Among those the least burdened is chosen: components per core, with a busy processor counting like
   further components. Equal hosts so get equal numbers, a loaded one gets fewer.
 * Equally burdened hosts are taken in the order of their names, so the same state gives the same choice.
@@ -73,7 +74,7 @@ class Choice:
     reasons: tuple[str, ...]
 
 
-def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView]) -> Choice:
+def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView], company: str = "") -> Choice:
     """Return the host for one more component.
 
     Args:
@@ -81,12 +82,14 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView])
         tags: Every one must be on the host.
         pin: The only host allowed; empty: any.
         hosts: All that are known; their order does not matter.
+        company: Where those are with whom it shares its process; empty: nowhere.
 
     Raises:
         NoHost: None can take it; the detail has a line for each.
     """
     known = sorted(hosts, key=lambda host: host.name)
-    obstacles = {host.name: obstacle(host, tags, pin) for host in known}
+    company = "" if pin else company
+    obstacles = {host.name: obstacle(host, tags, pin, company) for host in known}
     able = [host for host in known if not obstacles[host.name]]
     if not able:
         raise NoHost(_nobody(name, pin, known, obstacles), name=name)
@@ -94,7 +97,8 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView])
 
     def reason(host: HostView) -> str:
         if host is chosen:
-            return f"{host.name}: chosen, {'asked for' if pin else 'least burdened'}: {host.describe()}"
+            why = "asked for" if pin else "with the rest of its process" if company else "least burdened"
+            return f"{host.name}: chosen, {why}: {host.describe()}"
         if obstacles[host.name]:
             return f"{host.name}: {obstacles[host.name]}"
         return f"{host.name}: {'more burdened' if host.burden > chosen.burden else 'as burdened'}: {host.describe()}"
@@ -102,10 +106,12 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView])
     return Choice(chosen.name, tuple(reason(host) for host in known))
 
 
-def obstacle(host: HostView, tags: Collection[str], pin: str) -> str:
+def obstacle(host: HostView, tags: Collection[str], pin: str, company: str = "") -> str:
     """Return why this host cannot take it, empty if it can."""
     if pin and host.name != pin:
         return f"not {pin}, which was asked for"
+    if company and host.name != company:
+        return f"not {company}, where the rest of its process is"
     missing = sorted(set(tags) - host.tags)
     if missing:
         return f"lacks {', '.join(missing)}"

@@ -226,7 +226,7 @@ class PlacementBook:
         """
         record = self.record(name)
         record.host = ""  # it must not count against the host it is leaving
-        choice = place(name, record.spawn.tags, record.pin, self.hosts())
+        choice = place(name, record.spawn.tags, record.pin, self.hosts(), company=self._company(record))
         record.phase, record.host, record.reasons, record.since_s = Phase.STARTING, choice.host, choice.reasons, now_s
         record.pid, record.lost = 0, False
         return choice
@@ -352,6 +352,17 @@ class PlacementBook:
         return told
 
     # ------------------------------------------------------------------
+    def _company(self, record: Record) -> str:
+        """Return the host of those it shares its process with; empty if they are on none, or it shares with nobody."""
+        if not record.spawn.process:
+            return ""
+        hosts = [
+            other.host
+            for other in self.records()
+            if other is not record and other.spawn.process == record.spawn.process and self.is_alive(other.host)
+        ]
+        return hosts[0] if hosts else ""
+
     def _found(self, host: str, process: ProcessState, asked_s: float) -> list[Instruction]:
         """Settle one process a creator came up with."""
         spawn, record = process.spawn, self._records.get(process.spawn.name)

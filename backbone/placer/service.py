@@ -588,4 +588,5 @@ def _spawn(name: str, order: Start, component_type: ComponentType, requester: st
         policy=RestartPolicy(restart=component_type.restart),
         pinned=bool(order.host),
         tags=sorted({*component_type.tags, *order.tags}),
+        process=order.process,
     )

@@ -230,6 +230,20 @@ def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(tmp_path: Pat
     assert (read, type(read)) == (value, type(value))
 
 
+def test_what_shares_a_process_says_so_in_its_order(tmp_path: Path) -> None:
+    mission = read_text(
+        tmp_path,
+        changed(
+            ('name="radio"', 'name="radio" process="pool"'),
+            ("<world>", '<world process="pool">'),
+            ('name="watch1"', 'name="watch1" process="eyes"'),
+        ),
+    )
+    assert {resource.name: resource.process for resource in mission.resources if resource.process} == {"radio": "pool"}
+    assert [component.process for component in mission.components] == ["pool"]
+    assert [order.process for order in behavior_orders(mission)] == ["eyes", ""]
+
+
 def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
     lidar = '<type name="lidar" class="backbone.component.component:Component" subsystem="resource_pool"/>\n  </types>'
     description = read_text(

@@ -16,9 +16,9 @@ from backbone.placer.messages import NoHost, NotPlaced
 from backbone.placer.placement_book import EndStray, Inspect, Instruction, Note, Phase, PlaceAgain, PlacementBook
 
 
-def spawn(name: str, *, restart: bool = True, pinned: bool = False, kind: str = "watcher") -> Spawn:
+def spawn(name: str, *, restart: bool = True, pinned: bool = False, kind: str = "watcher", shares: str = "") -> Spawn:
     policy = RestartPolicy(restart=restart)
-    return Spawn(Subsystem.MISSION_CONTROL, name, kind, "x:Y", {"n": 1}, "boss", policy, pinned=pinned)
+    return Spawn(Subsystem.MISSION_CONTROL, name, kind, "x:Y", {"n": 1}, "boss", policy, pinned=pinned, process=shares)
 
 
 def process(order: Spawn, pid: int = 7, *, given_up: bool = False) -> ProcessState:
@@ -275,3 +275,30 @@ def test_an_unknown_name_is_answered_with_the_nearest_known_one() -> None:
     run(book, spawn("watcher"))
     with pytest.raises(NotPlaced, match="did you mean 'watcher'"):
         book.record("wacther")
+
+
+def test_who_shares_a_process_goes_where_the_first_of_it_is() -> None:
+    book = book_with("a", "b")
+    assert run(book, spawn("w1", shares="pool")) == "a"
+    assert run(book, spawn("w2")) == "b"
+    for name in ("w3", "w4"):
+        assert run(book, spawn(name, shares="pool")) == "a"
+    assert book.record("w4").reasons[0].startswith("a: chosen, with the rest of its process")
+    assert book.record("w4").reasons[1] == "b: not a, where the rest of its process is"
+    assert run(book, spawn("w5", shares="other")) == "b"
+
+
+def test_who_is_asked_for_elsewhere_goes_there_whoever_shares_its_process() -> None:
+    book = book_with("a", "b")
+    run(book, spawn("w1", shares="pool"))
+    assert run(book, spawn("w2", shares="pool", pinned=True), "b") == "b"
+
+
+def test_who_shared_a_process_on_a_lost_host_is_together_again_elsewhere() -> None:
+    book = book_with("a", "b", "c")
+    names = ("w1", "w2", "w3")
+    for name in names:
+        assert run(book, spawn(name, shares="pool")) == "a"
+    again = without_notes(book.creator_down("a"))
+    assert again == [PlaceAgain(name) for name in names]
+    assert {book.choose(name, 2.0).host for name in names} == {"b"}
