@@ -329,7 +329,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _start_rc(self, resource: Resource) -> None:
         self.story.note(resource.name, "is claimed but does not run: asks the placer to start it")
-        order = Start(resource.type, resource.name, resource.rc_parameters(), resource.host)
+        order = Start(resource.type, resource.name, resource.rc_parameters(), resource.host, process=resource.process)
         try:
             await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
         except Refusal:
