@@ -20,7 +20,7 @@ from backbone.rc_manager.messages import (
     UnknownRc,
     Usage,
 )
-from backbone.rc_manager.radio_admission import admissible, stream, utilization
+from backbone.rc_manager.radio_admission import admissible, remedy, stream, utilization
 
 Wish = Mapping[str, RcUse]
 
@@ -71,7 +71,7 @@ def _overloaded_alone(table: MasterSchedule, wish: Wish) -> str | None:
     """Return an RC that could not serve the wish even if nobody else were there; None: all could."""
     for name, use in wish.items():
         streams = sorted((stream(usage) for usage in use.streams), key=lambda one: one.period_us)
-        if table.rcs[name].sharable and not admissible(streams, table.rcs[name].capacity):
+        if table.rcs[name].sharable and not admissible(streams, table.rcs[name].capacity, table.admission):
             return name
     return None
 
@@ -80,9 +80,12 @@ def _overload(table: MasterSchedule, arc: str, wish: Wish, rc: str) -> CapacityE
     demanded = _share(wish[rc].streams)
     capacity = table.rcs[rc].capacity
     used = sum(_share(other.uses[rc].streams) for other in table.rcs[rc].holders if other.state in CONNECTED)
+    streams = sorted(wish[rc].streams, key=lambda usage: usage.period_s)
+    advice = remedy([(usage.kind, stream(usage)) for usage in streams], capacity)
     reason = "more than it can ever give" if demanded > capacity else "and not every packet can be in time"
     return CapacityExceeded(
         f"{arc} demands {demanded:.1%} of {rc}, {reason}: capacity {capacity:.1%}, {used:.1%} used now",
+        remedy=advice or CapacityExceeded.remedy,
         rc=rc,
         demanded=demanded,
         used=used,

@@ -53,6 +53,11 @@ class ContextSwitch:
 
     def __init__(self, bus: Bus, clock: Clock, note: Note) -> None:
         self._bus, self._clock, self._note = bus, clock, note
+        self._given_back: set[str] = set()
+
+    def gives_back(self, arc: str) -> bool:
+        """Say whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
+        return arc in self._given_back
 
     async def connect(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
         """Connect all RCs to the ARC and have it open its gate, or undo all of it.
@@ -69,9 +74,13 @@ class ContextSwitch:
         if failed is None and await self._open_gate(order, settled_s):
             return None
         close = CloseGate("failed", failed or order.arc, 0.0, -1.0)
-        async with asyncio.TaskGroup() as both:
-            both.create_task(self._close_gate(order.arc, close))
-            both.create_task(self.disconnect(_holds(order.arc, order.epochs), f"failed at {failed or order.arc}"))
+        self._given_back.add(order.arc)
+        try:
+            async with asyncio.TaskGroup() as both:
+                both.create_task(self._close_gate(order.arc, close))
+                both.create_task(self.disconnect(_holds(order.arc, order.epochs), f"failed at {failed or order.arc}"))
+        finally:
+            self._given_back.discard(order.arc)
         return failed or ""
 
     async def revoke(self, order: RevokeArc) -> None:

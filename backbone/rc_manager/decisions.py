@@ -245,4 +245,9 @@ class Record:
     cause: str = ""
 
 
-Instruction = ConnectArc | RevokeArc | WakeAt | Record
+@dataclass(frozen=True, slots=True)
+class RenewLeases:
+    """Renew all leases now: the places of holders on a sharable RC have changed."""
+
+
+Instruction = ConnectArc | RevokeArc | WakeAt | RenewLeases | Record

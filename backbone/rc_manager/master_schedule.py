@@ -29,10 +29,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
+from backbone.rc_manager.discipline import Discipline, deadline_s, eligible, joining_s
 from backbone.rc_manager.groups import Group, Groups
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
 from backbone.rc_manager.priority import Path, by_precedence, higher, rank
-from backbone.rc_manager.radio_admission import admissible, stream
+from backbone.rc_manager.radio_admission import Analysis, admissible, stream
 
 INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the rounding of sums of times
 SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, but is not free yet
@@ -112,6 +113,8 @@ class ArcEntry:
         afterwards: What becomes of it once free, while it is being revoked.
         retry_s: When it asks again after it could not open; None: only when told.
         turns: Grants so far.
+        had_s: Time it had, as the discipline ``time`` counts it; without the run that goes on.
+        raised: Levels by which it rose because it waited long (aging).
         swapped_out: Why it lost its RCs last; empty: never.
         swapped_out_by: Because of whom.
     """
@@ -139,6 +142,8 @@ class ArcEntry:
     afterwards: Afterwards = Afterwards.WAIT
     retry_s: float | None = None
     turns: int = 0
+    had_s: float = 0.0
+    raised: int = 0
     swapped_out: str = ""
     swapped_out_by: str = ""
 
@@ -168,11 +173,6 @@ class ArcEntry:
     def length_s(self) -> float:
         """Time from the beginning of settling to the end of its minimum run time."""
         return self.settle_s + self.minimum_s
-
-    @property
-    def seniority(self) -> tuple[float, int]:
-        """Key among equals: smaller comes first."""
-        return self.stamp if self.pledge is None else (-math.inf, self.pledge)
 
     def served(self, now_s: float) -> bool:
         """Say whether it runs and had its whole slice."""
@@ -217,25 +217,38 @@ class MasterSchedule:
         arcs: All ARCs that asked, by name, in the order of their requests.
     """
 
-    def __init__(self, *, tolerance_s: float, strict: bool, exact_up_to: int = EXACT_UP_TO) -> None:
+    def __init__(
+        self,
+        *,
+        tolerance_s: float,
+        strict: bool,
+        discipline: Discipline = "turns",
+        admission: Analysis = "exact",
+        exact_up_to: int = EXACT_UP_TO,
+    ) -> None:
         """Begin empty.
 
         Args:
             tolerance_s: By how much two reservations may overlap. Hand-over takes time: without it an
                 ARC never fits a gap that is exactly as long as its slice.
             strict: No ARC starts while a higher usable one of its group waits.
+            discipline: Which of several equals comes first.
+            admission: How it is decided what a sharable RC can serve.
             exact_up_to: Groups of at most this size are planned whole.
         """
         self.rcs: dict[str, RcEntry] = {}
         self.arcs: dict[str, ArcEntry] = {}
         self._slack_s = tolerance_s
         self._strict = strict
+        self._discipline = discipline
+        self.admission: Analysis = admission
         self._exact_up_to = exact_up_to
         self._groups: Groups[ArcEntry] = Groups(exact_up_to)
         self._bits: dict[str, int] = {}
         self._touched: dict[str, None] = {}
         self._candidates: dict[ArcEntry, None] = {}
         self._busy = 0
+        self._now_s = 0.0
         self._ends: list[tuple[float, int, ArcEntry]] = []
         self._serial = itertools.count()
         self._firsts: dict[str, ArcEntry | None] = {}
@@ -279,10 +292,15 @@ class MasterSchedule:
 
     def enter(self, arc: ArcEntry, state: RequestState, now_s: float) -> None:
         """Let the ARC come to this state; those it shares RCs with are looked at again."""
+        self._now_s = now_s
         was_active, held = arc.active, arc.holds
+        if arc.state is RequestState.RUNNING:
+            arc.had_s = self._had_s(arc)
         arc.state, arc.since_s = state, now_s
         if arc.active and not was_active:
             self._groups.add(arc, arc.uses)
+            if self._discipline == "time":
+                arc.had_s = joining_s(arc.had_s, map(self._had_s, self._rivals(arc)))
             self._demand_changed(arc.shares)
         if held != arc.holds:
             for rc in arc.uses:
@@ -326,6 +344,14 @@ class MasterSchedule:
             self._await_end(arc)
         self.touch(arc)
 
+    def _goes_on(self, arc: ArcEntry) -> bool:
+        """Say whether the discipline gives an ARC whose slice is over one more at once."""
+        if self._discipline == "turns":
+            return False
+        own = self._seniority(arc)
+        waiting = [rival for rival in self._rivals(arc) if rival.state is RequestState.WAITING and self.usable(rival)]
+        return bool(waiting) and all(own < self._seniority(rival) for rival in waiting)
+
     def _somebody_waits_for(self, holder: ArcEntry) -> bool:
         return any(user.state is RequestState.WAITING for rc in holder.uses for user in self._groups.users(rc))
 
@@ -336,6 +362,7 @@ class MasterSchedule:
 
     def next_end_s(self, now_s: float) -> float | None:
         """Return when the next slice ends that somebody waits for; those that have ended are looked at again."""
+        self._now_s = now_s
         while self._ends:
             end_s, _, arc = self._ends[0]
             stands = arc.state is RequestState.RUNNING and arc.end_s == end_s
@@ -345,7 +372,9 @@ class MasterSchedule:
             heapq.heappop(self._ends)
             if stands:
                 arc.awaited = wanted
-            if wanted:
+            if wanted and self._goes_on(arc):
+                self.end_at(arc, now_s + arc.minimum_s)
+            elif wanted:
                 self._busy &= ~arc.excludes
                 self.touch(arc)
         return None
@@ -391,7 +420,7 @@ class MasterSchedule:
                 (user, stream(usage), number) for user in users for number, usage in enumerate(user.uses[rc].streams)
             ]
             ranked = by_precedence(streams, lambda s: s[0].path, lambda s: (s[1].period_us, s[0].name, s[2]))
-            known[key] = admissible([packets for _, packets, _ in ranked], self.rcs[rc].capacity)
+            known[key] = admissible([packets for _, packets, _ in ranked], self.rcs[rc].capacity, self.admission)
         return known[key]
 
     # Order and plan (rules 2, 3, 4).
@@ -411,7 +440,24 @@ class MasterSchedule:
 
     def in_order(self, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
         """Return ARCs of one group in the order of rule 2."""
-        return by_precedence(arcs, lambda arc: arc.path, lambda arc: arc.seniority)
+        return by_precedence(arcs, lambda arc: arc.path, self._seniority)
+
+    def _seniority(self, arc: ArcEntry) -> tuple[bool, float, float, int]:
+        """Return the key among equals: smaller comes first. Those RCs are being freed for by force come before all."""
+        if arc.pledge is not None:
+            return (False, -math.inf, -math.inf, arc.pledge)
+        if self._discipline == "turns":
+            return (False, 0.0, *arc.stamp)
+        had_s = self._had_s(arc)
+        late = not eligible(had_s, map(self._had_s, self._rivals(arc)))
+        return (late, deadline_s(had_s, arc.minimum_s), *arc.stamp)
+
+    def _had_s(self, arc: ArcEntry) -> float:
+        return arc.had_s + (self._now_s - arc.granted_s if arc.state is RequestState.RUNNING else 0.0)
+
+    def _rivals(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the equals that cannot run beside the ARC."""
+        return [other for other in self._beside(arc) if not rank(other.path, arc.path) and not self.fits(arc, [other])]
 
     def plan(
         self, group: Sequence[ArcEntry], now_s: float, *, handed_over: bool = False, slack_s: float | None = None
@@ -735,11 +781,12 @@ class MasterSchedule:
         ]
         if not self.usable(arc):
             return Slot(arc, math.inf, holds)
+        own = self._seniority(arc)
         before = {
             other: other.length_s
             for other in self._beside(arc)
             if other.queued
-            and rank(other.path, arc.path) >= (other.seniority >= arc.seniority)
+            and rank(other.path, arc.path) >= (self._seniority(other) >= own)
             and not self.fits(arc, [other])
         }
         turns_s = [sum(before.get(user, 0.0) for user in self._groups.users(rc)) for rc in arc.uses]

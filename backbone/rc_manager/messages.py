@@ -322,10 +322,20 @@ class Lease(Message, frozen=True):
 
 
 class Leases(Message, frozen=True):
-    """Published by the RC manager every ``RENEW_EVERY_S``: these holds last another ``lease_s`` from the stamp."""
+    """Published by the RC manager every ``RENEW_EVERY_S``: these holds last another ``lease_s`` from the stamp.
+
+    An RC that knows better publishes its ``RcState``: one that does not have a hold any more which is
+    renewed here, or one that is called missing.
+
+    Attributes:
+        leases: All holds that are renewed.
+        lease_s: For how long, seconds of mission time.
+        missing: RCs that do not answer, as far as the RC manager knows.
+    """
 
     leases: list[Lease]
     lease_s: float
+    missing: list[str] = []
 
 
 # ---------------------------------------------------------------------- for everybody

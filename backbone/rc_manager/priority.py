@@ -99,6 +99,7 @@ class PriorityTree:
         self._mission = mission
         self._numbers: dict[tuple[str, ...], int] = {(mission,): priority}
         self._set: dict[str, int] = {}
+        self._raised: dict[tuple[str, ...], int] = {}
 
     def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[tuple[str, ...], bool]:
         """Take note of the nodes on this way.
@@ -122,7 +123,28 @@ class PriorityTree:
 
     def path(self, names: tuple[str, ...]) -> Path:
         """Return the way with its present numbers."""
-        return tuple((name, self._numbers[names[: depth + 1]]) for depth, name in enumerate(names))
+        return tuple(
+            (name, self._numbers[way] + self._raised.get(way, 0))
+            for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
+        )
+
+    def age(self, levels: Iterable[tuple[tuple[str, ...], int]]) -> bool:
+        """Raise nodes whose ARCs wait long by some levels, others by none any more; return whether that changed any.
+
+        A node rises with all above it, or it would rise among its siblings only. The mission's own node
+        does not: a console is not outwaited. Neither do consoles.
+
+        Args:
+            levels: Ways of the nodes and by how much they rise; of several for one node the largest counts.
+        """
+        raised: dict[tuple[str, ...], int] = {}
+        for names, by in levels:
+            for depth in range(2, len(names) + 1):
+                way = names[:depth]
+                raised[way] = max(by, raised.get(way, 0))
+        changed = raised != self._raised
+        self._raised = raised
+        return changed
 
     def change(self, node: str, priority: int) -> None:
         """Give the node, or the console, of this name another number from now on."""

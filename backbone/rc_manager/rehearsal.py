@@ -27,6 +27,7 @@ from backbone.rc_manager.decisions import (
     Opened,
     RcKnown,
     Record,
+    RenewLeases,
     RevokeArc,
     WakeAt,
     Woken,
@@ -106,6 +107,8 @@ class Rehearsal:
                     self.connected.pop(arc, None)
                     release_s = max((self._release_s[rc] for rc in epochs), default=0.0)
                     self.at(self.now_s + self._pause_s(deadline_s) + release_s, Freed(arc))
+                case RenewLeases():
+                    pass
                 case _:
                     assert_never(instruction)
 

@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import assert_never
+from typing import assert_never, get_args
 
 import msgspec
 
@@ -49,6 +49,7 @@ from backbone.rc_manager.decisions import (
     RcKnown,
     RcWentDown,
     Record,
+    RenewLeases,
     Requested,
     RevokeArc,
     RuntimeChanged,
@@ -56,8 +57,17 @@ from backbone.rc_manager.decisions import (
     Wanted,
     Woken,
 )
+from backbone.rc_manager.discipline import Discipline
 from backbone.rc_manager.explanation import Explanation
-from backbone.rc_manager.master_schedule import CONNECTED, Afterwards, ArcEntry, MasterSchedule, RcEntry, Turn
+from backbone.rc_manager.master_schedule import (
+    CONNECTED,
+    EXACT_UP_TO,
+    Afterwards,
+    ArcEntry,
+    MasterSchedule,
+    RcEntry,
+    Turn,
+)
 from backbone.rc_manager.messages import (
     Lease,
     RcUse,
@@ -69,8 +79,10 @@ from backbone.rc_manager.messages import (
     Why,
 )
 from backbone.rc_manager.priority import CONSOLE, PriorityTree, higher
+from backbone.rc_manager.radio_admission import Analysis
 
 RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
+ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
 STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken invariant
 
 
@@ -83,7 +95,11 @@ class ScheduleManager:
         grace_s: float,
         tolerance_s: float,
         policy: str = "no_delay",
-        discipline: str = "turns",
+        discipline: Discipline = "turns",
+        admission: Analysis = "exact",
+        aging_s: float = 0.0,
+        grid_s: float = 0.0,
+        exact_up_to: int = EXACT_UP_TO,
         mission: str,
         mission_priority: int,
     ) -> None:
@@ -94,23 +110,36 @@ class ScheduleManager:
             tolerance_s: Reaction and timer tolerance of this run.
             policy: ``no_delay``: lower ARCs fill gaps that cost nobody anything. ``strict``: no ARC
                 starts while a higher usable one of its group waits.
-            discipline: ``turns``: equals take turns.
+            discipline: ``turns``: equals take turns. ``time``: equals get equal time.
+            admission: ``exact``: a sharable RC serves what is always in time. ``sum``: what adds up to its capacity.
+            aging_s: Seconds of waiting after which an ARC rises by one level, and again; 0: never.
+            grid_s: Slices end at multiples of this many seconds, so that many RCs come free together; 0: no grid.
+            exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
             mission_priority: Its number among the consoles.
 
         Raises:
-            ValueError: The policy or discipline is not known.
+            ValueError: The policy, discipline or admission is not known, or a time is below 0.
         """
-        if policy not in {"no_delay", "strict"}:
-            raise ValueError(f"unknown policy {policy!r}; there are no_delay and strict")
-        if discipline != "turns":
-            raise ValueError(f"unknown discipline {discipline!r}; there is turns")
+        _require("policy", policy, ("no_delay", "strict"))
+        _require("discipline", discipline, get_args(Discipline))
+        _require("admission", admission, get_args(Analysis))
+        if not (0 <= aging_s < math.inf and 0 <= grid_s < math.inf):
+            raise ValueError(f"aging after {aging_s} s and a grid of {grid_s} s; both must be at least 0")
         self._grace_s = grace_s
         self._tolerance_s = tolerance_s
         self._policy = policy
         self._discipline = discipline
         self._tree = PriorityTree(mission, mission_priority)
-        self._table = MasterSchedule(tolerance_s=tolerance_s, strict=policy == "strict")
+        self._aging_s, self._grid_s = aging_s, grid_s
+        self._exact_up_to, self._relaxed = exact_up_to, False
+        self._table = MasterSchedule(
+            tolerance_s=tolerance_s,
+            strict=policy == "strict",
+            discipline=discipline,
+            admission=admission,
+            exact_up_to=exact_up_to,
+        )
         self._explanation = Explanation(self._table)
         self._now_s = 0.0
         self._count = 0
@@ -141,8 +170,10 @@ class ScheduleManager:
         self._take_note(event)
         self._retry()
         self._table.next_end_s(self._now_s)
+        self._age()
         while turn := self._table.due(self._now_s):
             self._give(turn)
+            self._age()
         self._set_alarm(rang=isinstance(event, Woken))
         return self._told
 
@@ -203,8 +234,14 @@ class ScheduleManager:
         arc.pledge = None
         arc.began_s = self._now_s
         self._enter(arc, RequestState.CONNECTING)
+        self._renew_if_ranks_changed(arc)
         self._record(trace.connect(self._now_s, arc.name, arc.epochs), "it is next, and all its RCs are free (rule 3)")
         self._tell(ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, self._now_s + arc.length_s, self._ranks(arc)))
+
+    def _renew_if_ranks_changed(self, arc: ArcEntry) -> None:
+        """Have the leases renewed if others hold sharable RCs beside this ARC: their places may be others now."""
+        if any(len(self._table.rcs[rc].holders) > 1 for rc in arc.shares):
+            self._tell(RenewLeases())
 
     def _ranks(self, arc: ArcEntry) -> dict[str, int]:
         """Return the ARC's place by user priority among the holders of each sharable RC it uses."""
@@ -239,11 +276,18 @@ class ScheduleManager:
         arc.granted_s = self._now_s
         arc.turns += 1
         self._enter(arc, RequestState.RUNNING)
-        self._table.end_at(arc, self._now_s + arc.minimum_s)
+        self._table.end_at(arc, self._slice_end_s(arc))
         newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._table.rcs[rc].granted_epoch}
         for rc, epoch in newest.items():
             self._table.rcs[rc].granted_epoch = epoch
         self._record(trace.grant(self._now_s, arc.name, newest), "its RCs have settled")
+        if self._grid_s:
+            self._record(trace.extend(self._now_s, name, arc.end_s), "slices end on a common grid (rule 15)")
+
+    def _slice_end_s(self, arc: ArcEntry) -> float:
+        """Return when the slice of an ARC that is granted now ends."""
+        end_s = self._now_s + arc.minimum_s
+        return math.ceil(end_s / self._grid_s - ROUNDING) * self._grid_s if self._grid_s else end_s
 
     def _open_failed(self, name: str, rc: str) -> None:
         self._rc_down(rc, lost_by=name)
@@ -314,10 +358,15 @@ class ScheduleManager:
         place_in_tree = self._note_nodes(request)
         uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
         arc = self._table.make_arc(request, uses, place_in_tree, path, self._now_s)
+        arc.maximum_s = max(arc.maximum_s, self._longest_s(arc.minimum_s))
         self._record(self._request_line(arc), f"asked by {request.owner}")
         if not request.idle:
             self._queue(arc)
         return arc
+
+    def _longest_s(self, minimum_s: float) -> float:
+        """Return the longest slice of this minimum run time that is not extended on request."""
+        return minimum_s + self._grid_s
 
     def _request_line(self, arc: ArcEntry) -> trace.Line:
         name, number = arc.path[-1]
@@ -427,7 +476,7 @@ class ScheduleManager:
 
     def _runtime_changed(self, name: str, minimum_s: float, maximum_s: float) -> None:
         arc = self._table.arcs.get(name)
-        maximum_s = max(minimum_s, maximum_s)
+        maximum_s = max(maximum_s, self._longest_s(minimum_s))
         if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
             return
         if not 0 < minimum_s <= maximum_s < math.inf:
@@ -464,9 +513,31 @@ class ScheduleManager:
 
     def _priority_changed(self, node: str, priority: int) -> None:
         self._tree.change(node, priority)
+        self._priorities_changed()
+
+    def _priorities_changed(self) -> None:
         self._renumber()
         for names in [*self._traced_nodes]:
             self._introduce_nodes(names)
+        self._tell(RenewLeases())
+
+    def _age(self) -> None:
+        """Raise who waits long; it keeps its level until it was served or wants no time any more."""
+        if not self._aging_s:
+            return
+        for arc in self._table.arcs.values():
+            if arc.state is RequestState.WAITING:
+                arc.raised = int((self._now_s - arc.since_s) / self._aging_s + ROUNDING)
+            elif arc.served(self._now_s) or not arc.active:
+                arc.raised = 0
+        if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._table.arcs.values() if arc.raised):
+            self._priorities_changed()
+
+    def _next_aging_s(self) -> float | None:
+        if not self._aging_s:
+            return None
+        waiting = [arc for arc in self._table.arcs.values() if arc.state is RequestState.WAITING]
+        return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
 
     def _renumber(self) -> None:
         for arc in self._table.arcs.values():
@@ -605,9 +676,10 @@ class ScheduleManager:
     def leases(self) -> list[Lease]:
         """Return all holds that must be renewed: those of ARCs that connect or run."""
         return [
-            Lease(rc, arc.name, epoch)
+            Lease(rc, arc.name, epoch, ranks.get(rc, -1))
             for arc in self._table.arcs.values()
             if arc.state in CONNECTED
+            for ranks in [self._ranks(arc)]
             for rc, epoch in arc.epochs.items()
         ]
 
@@ -682,10 +754,16 @@ class ScheduleManager:
         """Ask to be woken when the next decision can be due without an event."""
         retries = [arc.retry_s for arc in self._retrying.values() if arc.retry_s is not None]
         slice_end_s = self._table.next_end_s(self._now_s)
-        wake_s = min([*retries, *([slice_end_s] if slice_end_s is not None else [])], default=None)
+        times_s = [*retries, slice_end_s, self._next_aging_s()]
+        wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
         if rang or wake_s != self._wake_s:
             self._wake_s = wake_s
             self._tell(WakeAt(wake_s))
+
+
+def _require(what: str, given: str, known: Sequence[str]) -> None:
+    if given not in known:
+        raise ValueError(f"unknown {what} {given!r}; there are {' and '.join(known)}")
 
 
 def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:

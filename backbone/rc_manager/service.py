@@ -13,11 +13,11 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections import deque
-from collections.abc import Coroutine, Iterable, Mapping
+from collections import Counter, deque
+from collections.abc import Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO, assert_never
+from typing import Annotated, Any, Literal, TextIO, assert_never
 
 import msgspec
 
@@ -52,6 +52,7 @@ from backbone.rc_manager.decisions import (
     RcKnown,
     RcWentDown,
     Record,
+    RenewLeases,
     Requested,
     RevokeArc,
     RuntimeChanged,
@@ -59,6 +60,7 @@ from backbone.rc_manager.decisions import (
     Wanted,
     Woken,
 )
+from backbone.rc_manager.discipline import Discipline
 from backbone.rc_manager.messages import (
     BEAT_MISSED_S,
     LEASE_S,
@@ -72,6 +74,7 @@ from backbone.rc_manager.messages import (
     CurrentRequest,
     Done,
     Extend,
+    Lease,
     Leases,
     RcManagerQuestion,
     RcState,
@@ -83,6 +86,7 @@ from backbone.rc_manager.messages import (
     TraceLine,
     Withdraw,
 )
+from backbone.rc_manager.radio_admission import Analysis
 from backbone.rc_manager.schedule_manager import ScheduleManager
 from backbone.wire import Envelope, Message
 
@@ -105,14 +109,20 @@ class RcManagerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
         grace_s: Time a decision process has to stop cleanly at the end of a slice.
         policy: ``no_delay`` or ``strict``.
         discipline: ``turns`` or ``time``.
+        admission: ``exact`` or ``sum``.
+        aging_s: Seconds of waiting after which an ARC rises by one level, and again; 0: never.
+        grid_s: Slices end at multiples of this many seconds; 0: no grid.
         trace: File the decisions are written to; empty: none.
     """
 
     mission: str
     mission_priority: int = 0
     grace_s: float = 0.2
-    policy: str = "no_delay"
-    discipline: str = "turns"
+    policy: Literal["no_delay", "strict"] = "no_delay"
+    discipline: Discipline = "turns"
+    admission: Analysis = "exact"
+    aging_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+    grid_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
     trace: str = ""
 
 
@@ -148,6 +158,9 @@ class RcManager(Component[RcManagerParameters]):
             tolerance_s=TOLERANCE_S,
             policy=given.policy,
             discipline=given.discipline,
+            admission=given.admission,
+            aging_s=given.aging_s,
+            grid_s=given.grid_s,
             mission=given.mission,
             mission_priority=given.mission_priority,
         )
@@ -155,6 +168,8 @@ class RcManager(Component[RcManagerParameters]):
         self._uses: dict[str, Mapping[str, RcUse]] = {}
         self._running_rcs: set[str] = set()
         self._beats: dict[str, float] = {}
+        self._requesting: Counter[str] = Counter()
+        self._failing_rcs: set[str] = set()
         self._starts: dict[str, asyncio.Task[None]] = {}
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
@@ -181,6 +196,8 @@ class RcManager(Component[RcManagerParameters]):
         self._take_over(self._found)
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
+        for rc in self._resources:
+            self.bus.subscribe(_rc(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
         self.bus.watch_link(self._link_changed)
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
@@ -232,9 +249,13 @@ class RcManager(Component[RcManagerParameters]):
         return Done()
 
     async def _request(self, request: SchedulingRequest) -> Scheduled:
-        rcs = self.manager.choose(request)
-        await self._have_running(rcs)
-        self._admit(request, rcs)
+        self._requesting[request.arc] += 1
+        try:
+            rcs = self.manager.choose(request)
+            await self._have_running(rcs)
+            self._admit(request, rcs)
+        finally:
+            self._requesting[request.arc] -= 1
         return self.manager.scheduled(request.arc, self.clock.now_s())
 
     def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
@@ -262,14 +283,16 @@ class RcManager(Component[RcManagerParameters]):
                 self._wake_at_s = at_s
                 self._wake.set()
             case ConnectArc(arc=arc):
-                self._switch(arc, self._connect(instruction))
+                self._switch(arc, lambda: self._connect(instruction))
             case RevokeArc(arc=arc, epochs=epochs):
                 self._revoked |= dict.fromkeys(epochs, (self.clock.now_s(), arc))
-                self._switch(arc, self._revoke(instruction))
+                self._switch(arc, lambda: self._revoke(instruction))
+            case RenewLeases():
+                self._publish_leases()
             case _:
                 assert_never(instruction)
 
-    def _switch(self, arc: str, work: Coroutine[Any, Any, None]) -> None:
+    def _switch(self, arc: str, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Run the work after whatever is still under way for this ARC was ended."""
         before = self._switches.get(arc)
 
@@ -277,7 +300,7 @@ class RcManager(Component[RcManagerParameters]):
             if before is not None and not before.done():
                 before.cancel()
                 await asyncio.gather(before, return_exceptions=True)
-            await work
+            await work()
             if self._switches.get(arc) is asyncio.current_task():
                 del self._switches[arc]
 
@@ -437,15 +460,41 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _meet_later(self, rc: str) -> None:
         """Ask a failed RC how it is; not at once, or it and the schedule would try each other without end."""
-        await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
-        while not await self._meet_rc(rc) and rc in await self._present():
+        self._failing_rcs.add(rc)
+        try:
             await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
+            while not await self._meet_rc(rc) and rc in await self._present():
+                await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
+        finally:
+            self._failing_rcs.discard(rc)
 
     async def _present(self) -> set[str]:
         return {component_of(component.address) for component in await self._listing()}
 
     async def _meet_again(self, rc: str) -> None:
         await self._meet_rc(rc)
+
+    def _heard_rc(self, envelope: Envelope[Any]) -> None:
+        """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
+        state: RcState = envelope.body
+        rc = state.name
+        if rc not in self._running_rcs:
+            if rc not in self._failing_rcs:
+                self.start_task(self._meet_again(rc), f"meet {rc}")
+            return
+        self.happened(CapacityChanged(rc, state.capacity))
+        holds = {(holder.arc, holder.epoch) for holder in state.holders}
+        if any(
+            lease.rc == rc and lease.epoch <= state.last_epoch and (lease.arc, lease.epoch) not in holds
+            for lease in self._leases()
+            if lease.arc not in self._switches
+        ):
+            self.story.note(rc, "does not have all holds any more that it was given")
+            self.happened(RcCameBack(rc, state.last_epoch))
+
+    def _leases(self) -> list[Lease]:
+        """Return what is to be renewed: all that is held, but for what is just being given back."""
+        return [lease for lease in self.manager.leases() if not self._context_switch.gives_back(lease.arc)]
 
     def _disappeared(self, name: str) -> None:
         if name in self._running_rcs:
@@ -494,9 +543,14 @@ class RcManager(Component[RcManagerParameters]):
                 del self._beats[arc]
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
-            self.bus.publish(self.address, Conversation.LEASES, Leases(self.manager.leases(), LEASE_S * rate))
+            self._publish_leases()
             self.changed()
             await self.clock.sleep_s(RENEW_EVERY_S * rate)
+
+    def _publish_leases(self) -> None:
+        missing = sorted(self._resources.keys() - self._running_rcs - self._failing_rcs)
+        leases = Leases(self._leases(), LEASE_S * self.clock.rate, missing)
+        self.bus.publish(self.address, Conversation.LEASES, leases)
 
     def publish_news(self) -> None:
         """Publish the schedule, and how many run if that is news."""
@@ -512,14 +566,21 @@ class RcManager(Component[RcManagerParameters]):
         arc = envelope.body.arc
         if arc in self._uses:
             self._beats[arc] = self.clock.now_s()
-        elif arc not in self._switches:
-            self._switch(arc, self._meet_arc(arc))
+        elif arc not in self._switches and not self._requesting[arc]:
+            self._switch(arc, lambda: self._meet_arc(arc))
 
     async def _meet_arc(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
         current = (await self._ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
-        if current is not None and current.rcs and arc not in self._uses:
+        if current is None or arc in self._uses or self._requesting[arc]:
+            return
+        if current.rcs:
             self._admit(current.request, tuple(current.rcs))
+            return
+        try:
+            await self._request(current.request)  # its own question was lost, or is still on its way
+        except (Refusal, LinkError) as error:
+            self.story.note(arc, f"cannot be scheduled: {error}")
 
 
 def _rc(rc: str) -> str:
