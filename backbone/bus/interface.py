@@ -1,7 +1,8 @@
 """Bus and Clock: all that a component knows of the world between components.
 
-Two implementations of ``Bus`` pass one conformance suite: ``zenoh_bus`` between processes and
-``local_bus`` inside one.  Which of them a component got is never visible to it.
+Three implementations of ``Bus`` pass one conformance suite: ``zenoh_bus`` between processes,
+``local_bus`` inside one, and ``shared_bus`` where several components share a process among others.
+Which of them a component got is never visible to it.
 
 Words: a *question* is asked of one address and answered by exactly one reply or refusal; a
 *publication* goes to whoever subscribed; a *liveliness token* stands as long as its component lives.

@@ -44,6 +44,14 @@ class Broken(Component[NoParameters]):
         raise RuntimeError("the bug of the sample")
 
 
+class Stumbling(Component[NoParameters]):
+    """Ends by a bug a moment after it is ready."""
+
+    async def serve(self) -> None:
+        await self.clock.sleep_s(0.1)
+        raise RuntimeError("the bug of the sample")
+
+
 class Leaver(Component[NoParameters]):
     """Ends itself in good order a moment after it is ready."""
 

@@ -89,6 +89,24 @@ def test_components_are_started_and_stopped_while_the_others_keep_their_processe
     }
 
 
+def test_who_shares_a_process_is_stopped_alone_and_started_in_it_again(mission: RunningMission) -> None:
+    """Which components share a process is a line in mission.xml."""
+
+    def pids() -> dict[str, int]:
+        return {c["name"]: c["pid"] for c in mission.status()["components"] if c["name"] in RCS}
+
+    before = pids()
+    assert len({before[rc] for rc in RCS - {"grabber"}}) == 1
+    assert before["grabber"] not in {before[rc] for rc in RCS - {"grabber"}}
+    stopped = mission.command("scout-backbone", "stop", "scout3", "--mission", mission.name)
+    assert stopped.returncode == 0, stopped.stderr
+    assert pids() == {rc: pid for rc, pid in before.items() if rc != "scout3"}
+    words = ("scout-console", "attach", "scout3", "--profile", "pendant", "--mission", mission.name, "--script", "-")
+    done = mission.command(*words, stdin='{"at_s":0.1,"release":true}\n')
+    assert done.returncode == 0, f"{done.stdout}\n{done.stderr}\n{mission.story()}"
+    assert pids() == before
+
+
 async def test_a_console_drives_a_robot_and_its_behavior_goes_on_afterwards(mission: RunningMission) -> None:
     watcher = mission.component("watch-scout1")["pid"]
     async with mission.bus() as bus:
