@@ -11,12 +11,14 @@ from __future__ import annotations
 import asyncio
 import selectors
 import time
-from collections.abc import Coroutine, Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable, Coroutine, Mapping
+from contextvars import Context
+from typing import Any, TypeVar, TypeVarTuple
 
 from backbone.errors import BackboneError
 
 T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
 
 
 class MissionClock:
@@ -89,6 +91,7 @@ class EndOfVirtualTime(BackboneError):
     """Virtual time went on for longer than it can be told exactly."""
 
 
+RESOLUTION_S = time.get_clock_info("monotonic").resolution
 LAST_VIRTUAL_S = 2.0**23  # 97 days; beyond, steps of a float are coarser than the loop's 1 ns and timers never come
 
 
@@ -136,6 +139,18 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         """Return the virtual time in seconds."""
         return self._jumping.now_s
+
+    def call_at(
+        self, when: float, callback: Callable[[*Ts], object], *args: *Ts, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        """Call it at this time; see ``asyncio.AbstractEventLoop.call_at``.
+
+        The loop takes a timer less than its resolution away for due and lets no time pass. Whoever then waits for
+        the rest of a nanosecond would do so for ever, so that rest is made one in which time passes.
+        """
+        if self.time() < when < self.time() + RESOLUTION_S:
+            when = self.time() + 2 * RESOLUTION_S
+        return super().call_at(when, callback, *args, context=context)
 
 
 def run_virtual(main: Coroutine[Any, Any, T]) -> T:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import random
 import time
 from collections.abc import Coroutine
@@ -209,3 +210,21 @@ def test_a_mission_clock_started_now_begins_at_zero() -> None:
 def test_time_that_does_not_move_on_is_refused(rate: float) -> None:
     with pytest.raises(ValueError, match="rate must be above 0"):
         MissionClock(0.0, rate)
+
+
+@given(st.floats(1e-3, 1e6))
+def test_whoever_is_woken_a_rounding_early_and_waits_for_the_rest_gets_there(at_s: float) -> None:
+    """The loop takes timers less than its resolution apart for due together; the rest must not take for ever."""
+
+    async def main() -> None:
+        clock = VirtualClock()
+        early = asyncio.create_task(clock.sleep_until_s(math.nextafter(at_s, 0.0)))
+        trials = 0
+        while clock.now_s() < at_s:
+            await clock.sleep_until_s(at_s)
+            trials += 1
+            assert trials < 4
+        assert clock.now_s() <= at_s + 1e-8
+        await early
+
+    run_virtual(main())
