@@ -88,6 +88,7 @@ OWNER_GONE_S = 0.5  # chosen: a robot is given back within a second of its conso
 OWNER_BEAT_S = 0.9  # chosen: less than the RC manager waits for a beat (1 s) with one to spare
 PREPARE_S = 0.9  # chosen: less than the RC manager waits for the opening beyond settling, so it opens in time or never
 NOTICE_S = 1.0  # chosen: an owner that needs longer to take note is noticed by its beat
+NOTICE_AGAIN_S = 0.1  # chosen: a hub that is being restarted is back after some of these; machine seconds
 REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first have RCs started
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; later it has overlooked this one
 
@@ -343,6 +344,11 @@ class AggregateResourceController(Component[ArcParameters]):
     # ------------------------------------------------------------------ the gate
     async def _open(self, order: OpenGate) -> GateOpen:
         self._choose(order.epochs)
+        if self._gate.epochs == order.epochs:  # the same order came twice: the first goes on undisturbed
+            if self._gate.is_open:
+                return GateOpen()
+            reason = "is being opened already"
+            raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0)
         self._gate.prepare(order.epochs)
         self._lease_until_s = self.clock.now_s() + LEASE_S * self.clock.rate
         self._leased.set()
@@ -414,17 +420,29 @@ class AggregateResourceController(Component[ArcParameters]):
         return told
 
     async def _tell_owner(self) -> None:
-        """Tell one notice after the other, so that none overtakes another on its way to a slow owner.
-
-        It may also hang or be gone, which others find out.
-        """
+        """Tell one notice after the other, so that none overtakes another on its way to a slow owner."""
         while True:
             waiting = await self._notices.get()
+            await self._tell_until_noted(waiting)
+            waiting.told.set()
+
+    async def _tell_until_noted(self, waiting: _Notice) -> None:
+        """Tell it until the owner took note or there is something newer to tell: a notice may get lost.
+
+        The owner may also hang or be gone, which others find out.
+        """
+        while True:
             try:
                 await self.bus.ask(self._owner, waiting.notice, Noted, within_s=waiting.within_s)
-            except (Refusal, LinkError) as error:
+                return
+            except Refusal as refusal:
+                self.story.note(self._owner, f"did not take note of {type(waiting.notice).__name__}: {refusal}")
+                return
+            except LinkError as error:
                 self.story.note(self._owner, f"did not take note of {type(waiting.notice).__name__}: {error}")
-            waiting.told.set()
+            if isinstance(waiting.notice, Suspending) or not self._notices.empty():
+                return
+            await self.clock.sleep_s(NOTICE_AGAIN_S * self.clock.rate)
 
     # ------------------------------------------------------------------ watching
     def _heard_leases(self, envelope: Envelope[Any]) -> None:

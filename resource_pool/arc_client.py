@@ -207,14 +207,17 @@ class ArcClient:
             raise NotMyArc(f"{notice_arc(notice)} is not claimed here, {self.arc} is", arc=notice_arc(notice))
         match notice:
             case Resumed():
-                if self.granted is not None and self.granted.epochs != notice.epochs:
-                    await self._lost()
+                if self.granted is not None and self.granted.epochs == notice.epochs:
+                    return Noted()  # told again: the answer to the first was lost
+                await self._lost()
                 self.granted, self.suspended = notice, None
                 self._granted.set()
                 await self._listener.arc_resumed(notice)
             case Suspending():
                 await self._listener.arc_suspending(notice)
             case Suspended():
+                if self.granted is None and self.suspended == notice:
+                    return Noted()
                 self.granted, self.suspended = None, notice
                 self._granted.clear()
                 await self._listener.arc_suspended(notice)

@@ -31,6 +31,7 @@ from backbone.rc_manager.messages import (
     Disconnect,
     Disconnected,
     Holder,
+    Lease,
     Leases,
     RcState,
     StaleEpoch,
@@ -339,6 +340,16 @@ class ResourceController(Component[R], Generic[R]):
             if lease.rc == self.name:
                 self.holds.renew(lease.arc, lease.epoch, envelope.stamp_s + leases.lease_s, lease.rank)
                 self.ranked(lease.arc, lease.epoch)
+        if self.name in leases.missing or any(self._has_lost(lease) for lease in leases.leases):
+            self.changed()  # the RC manager's picture is wrong, and it hears what is published
+
+    def _has_lost(self, lease: Lease) -> bool:
+        """Say whether this is a hold of this RC that was here and is no more."""
+        return (
+            lease.rc == self.name
+            and lease.epoch <= self.holds.last_epoch
+            and not self.holds.has(lease.arc, lease.epoch)
+        )
 
 
 def _sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:

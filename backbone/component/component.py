@@ -291,10 +291,13 @@ class Component(Generic[P]):
         try:
             async with asyncio.TaskGroup() as group:
                 self._group = group
-                connected = await self._unless_ended(self.connect(), "connect")
-                if connected:
-                    await self._serve_until_end()
-                self._group = None
+                try:
+                    connected = await self._unless_ended(self.connect(), "connect")
+                    if connected:
+                        await self._serve_until_end()
+                finally:
+                    self._end.set()  # also when it is killed: what is still heard begins nothing any more
+                    self._group = None
                 for task in self._tasks:
                     task.cancel()
         except* Exception as bugs:
