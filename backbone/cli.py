@@ -13,6 +13,7 @@ import sys
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractAsyncContextManager
 from enum import IntEnum
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -43,6 +44,7 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
+SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
 PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
 
 MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
@@ -356,6 +358,25 @@ def creator(
         return ExitCode.MISSION_FAILED
 
     run(work)
+
+
+@app.command()
+def simulate(
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="How many missions.")] = 100,
+    first: Annotated[int, typer.Option("--first", min=0, help="Seed of the first.")] = 0,
+    chaos: Annotated[
+        bool, typer.Option("--chaos", help="Lose, delay and double messages, cut off and kill components.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run missions of random shape in one process on virtual time; report the first broken law with its seed."""
+    campaign = import_module(SIMULATION)
+    outcome = campaign.simulate(first, seeds, chaos=chaos, tell=say)
+    print(json.dumps(outcome.to_json()) if as_json else outcome.summary())
+    if outcome.finding is not None:
+        for line in outcome.finding.lines():
+            say(line)
+        raise typer.Exit(int(ExitCode.MISSION_FAILED))
 
 
 def _parameter(given: str) -> tuple[str, Any]:

@@ -1,0 +1,213 @@
+"""Many simulated missions, spread over the processors; the first that breaks a law, with its story."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+
+import msgspec
+
+from resource_pool.simulation.faults import Fault
+from resource_pool.simulation.laws import Broken, story_of
+from resource_pool.simulation.mission_run import MissionRun, run_mission
+from resource_pool.simulation.shrink import smallest
+
+BATCH = 10  # chosen: two seconds of work, so that progress is seen and the first broken law soon ends it all
+ALONE = 2 * BATCH  # chosen: fewer are done before other processes have started
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """What was seen in some runs.
+
+    Attributes:
+        runs: How many there were.
+        happenings: Things that happened in them.
+        grants: Grants in them.
+        packets: Packets on the air.
+        faults: Faults on purpose.
+    """
+
+    runs: int = 0
+    happenings: int = 0
+    grants: int = 0
+    packets: int = 0
+    faults: int = 0
+
+    def __add__(self, other: Count) -> Count:
+        """Return what was seen in both."""
+        return Count(
+            self.runs + other.runs,
+            self.happenings + other.happenings,
+            self.grants + other.grants,
+            self.packets + other.packets,
+            self.faults + other.faults,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A mission that breaks a law.
+
+    Attributes:
+        seed: Of the mission.
+        chaos: Whether anything went wrong on purpose.
+        broken: The law, in the run with the fewest faults.
+        faults: As few faults as still break it.
+        faults_before: How many the run had that broke it first.
+        story: What happened to those concerned, up to the breach.
+    """
+
+    seed: int
+    chaos: bool
+    broken: Broken
+    faults: tuple[Fault, ...]
+    faults_before: int
+    story: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report for people."""
+        yield f"seed {self.seed}{' --chaos' if self.chaos else ''} breaks the law {self.broken}"
+        if self.chaos:
+            yield f"{len(self.faults)} of {self.faults_before} faults are enough for it:"
+            yield from (f"  {fault}" for fault in self.faults)
+        yield f"what happened to {', '.join(self.broken.names)}:"
+        yield from (f"  {line}" for line in self.story)
+        yield f"again: scout-backbone simulate --first {self.seed} --seeds 1{' --chaos' if self.chaos else ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of all runs.
+
+    Attributes:
+        count: What was seen.
+        finding: The broken law of the smallest seed that was run and broke one; None if all hold.
+        took_s: Machine seconds it took.
+    """
+
+    count: Count
+    finding: Finding | None
+    took_s: float
+
+    def summary(self) -> str:
+        """Return one line for people."""
+        count = self.count
+        verdict = "all laws hold" if self.finding is None else f"broken: {self.finding.broken.law}"
+        return (
+            f"{count.runs} missions, {count.grants} grants, {count.packets} packets, {count.faults} faults on purpose "
+            f"in {self.took_s:.1f} s: {verdict}"
+        )
+
+    def to_json(self) -> dict[str, object]:
+        """Return what ``--json`` prints."""
+        finding = self.finding
+        told: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
+        if finding is not None:
+            told["broken"] = {
+                "law": finding.broken.law,
+                "seed": finding.seed,
+                "chaos": finding.chaos,
+                "at_s": finding.broken.at_s,
+                "what": finding.broken.what,
+                "names": list(finding.broken.names),
+                "faults": [str(fault) for fault in finding.faults],
+                "faults_before": finding.faults_before,
+                "story": list(finding.story),
+            }
+        return told
+
+
+def simulate(
+    first: int, seeds: int, *, chaos: bool, tell: Callable[[str], None], processes: int | None = None
+) -> Outcome:
+    """Run the missions of these seeds until one breaks a law; reproduce and shrink that one.
+
+    Args:
+        first: First seed.
+        seeds: How many, 1 or more.
+        chaos: Whether things go wrong on purpose.
+        tell: Takes lines of progress.
+        processes: How many to use; one for each processor if not said, this one alone for few seeds.
+    """
+    began_s = time.monotonic()
+    batches = [range(at, min(at + BATCH, first + seeds)) for at in range(first, first + seeds, BATCH)]
+    workers = processes or (1 if seeds <= ALONE else min(os.cpu_count() or 1, len(batches)))
+    counted, failed = Count(), list[int]()
+    for count, seed in _in_turn(batches, chaos) if workers == 1 else _spread(batches, chaos, workers):
+        counted += count
+        if seed is not None:
+            failed.append(seed)
+        tell(f"{counted.runs} of {seeds} missions")
+    finding = None
+    if failed:
+        tell(f"seed {min(failed)} breaks a law; looking for the fewest faults that do")
+        finding = find(min(failed), chaos=chaos)
+    return Outcome(counted, finding, time.monotonic() - began_s)
+
+
+def find(seed: int, *, chaos: bool) -> Finding | None:
+    """Return which law the mission of this seed breaks, with as few faults as possible; None if it breaks none."""
+    run = run_mission(seed, chaos=chaos)
+    if run.broken is None:
+        return None
+    law, least, faults_before = run.broken.law, run, len(run.faults)
+
+    def breaks(faults: Sequence[Fault]) -> bool:
+        nonlocal least
+        tried = run_mission(seed, chaos=chaos, faults=faults)
+        if tried.broken is None or tried.broken.law != law:
+            return False
+        least = tried
+        return True
+
+    smallest(run.faults, breaks)
+    broken = least.broken or run.broken
+    story = tuple(str(happening) for happening in story_of(broken, least.happenings))
+    return Finding(seed, chaos, broken, least.faults, faults_before, story)
+
+
+def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[Count, int | None]]:
+    for batch in batches:
+        count, failed = _run_batch(batch, chaos)
+        yield count, failed
+        if failed is not None:
+            return
+
+
+def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tuple[Count, int | None]]:
+    """Run the batches in fresh processes, always as many as there are workers; begin none after a broken law."""
+    waiting = iter(batches)
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        running = {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, workers)}
+        while running:
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                count, failed = future.result()
+                yield count, failed
+                if failed is not None:
+                    waiting = iter(())
+            running |= {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, len(done))}
+
+
+def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[Count, int | None]:
+    """Run missions until one breaks a law; return what was seen, and its seed."""
+    logging.disable(logging.CRITICAL)  # components speak of every fault; what matters is in the audit
+    counted = Count()
+    for seed in batch:
+        run = run_mission(seed, chaos=chaos)
+        counted += _count(run)
+        if run.broken is not None:
+            return counted, seed
+    return counted, None
+
+
+def _count(run: MissionRun) -> Count:
+    words = [happening.what for happening in run.happenings]
+    return Count(1, len(words), words.count("grant"), words.count("packet"), len(run.faults))

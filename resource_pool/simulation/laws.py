@@ -1,0 +1,277 @@
+"""What must hold in every simulated mission, whatever goes wrong. Pure: happenings in, the first broken law out.
+
+The laws, by name:
+
+* one-holder: at no instant have two ARCs one unit RC, as the RCs themselves see it.
+* epochs-grow: every hold of an RC has a larger epoch than all before it, over all restarts.
+* fenced: once a robot was commanded under an epoch, no packet of an older one goes on the air to it; and none
+  but the safe packet once it was given to the next; and none outside of its ARC's hold of the radio.
+* freed: an ARC of which the RC manager says that its RCs are free has no RC any more.
+* safe: who commanded a robot through a radio leaves it safe: the safe packet is the last it hears from it.
+* whole-set: a gate opens only over RCs that were all connected to its ARC under just these epochs.
+* true: what an owner believes agrees with its ARC's gate, and the gate with the RCs, but for known delays.
+* schedule: the RC manager's schedule keeps its own promises after each event.
+* progress: when nothing fails any more, whoever wants time and has no higher rival gets it.
+* no-bug: nobody ends by a bug.
+
+What happens (the words of the audit): ``begins killed ends fails`` of components; ``held``, ``let go``,
+``safe``, ``unsafe`` of RCs; ``open shut`` of ARCs; ``resumed suspended claims releases wants applied refused``
+of decision processes; ``packet`` of radios; the trace's own words of the RC manager; ``calm`` and ``over``
+of the mission.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from backbone.rc_manager.messages import LEASE_S
+from backbone.rc_manager.priority import higher
+from resource_pool.simulation.audit import Happening
+from resource_pool.simulation.faults import LONGEST_DELAY_S, LONGEST_HANG_S
+from resource_pool.simulation.shape import MissionShape, OwnerShape
+
+SAFE, FREED = "S", "freed"
+FREED_WITHIN_S = 0.5  # chosen: an RC ends one hold after the other, each within 0.4 s; the next is not connected before
+RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time in which a lost ARC is claimed anew
+CALM_DELAY_S = (
+    1.5  # chosen: in the calm a notice takes no time, a death is seen at once, an owner is missed in half a second
+)
+STORM_DELAY_S = LEASE_S + LONGEST_DELAY_S + LONGEST_HANG_S + 2.0
+"""Chosen: while things fail, a renewal may be late by the longest delay and then be held back by a hang;
+what it renewed lasts a lease, and the next second the owner hears of the end."""
+STORY_LENGTH = 30  # chosen: a screen
+
+
+@dataclass(frozen=True, slots=True)
+class Broken:
+    """A law that does not hold.
+
+    Attributes:
+        law: Its name.
+        at_s: Mission time.
+        what: One sentence with the names and numbers of this case.
+        names: Components concerned.
+    """
+
+    law: str
+    at_s: float
+    what: str
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.law}, at {self.at_s:.4f} s: {self.what}"
+
+
+def first_broken(shape: MissionShape, happenings: Sequence[Happening]) -> Broken | None:
+    """Return the law that was broken first, or None if all hold."""
+    judge = _Judge(shape)
+    for happening in happenings:
+        for broken in judge.judge(happening):
+            return broken
+    return None
+
+
+def story_of(broken: Broken, happenings: Sequence[Happening], length: int = STORY_LENGTH) -> list[Happening]:
+    """Return the last things that happened to those concerned before the law was broken, packets of a kind once."""
+    told: list[Happening] = []
+    for happening in reversed([h for h in happenings if h.at_s <= broken.at_s and h.concerns(broken.names)]):
+        if told and happening.what == told[-1].what == "packet" and happening.values == told[-1].values:
+            continue
+        told.append(happening)
+        if len(told) == length:
+            break
+    return told[::-1]
+
+
+@dataclass(slots=True)
+class _Sent:
+    """What an ARC sent through a radio it holds."""
+
+    epoch: int
+    last: dict[int, str] = field(default_factory=dict)
+    is_over: bool = False
+
+
+@dataclass(slots=True)
+class _Belief:
+    """What an owner was told of its ARC."""
+
+    epochs: dict[str, int] | None = None
+    since_s: float = 0.0
+
+
+class _Judge:
+    def __init__(self, shape: MissionShape) -> None:
+        self._shape = shape
+        self._unit = {resource.name for resource in shape.resources if not resource.sharable}
+        self._scouts = {
+            resource.parameters["network_id"]: resource.name for resource in shape.resources if resource.type == "scout"
+        }
+        self._holds: dict[str, dict[str, int]] = {resource.name: {} for resource in shape.resources}
+        self._newest: dict[str, int] = {}
+        self._commanded: dict[int, int] = {}
+        self._connected: set[tuple[str, str, int]] = set()
+        self._sent: dict[str, dict[str, _Sent]] = {}
+        self._gates: dict[str, dict[str, int]] = {}
+        self._beliefs: dict[str, _Belief] = {owner.name: _Belief() for owner in shape.owners}
+        self._doubts: dict[tuple[str, ...], float] = {}
+        self._calm_s: float | None = None
+        self._wanting: dict[str, float] = {}
+        self._granted: dict[str, float] = {}
+
+    # ------------------------------------------------------------------ one thing after the other
+    def judge(self, h: Happening) -> Iterator[Broken]:
+        """Take note of what happened and yield each law it breaks."""
+        yield from self._overdue(h.at_s)
+        match h.what:
+            case "held":
+                yield from self._held(h, h.values["arc"], h.values["epoch"])
+            case "let go":
+                self._let_go(h, h.values["arc"], h.values["epoch"])
+            case "safe":
+                yield from self._safe(h, h.values["arc"])
+            case "packet":
+                yield from self._packet(h)
+            case "free":
+                self._must_be_free(h, h.values["arc"])
+            case "open":
+                yield from self._open(h)
+            case "shut":
+                self._gates.pop(h.who, None)
+            case "resumed":
+                self._beliefs[h.who] = _Belief(h.values["epochs"], h.at_s)
+                self._granted[h.who] = h.at_s
+            case "suspended" | "claims" | "releases":
+                self._beliefs[h.who] = _Belief(None, h.at_s)
+            case "wants":
+                self._wanting[h.who] = h.at_s
+            case "killed" | "ends" | "gives up" | "begins":
+                self._gone(h)
+            case "fails":
+                yield Broken("no-bug", h.at_s, f"{h.who} ended by a bug: {h.values['error']}", (h.who,))
+            case "promise broken":
+                yield Broken("schedule", h.at_s, h.values["promise"], (h.who,))
+            case "calm":
+                self._calm_s = h.at_s
+            case "over":
+                yield from self._progress(h.at_s)
+        self._compare(h.at_s)
+
+    def _held(self, h: Happening, arc: str, epoch: int) -> Iterator[Broken]:
+        holders = self._holds[h.who]
+        others = [other for other in holders if other != arc]
+        if others and h.who in self._unit:
+            yield Broken(
+                "one-holder", h.at_s, f"{h.who} is given to {arc} while {others[0]} holds it", (h.who, arc, *others)
+            )
+        if epoch <= self._newest.get(h.who, -1):
+            what = f"{h.who} is held by {arc} under epoch {epoch}, after epoch {self._newest[h.who]}"
+            yield Broken("epochs-grow", h.at_s, what, (h.who, arc))
+        holders[arc] = self._newest[h.who] = epoch
+        self._connected.add((h.who, arc, epoch))
+        self._sent.setdefault(h.who, {})[arc] = _Sent(epoch)
+
+    def _must_be_free(self, h: Happening, arc: str) -> None:
+        for rc, holders in self._holds.items():
+            if arc in holders:
+                self._doubts[FREED, arc, rc, str(holders[arc])] = h.at_s
+
+    def _let_go(self, h: Happening, arc: str, epoch: int) -> None:
+        if self._holds[h.who].get(arc) == epoch:
+            del self._holds[h.who][arc]
+
+    def _safe(self, h: Happening, arc: str) -> Iterator[Broken]:
+        sent = self._sent.get(h.who, {}).get(arc)
+        if sent is None:
+            return
+        sent.is_over = True
+        for robot, last in sent.last.items():
+            if last != SAFE:
+                scout = self._scouts[robot]
+                what = f"{h.who} calls itself safe after {arc}, but the last that {scout} heard from it is {last!r}"
+                yield Broken("safe", h.at_s, what, (h.who, arc, scout))
+
+    def _packet(self, h: Happening) -> Iterator[Broken]:
+        robot, command, arc, epoch = (h.values[name] for name in ("robot", "command", "arc", "epoch"))
+        scout = self._scouts[robot]
+        commanded = self._commanded[robot] = max(epoch, self._commanded.get(robot, -1))
+        newest = commanded if command == SAFE else self._newest.get(scout, -1)
+        if epoch < newest:
+            what = f"{h.who} sends {command!r} of {arc} to {scout} under epoch {epoch}, which is at {newest}"
+            yield Broken("fenced", h.at_s, what, (h.who, arc, scout))
+        sent = self._sent.get(h.who, {}).get(arc)
+        if sent is None or sent.is_over:
+            what = f"{h.who} sends {command!r} to {scout} for {arc}, which does not hold it"
+            yield Broken("fenced", h.at_s, what, (h.who, arc, scout))
+            return
+        sent.last[robot] = command
+
+    def _open(self, h: Happening) -> Iterator[Broken]:
+        epochs: dict[str, int] = h.values["epochs"]
+        self._gates[h.who] = dict(epochs)
+        for rc, epoch in epochs.items():
+            if (rc, h.who, epoch) not in self._connected:
+                what = f"{h.who} opens over {rc} under epoch {epoch}, which was never connected to it"
+                yield Broken("whole-set", h.at_s, what, (h.who, rc))
+
+    def _gone(self, h: Happening) -> None:
+        if h.who in self._holds:
+            self._holds[h.who] = {}
+            self._sent.pop(h.who, None)
+        self._gates.pop(h.who, None)
+        if h.who in self._beliefs:
+            self._beliefs[h.who] = _Belief(None, h.at_s)
+
+    # ------------------------------------------------------------------ what is believed
+    def _compare(self, now_s: float) -> None:
+        """Keep since when each two that should agree do not."""
+        doubts: set[tuple[str, ...]] = set()
+        for owner in self._shape.owners:
+            believed = self._beliefs[owner.name].epochs
+            gate = self._gates.get(owner.arc)
+            if believed != gate:
+                doubts.add((owner.name, owner.arc))
+        for arc, epochs in self._gates.items():
+            doubts |= {(arc, rc) for rc, epoch in epochs.items() if self._holds[rc].get(arc) != epoch}
+        doubts |= {
+            doubt
+            for doubt in self._doubts
+            if doubt[0] == FREED and self._holds[doubt[2]].get(doubt[1]) == int(doubt[3])
+        }
+        self._doubts = {doubt: self._doubts.get(doubt, now_s) for doubt in sorted(doubts)}
+
+    def _overdue(self, now_s: float) -> Iterator[Broken]:
+        """Yield who has disagreed for longer than there is an excuse."""
+        calm_s = self._calm_s
+        for doubt, since_s in self._doubts.items():
+            if doubt[0] == FREED:
+                if now_s > since_s + FREED_WITHIN_S:
+                    _, arc, rc, epoch = doubt
+                    what = f"{arc} is called free since {since_s:.4f} s and holds {rc} under epoch {epoch}"
+                    yield Broken(FREED, now_s, what, (arc, rc))
+                continue
+            due_s = since_s + STORM_DELAY_S
+            if calm_s is not None:
+                due_s = min(due_s, max(since_s, calm_s + RECOVERY_S) + CALM_DELAY_S)
+            if now_s > due_s:
+                one, other = doubt
+                what = f"{one} and {other} have not agreed on who holds what since {since_s:.4f} s"
+                yield Broken("true", now_s, what, (one, other))
+
+    # ------------------------------------------------------------------ the end
+    def _progress(self, now_s: float) -> Iterator[Broken]:
+        """Judge the calm: who wanted time all through it, and had nobody above, got some."""
+        wanting = [owner for owner in self._shape.owners if owner.name in self._wanting]
+        for owner in wanting:
+            rivals = [other for other in wanting if other is not owner and self._is_above(other, owner)]
+            if rivals or self._granted.get(owner.name, -1.0) >= self._wanting[owner.name]:
+                continue
+            if self._gates.get(owner.arc):
+                continue
+            since_s = self._wanting[owner.name]
+            what = f"{owner.name} has wanted time since {since_s:.4f} s, got none, and nobody is above it"
+            yield Broken("progress", now_s, what, (owner.name, owner.arc))
+
+    def _is_above(self, one: OwnerShape, other: OwnerShape) -> bool:
+        return higher(one.path, other.path)

@@ -1,0 +1,225 @@
+"""A decision process that does as it likes: drives, idles, asks for other run times, releases, claims again.
+
+It speaks to its ARC through ``arc_client`` as every behavior and console does, and tells the audit what
+it was told and what came of its commands.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from random import Random
+from typing import Any
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.component import Component
+from backbone.component.launch import Launch
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.rc_manager.messages import PathNode
+from backbone.wire import Envelope, Message
+from resource_pool.arc_client import (
+    ArcClient,
+    ArcNotice,
+    NotMyArc,
+    Resumed,
+    Suspended,
+    Suspending,
+    Usage,
+    arc_name,
+    claim_parameters,
+    notice_arc,
+)
+from resource_pool.simulation.audit import current_audit
+
+log = logging.getLogger(__name__)
+
+TICK_S = 1e-6  # chosen: far above the rounding of a time that is waited for, far below any that means something
+AGAIN_S = 0.3  # chosen: a wish nobody confirmed is said again at a person's pace
+TOP_WHEEL_SPEED_RAD_S = 10.0  # chosen: below the motor's limit
+
+
+class OwnerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What it does.
+
+    Attributes:
+        seed: Of its moods.
+        kind: Kind of its ARC.
+        path: Its place in the behavior tree.
+        console: True for a console.
+        minimum_runtime_s: As for ``ArcClient.claim``.
+        maximum_runtime_s: As for ``ArcClient.claim``.
+        wish: As for ``ArcClient.claim``.
+        usage: As for ``ArcClient.claim``.
+        begins_s: Mission time of its first claim.
+        calm_at_s: Mission time from which it only drives.
+        rests: True if it gives its ARC back then.
+    """
+
+    seed: int
+    kind: str
+    path: list[tuple[str, int]]
+    console: bool
+    minimum_runtime_s: float
+    maximum_runtime_s: float
+    wish: dict[str, str]
+    usage: Usage
+    begins_s: float
+    calm_at_s: float
+    rests: bool
+
+
+class SimulatedOwner(Component[OwnerParameters]):
+    """Owner of one ARC."""
+
+    parameters_type = OwnerParameters
+    accepts = ArcNotice
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._audit = current_audit.get()
+        # A later life begins at another time, and must not repeat the earlier one's moods.
+        self._dice = Random(f"{self.parameters.seed} {self.name} {clock.now_s():.6f}")
+        self._driving_dice = Random(f"driving {self.parameters.seed} {self.name} {clock.now_s():.6f}")
+        self._arc: ArcClient | None = None
+
+    # ------------------------------------------------------------------ life
+    async def serve(self) -> None:
+        """Claim, live, release, again and again; from the calm on have the ARC and drive, or rest."""
+        await self.clock.sleep_until_s(self.parameters.begins_s)
+        while not self._is_calm():
+            await self._live_with_arc()
+            await self._until_calm_or(self._dice.uniform(0.1, 3.0))
+        if not self.parameters.rests:
+            await self._live_with_arc()
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Hand a notice to the hold on the ARC."""
+        notice: ArcNotice = asked.body
+        if self._arc is None:
+            raise NotMyArc(f"{self.name} claims nothing", arc=notice_arc(notice))
+        return await self._arc.handle(notice)
+
+    # ------------------------------------------------------------------ told by the ARC
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Keep that the RCs are there."""
+        self._audit.note(self.name, "resumed", arc=notice.arc, epochs=dict(notice.epochs))
+
+    async def arc_suspending(self, notice: Suspending) -> None:
+        """Stop the wheels, as a decision process should."""
+        self._audit.note(self.name, "suspending", arc=notice.arc, by=notice.by)
+        if self._arc is not None and self._dice.random() < 0.7:
+            await self._command("halt", self._arc.halt())
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Keep that the RCs are gone."""
+        self._audit.note(self.name, "suspended", arc=notice.arc, reason=notice.reason, by=notice.by)
+
+    # ------------------------------------------------------------------ with an ARC
+    async def _live_with_arc(self) -> None:
+        arc = self._arc = ArcClient(self.bus, arc_name(self.bus, self.parameters.kind), self)
+        self._audit.note(self.name, "claims", arc=arc.arc)
+        keeping = asyncio.create_task(self._keep(arc), name=f"{self.name}:keep")
+        driving = asyncio.create_task(self._drive(arc), name=f"{self.name}:drive")
+        try:
+            await self._have_moods(arc)
+        finally:
+            for task in (keeping, driving):
+                task.cancel()
+            await asyncio.gather(keeping, driving, return_exceptions=True)
+        # From here on what was granted is not used any more, whatever is still told about it.
+        self._audit.note(self.name, "releases", arc=arc.arc)
+        self._arc = None
+        await self._until_said(lambda: arc.release("had enough"))
+
+    async def _have_moods(self, arc: ArcClient) -> None:
+        """Ask for this and that until it wants to release; in the calm want time and never release."""
+        dice, given = self._dice, self.parameters
+        while not self._is_calm():
+            await self._until_calm_or(dice.uniform(0.2, 2.5))
+            mood = dice.choice(("idle", "want", "want", "runtime", "longer", "nothing", "nothing", "release"))
+            if self._is_calm():
+                break
+            match mood:
+                case "idle" | "want":
+                    await self._say(mood, arc.idle(mood == "idle"))
+                case "runtime":
+                    least_s = round(dice.uniform(0.5, 1.0) * given.minimum_runtime_s, 3)
+                    await self._say(mood, arc.want_runtime(least_s, given.maximum_runtime_s))
+                case "longer":
+                    await self._say(mood, arc.want_longer(self.clock.now_s() + given.maximum_runtime_s))
+                case "release":
+                    return
+        if given.rests:
+            return
+        await self._until_said(lambda: arc.idle(False))
+        self._audit.note(self.name, "wants", arc=arc.arc)
+        await asyncio.Event().wait()
+
+    async def _keep(self, arc: ArcClient) -> None:
+        given = self.parameters
+        parameters = claim_parameters(
+            self.address,
+            path=[PathNode(name, priority) for name, priority in given.path],
+            minimum_runtime_s=given.minimum_runtime_s,
+            maximum_runtime_s=given.maximum_runtime_s,
+            wish=given.wish,
+            usage=given.usage,
+            console=given.console,
+        )
+        while True:
+            try:
+                await arc.keep(self.clock, given.kind, parameters)
+            except Refusal as refusal:
+                self._audit.note(self.name, "claim refused", arc=arc.arc, code=code_of(refusal))
+            await self.clock.sleep_s(AGAIN_S)
+
+    async def _drive(self, arc: ArcClient) -> None:
+        dice = self._driving_dice
+        while True:
+            await arc.wait_granted()
+            what = dice.choice(("drive", "drive", "drive", "drive", "drive", "halt", "jump"))
+            match what:
+                case "halt":
+                    await self._command(what, arc.halt())
+                case "jump":
+                    await self._command(what, arc.jump())
+                case _:
+                    await self._command(what, arc.drive(self._speed_rad_s(), self._speed_rad_s()))
+            await self.clock.sleep_s(dice.uniform(0.1, 0.6))
+
+    def _speed_rad_s(self) -> float:
+        return round(self._driving_dice.uniform(-1.0, 1.0) * TOP_WHEEL_SPEED_RAD_S, 2)
+
+    # ------------------------------------------------------------------ said to the ARC
+    async def _command(self, what: str, doing: Awaitable[Any]) -> None:
+        try:
+            applied = await doing
+        except Refusal as refusal:
+            self._audit.note(self.name, "refused", command=what, code=code_of(refusal))
+        except LinkError:
+            self._audit.note(self.name, "unanswered", command=what)
+        else:
+            self._audit.note(self.name, "applied", command=what, rc=applied.rc, epoch=applied.epoch)
+
+    async def _say(self, what: str, saying: Awaitable[None]) -> bool:
+        try:
+            await saying
+        except (Refusal, LinkError) as error:
+            log.info("%s: %s: %s", self.name, what, error)
+            return False
+        self._audit.note(self.name, what)
+        return True
+
+    async def _until_said(self, say: Callable[[], Awaitable[None]]) -> None:
+        """Say it again until somebody confirms: what an unanswered wish did is unknown."""
+        while not await self._say("confirmed", say()):
+            await self.clock.sleep_s(AGAIN_S)
+
+    def _is_calm(self) -> bool:
+        return self.clock.now_s() >= self.parameters.calm_at_s - TICK_S
+
+    async def _until_calm_or(self, pause_s: float) -> None:
+        await self.clock.sleep_until_s(min(self.clock.now_s() + pause_s, self.parameters.calm_at_s))
