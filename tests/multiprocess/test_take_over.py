@@ -37,6 +37,7 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 DRIVEN_WITHIN_S = 0.150
 GIVEN_BACK_WITHIN_S = 1.0
 RESUMED_WITHIN_S = 5.0
+TOLD_WITHIN_S = 2.0  # RCs publish their news when it is calm
 SECOND_WATCHER = re.search(
     r'<behavior type="watch_for_motion" name="watch-scout2".*?</behavior>', MISSION_XML.read_text(), re.DOTALL
 )
@@ -130,6 +131,12 @@ class ScoutWatch:
         self.history.append((envelope.stamp_s, tuple(holder.arc for holder in state.holders)))  # type: ignore[attr-defined]
         self._changed.set()
 
+    async def held_by(self, arc: str) -> None:
+        """Return when the RC has told that this ARC alone holds it."""
+        while not self.history or self.history[-1][1] != (arc,):
+            self._changed.clear()
+            await self._changed.wait()
+
     async def left_after(self, arc: str, since_s: float) -> float:
         """Return when the RC was first without this holder after a time."""
         while True:
@@ -208,10 +215,11 @@ async def kill_one(mission: RunningMission, bus: ZenohBus, clock: MissionClock, 
         assert process.stdin is not None
         process.stdin.write(TURN.encode())
         await process.stdin.drain()
-        granted = await line(process, "granted")
+        await line(process, "granted")
         await line(process, "applied")
         arc = f"console-{process.pid}-drive"
-        assert watch.history[-1][1] == (arc,), f"{watch.history}\n{granted}"
+        async with asyncio.timeout(TOLD_WITHIN_S):
+            await watch.held_by(arc)
         killed_s = clock.now_s()
         process.kill()
         async with asyncio.timeout(10):
