@@ -363,7 +363,10 @@ class RcManager(Component[RcManagerParameters]):
         await self._meet_rc(resource.name)
 
     async def _meet_rc(self, rc: str) -> bool:
-        """Ask the RC how it is and let the schedule manager know; return whether it answered."""
+        """Ask the RC how it is and let the schedule manager know; return whether it answered.
+
+        It was counted as down, so whoever holds it still does so by an earlier grant: that ends first.
+        """
         if rc in self._running_rcs:
             return True
         try:
@@ -371,6 +374,9 @@ class RcManager(Component[RcManagerParameters]):
         except (Refusal, LinkError) as error:
             log.warning("%s does not say how it is: %s", rc, error)
             return False
+        orphans = [(rc, holder.arc, holder.epoch) for holder in state.holders]
+        if orphans and rc not in self._running_rcs:
+            await self._context_switch.disconnect(orphans, "held from before it was down")
         if rc not in self._running_rcs:
             self._running_rcs.add(rc)
             self.happened(RcCameBack(rc, state.last_epoch))
