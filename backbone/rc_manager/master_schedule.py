@@ -21,13 +21,14 @@ Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
 
 from __future__ import annotations
 
+import functools
 import heapq
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from backbone.rc_manager.discipline import Discipline, deadline_s, eligible, joining_s
 from backbone.rc_manager.groups import Group, Groups
@@ -102,7 +103,8 @@ class ArcEntry:
         excludes: Those of them it uses exclusively.
         shares: Names of those it uses by streams.
         stamp: When it became active or was last served, and which of several at that time it was.
-        pledge: Set while RCs are being freed by force for it: it comes before all equals; smaller is earlier.
+        pledge: Set while RCs are being freed for it by force, or in the discipline ``time``: it comes before all
+            equals; smaller is earlier.
         state: Where it is.
         since_s: When it came to that state.
         began_s: When its RCs began to settle, while it holds them.
@@ -482,12 +484,24 @@ class MasterSchedule:
         *,
         handed_over: bool = False,
         slack_s: float | None = None,
+        among_equals: bool = True,
     ) -> list[Slot]:
+        """Return the place of each of these; see ``plan``.
+
+        Args:
+            queued: In order, some of the group.
+            group: Active ARCs.
+            now_s: From when on.
+            handed_over: As for ``plan``.
+            slack_s: As for ``plan``.
+            among_equals: False: what is reserved from later on binds those below, and equals only if it is pledged.
+        """
         forgiven_s = self._slack_s if slack_s is None else slack_s
         holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
         slots: list[Slot] = []
         for arc in queued:
-            against = self._against(arc, holders, slots, now_s)
+            before = slots if among_equals else [slot for slot in slots if _binds(slot, arc, now_s)]
+            against = self._against(arc, holders, before, now_s)
             from_s = self.free_s(arc, now_s) if arc.holds and not handed_over else now_s
             start_s = self._earliest_s(arc, from_s, against, forgiven_s) if self.usable(arc) else math.inf
             slots.append(Slot(arc, start_s, against))
@@ -603,26 +617,54 @@ class MasterSchedule:
         queued = self.in_order([arc for arc in group if arc.queued])
         while queued[-1] not in possible:
             queued.pop()  # who comes after them changes nothing for them
-        starting = _starting(self._plan(queued, group, now_s), now_s)
-        if not starting:
+        while queued:
+            turn = self._due_of(queued, group, now_s)
+            if turn is None or self._discipline == "turns" or self._in_turn(turn, group, now_s):
+                return turn
+            queued.remove(turn.arc)
+        return None
+
+    def _due_of(self, queued: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float) -> Turn | None:
+        """Return whose time is now of these, given in order."""
+
+        def starting(**how: Any) -> set[ArcEntry]:
+            slots = self._plan(queued, group, now_s, among_equals=self._discipline == "turns", **how)
+            return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
+
+        now = starting()
+        if not now:
             return None
         # A slice is ended only for who fits without forgiveness, however early the hand-overs under way may end:
         # else it might be ended for a gap that closes meanwhile.
-        exact = _starting(self._plan(queued, group, now_s, slack_s=0.0), now_s)
-        certain = _starting(self._plan(queued, group, now_s, slack_s=0.0, handed_over=True), now_s)
+        exact = functools.cache(lambda: starting(slack_s=0.0))
+        certain = functools.cache(lambda: starting(slack_s=0.0, handed_over=True))
         pending: list[ArcEntry] = []
         for arc in queued:
             if arc.state is not RequestState.WAITING or self._must_let_higher_go_first(arc, group):
                 continue
-            if arc in starting or (arc in exact and arc in certain):
+            if arc in now or (arc in exact() and arc in certain()):
                 in_the_way = self._in_the_way(arc, pending, group, now_s)
-                if in_the_way and arc in certain:
+                if in_the_way and arc in certain():
                     return Turn(arc, in_the_way)
-                if not in_the_way and arc in starting and self.fits(arc, [h for h in group if h.holds]):
+                if not in_the_way and arc in now and self.fits(arc, [h for h in group if h.holds]):
                     return Turn(arc, [])
-            if arc in certain:
+            if arc in certain():
                 pending.append(arc)
         return None
+
+    def _in_turn(self, turn: Turn, group: Sequence[ArcEntry], now_s: float) -> bool:
+        """Say whether somebody would displace each that must go for this turn also if equals took turns.
+
+        RCs come free as whole sets: who had least time, but would not get all its RCs so, ends no slice.
+        """
+        order = by_precedence([arc for arc in group if arc.queued], lambda arc: arc.path, lambda arc: arc.stamp)
+        slots = self._plan(order, group, now_s, slack_s=0.0, handed_over=True)
+        entitled = [slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S]
+        holders = [holder for holder in group if holder.state in CONNECTED]
+        return all(
+            any(arc.touches & holder.touches and not self.fits(arc, holders) for arc in entitled)
+            for holder in turn.in_the_way
+        )
 
     def _could_start(self, arc: ArcEntry, now_s: float) -> bool:
         """Say whether, of those it cannot share with, nobody holds an RC of it for longer than until now."""
@@ -799,9 +841,9 @@ def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
     return [hold for hold in holds if hold[1] < end_s - INSTANT_S and hold[2] > start_s + INSTANT_S]
 
 
+def _binds(slot: Slot, arc: ArcEntry, now_s: float) -> bool:
+    return slot.start_s <= now_s or slot.arc.pledge is not None or rank(slot.arc.path, arc.path) != 0
+
+
 def _begin_s(hold: Hold) -> float:
     return hold[1]
-
-
-def _starting(slots: Iterable[Slot], now_s: float) -> set[ArcEntry]:
-    return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}

@@ -223,7 +223,8 @@ class ScheduleManager:
             return
         for holder in turn.in_the_way:
             overridden = higher(turn.arc.path, holder.path)
-            if overridden and not holder.served(self._now_s) and turn.arc.pledge is None:
+            forced = overridden and not holder.served(self._now_s)
+            if (forced or self._discipline == "time") and turn.arc.pledge is None:
                 turn.arc.pledge = self._next()
             self._revoke(holder, "higher" if overridden else "slice", turn.arc.name)
 

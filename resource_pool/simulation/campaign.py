@@ -154,14 +154,14 @@ def simulate(
 
 def find(seed: int, *, chaos: bool) -> Finding | None:
     """Return which law the mission of this seed breaks, with as few faults as possible; None if it breaks none."""
-    run = run_mission(seed, chaos=chaos)
+    run = _run_quietly(seed, chaos)
     if run.broken is None:
         return None
     law, least, faults_before = run.broken.law, run, len(run.faults)
 
     def breaks(faults: Sequence[Fault]) -> bool:
         nonlocal least
-        tried = run_mission(seed, chaos=chaos, faults=faults)
+        tried = _run_quietly(seed, chaos, faults)
         if tried.broken is None or tried.broken.law != law:
             return False
         least = tried
@@ -198,14 +198,23 @@ def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tup
 
 def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[Count, int | None]:
     """Run missions until one breaks a law; return what was seen, and its seed."""
-    logging.disable(logging.CRITICAL)  # components speak of every fault; what matters is in the audit
     counted = Count()
     for seed in batch:
-        run = run_mission(seed, chaos=chaos)
+        run = _run_quietly(seed, chaos)
         counted += _count(run)
         if run.broken is not None:
             return counted, seed
     return counted, None
+
+
+def _run_quietly(seed: int, chaos: bool, faults: Sequence[Fault] | None = None) -> MissionRun:
+    """Run the mission without the log: components speak of every fault, and what matters is in the audit."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        return run_mission(seed, chaos=chaos, faults=faults)
+    finally:
+        logging.disable(before)
 
 
 def _count(run: MissionRun) -> Count:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from random import Random
+from typing import Any
 
 from simulated_switches import MISSION, TOLERANCE_S, Bench, ask, manager, sharable, unit
 
@@ -26,13 +27,13 @@ GRID_S = 0.25  # coarse: many things happen at the same instant
 
 
 def random_mission(
-    rng: Random, *, policy: str = "no_delay", tolerance_s: float = TOLERANCE_S, faults: bool = True
+    rng: Random, *, tolerance_s: float = TOLERANCE_S, faults: bool = True, **rules: Any
 ) -> tuple[Bench, list[tuple[float, Event]]]:
     """Return a bench with RCs, and what will happen on it."""
     rcs = [_rc(rng, number) for number in range(rng.randint(1, 6))]
     grace_s = rng.choice([0.0, 0.0, 0.2])
     bench = Bench(
-        manager(grace_s=grace_s, policy=policy, tolerance_s=tolerance_s),
+        manager(grace_s=grace_s, tolerance_s=tolerance_s, **rules),
         *rcs,
         pause_s=lambda deadline_s: rng.choice([0.0, deadline_s / 2, deadline_s]),
         delay_s=(lambda: 0.0) if tolerance_s == TOLERANCE_S else (lambda: rng.uniform(0.0, tolerance_s / 5)),

@@ -84,8 +84,8 @@ def ask(
     return Requested(request, tuple(wish))
 
 
-def manager(*, grace_s: float = 0.0, policy: str = "no_delay", tolerance_s: float = TOLERANCE_S) -> ScheduleManager:
-    return ScheduleManager(grace_s=grace_s, tolerance_s=tolerance_s, policy=policy, mission=MISSION, mission_priority=0)
+def manager(*, grace_s: float = 0.0, tolerance_s: float = TOLERANCE_S, **rules: Any) -> ScheduleManager:
+    return ScheduleManager(grace_s=grace_s, tolerance_s=tolerance_s, mission=MISSION, mission_priority=0, **rules)
 
 
 class Bench:
