@@ -349,6 +349,8 @@ class AggregateResourceController(Component[ArcParameters]):
                 return GateOpen()
             reason = "is being opened already"
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0)
+        if self._gate.is_open:  # the order to close it was lost
+            self._shut("connected anew", "rc_manager", -1.0)
         self._gate.prepare(order.epochs)
         self._lease_until_s = self.clock.now_s() + LEASE_S * self.clock.rate
         self._leased.set()
