@@ -153,6 +153,8 @@ class AggregateResourceController(Component[ArcParameters]):
         self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
         self._lease_until_s = 0.0
         self._leased = asyncio.Event()
+        self._unfounded: dict[str, int] = {}
+        self._unfounded_since_s = 0.0
         self._manager: Companion | None = None
         self._commands = self._refused = 0
 
@@ -453,6 +455,19 @@ class AggregateResourceController(Component[ArcParameters]):
         renewed = {lease.rc: lease.epoch for lease in leases.leases if lease.arc == self.name}
         if self._gate.epochs and self._gate.epochs.items() <= renewed.items():
             self._lease_until_s = max(self._lease_until_s, envelope.stamp_s + leases.lease_s)
+        self._doubt(renewed if not self._gate.epochs else {}, envelope.stamp_s)
+
+    def _doubt(self, unfounded: dict[str, int], now_s: float) -> None:
+        """Ask anew if for a whole lease a hold is renewed that this ARC does not have: a former one of its name had it.
+
+        For less than that it may be about to be opened.
+        """
+        if unfounded != self._unfounded:
+            self._unfounded, self._unfounded_since_s = unfounded, now_s
+        elif unfounded and now_s - self._unfounded_since_s >= LEASE_S * self.clock.rate:
+            self._unfounded = {}
+            self.tell(self.name, "is counted as running and holds nothing: asks anew")
+            self.start_task(self._ask_anew(), "ask anew")
 
     async def _watch_lease(self) -> None:
         """Shut the gate when the RCs' leases are over: they are in their safe states then, and the owner must know."""
