@@ -31,6 +31,7 @@ _REASONS = {
     "higher": "{by} is higher and took over",
     "rc": "{by} does not answer",
     "capacity": "{by} can give less than before",
+    "order": "{by} could not serve all its holders in time in their new order",
     "failed": "it could not open its gate",
     "self": "its owner wanted no time any more",
 }

@@ -103,8 +103,8 @@ class ArcEntry:
         excludes: Those of them it uses exclusively.
         shares: Names of those it uses by streams.
         stamp: When it became active or was last served, and which of several at that time it was.
-        pledge: Set while RCs are being freed for it by force, or in the discipline ``time``: it comes before all
-            equals; smaller is earlier.
+        pledge: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
+            comes before all equals; smaller is earlier.
         state: Where it is.
         since_s: When it came to that state.
         began_s: When its RCs began to settle, while it holds them.
@@ -249,6 +249,7 @@ class MasterSchedule:
         self._bits: dict[str, int] = {}
         self._touched: dict[str, None] = {}
         self._candidates: dict[ArcEntry, None] = {}
+        self._reserved: dict[ArcEntry, float] = {}
         self._busy = 0
         self._now_s = 0.0
         self._ends: list[tuple[float, int, ArcEntry]] = []
@@ -301,9 +302,9 @@ class MasterSchedule:
         arc.state, arc.since_s = state, now_s
         if arc.active and not was_active:
             self._groups.add(arc, arc.uses)
+            self._demand_changed(arc.shares)
             if self._discipline == "time":
                 arc.had_s = joining_s(arc.had_s, map(self._had_s, self._rivals(arc)))
-            self._demand_changed(arc.shares)
         if held != arc.holds:
             for rc in arc.uses:
                 if held:
@@ -666,6 +667,10 @@ class MasterSchedule:
             for holder in turn.in_the_way
         )
 
+    def reserves_by_pledge(self, arc: ArcEntry) -> bool:
+        """Say whether only a pledge keeps equals from what is being freed for the ARC."""
+        return self._discipline == "time" or len(self._groups.of(arc)) > self._exact_up_to
+
     def _could_start(self, arc: ArcEntry, now_s: float) -> bool:
         """Say whether, of those it cannot share with, nobody holds an RC of it for longer than until now."""
         return all(
@@ -678,11 +683,12 @@ class MasterSchedule:
 
     def _due_beside_others(self, now_s: float) -> Turn | None:
         """Return a candidate whose time is now; the others are candidates no more."""
+        self._reserved.clear()  # nothing changes while they are looked at
         while self._candidates:
             arc, _ = self._candidates.popitem()
             if not (arc.state is RequestState.WAITING and self._could_start(arc, now_s) and self.usable(arc)):
                 continue
-            if self._is_in_the_way_of_a_first(arc, now_s):
+            if self._takes_from_others(arc, now_s):
                 continue
             if self._must_let_higher_go_first(arc, self._groups.of(arc).arcs):
                 continue
@@ -711,15 +717,18 @@ class MasterSchedule:
         beside.pop(arc, None)
         return [*beside]
 
-    def _is_in_the_way_of_a_first(self, arc: ArcEntry, now_s: float) -> bool:
-        """Say whether, if it started, it would take time from another that is first in line at one of its RCs."""
+    def _takes_from_others(self, arc: ArcEntry, now_s: float) -> bool:
+        """Say whether, if it started now, it would take time from a higher one or from the first in line at an RC."""
         end_s = now_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
+
+        def from_one(other: ArcEntry) -> bool:
+            competes = other is not arc and not self.fits(arc, [other]) and self.usable(other)
+            return competes and self._reserved_s(other, now_s, (arc,)) < end_s
+
         firsts = dict.fromkeys(self._first_in_line(rc) for rc in arc.uses)
-        return any(
-            first is not arc and not self.fits(arc, [first]) and self._reserved_s(first, now_s, (arc,)) < end_s
-            for first in firsts
-            if first is not None
-        )
+        if any(from_one(first) for first in firsts if first is not None):
+            return True
+        return any(from_one(one) for one in self._beside(arc) if one.queued and higher(one.path, arc.path))
 
     def _first_in_line(self, rc: str) -> ArcEntry | None:
         """Return the first in order of those queued for the RC; None if nobody is."""
@@ -732,22 +741,25 @@ class MasterSchedule:
         """Return from when its RCs are reserved for the ARC: when its holders go and others first in line have run.
 
         Args:
-            arc: First in line at an RC.
+            arc: The ARC.
             now_s: From when on.
             behind: Those that asked for this: they do not wait for themselves, though being equal is not transitive.
         """
+        if arc in self._reserved:
+            return self._reserved[arc]
         holders = dict.fromkeys(holder for rc in arc.uses for holder in self.rcs[rc].holders)
         ends = [self.stands_until_s(h, arc, now_s) for h in holders if h is not arc and not self.fits(arc, [h])]
         start_s = max([now_s, *ends])
         if len(behind) > LOOK_AHEAD:
             return start_s
-        for rc in arc.uses:
+        for rc in arc.uses if start_s < math.inf else ():
             first = self._first_in_line(rc)
             if first is None or first is arc or first in behind or self.fits(arc, [first]):
                 continue
             first_s = self._reserved_s(first, now_s, (*behind, arc))
             if first_s < start_s + arc.length_s - INSTANT_S:
                 start_s = math.inf if higher(first.path, arc.path) else max(start_s, first_s + first.length_s)
+        self._reserved[arc] = start_s
         return start_s
 
     def _in_the_way(

@@ -224,7 +224,7 @@ class ScheduleManager:
         for holder in turn.in_the_way:
             overridden = higher(turn.arc.path, holder.path)
             forced = overridden and not holder.served(self._now_s)
-            if (forced or self._discipline == "time") and turn.arc.pledge is None:
+            if (forced or self._table.reserves_by_pledge(turn.arc)) and turn.arc.pledge is None:
                 turn.arc.pledge = self._next()
             self._revoke(holder, "higher" if overridden else "slice", turn.arc.name)
 
@@ -392,6 +392,9 @@ class ScheduleManager:
         arc.pledge = None
         arc.retry_s = None
         self._enter(arc, RequestState.WAITING)
+        if not self._relaxed and len(self._table.group_of(arc)) > self._exact_up_to:
+            self._relaxed = True
+            self._record(self._rules(), "a group is too big to be planned whole")
 
     def _adopted(self, event: Adopted) -> None:
         """Let an ARC run on that an earlier RC manager granted its RCs.
@@ -520,6 +523,9 @@ class ScheduleManager:
         self._renumber()
         for names in [*self._traced_nodes]:
             self._introduce_nodes(names)
+        for rc in self._table.rcs.values():
+            for holder in self._table.overloading(rc.name) if rc.sharable else ():
+                self._revoke(holder, "order", rc.name)
         self._tell(RenewLeases())
 
     def _age(self) -> None:
@@ -686,14 +692,17 @@ class ScheduleManager:
 
     def opening_lines(self) -> list[Record]:
         """Return the records with which a trace begins."""
-        line = trace.meta(
+        return [Record(self._rules())]
+
+    def _rules(self) -> trace.Line:
+        return trace.meta(
             self._now_s,
             policy=self._policy,
             discipline=self._discipline,
             grace_s=self._grace_s,
             tolerance_s=self._tolerance_s,
+            relaxed=self._relaxed,
         )
-        return [Record(line)]
 
     def check(self) -> None:
         """Make sure that the schedule keeps its promises.
@@ -781,6 +790,7 @@ _CAUSES: Mapping[str, str] = {
     "higher": "{by} is higher (rule 4)",
     "rc": "{by} does not answer (rule 11)",
     "capacity": "{by} can give less than before (rule 11)",
+    "order": "{by} cannot serve all its holders in time in their new order (rule 11)",
     "failed": "it could not open its gate",
     "self": "its owner wants no time any more",
     "owner": "its owner ended",

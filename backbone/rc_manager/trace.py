@@ -17,15 +17,17 @@ VERSION = 1
 EXCLUSIVE = "x"
 
 
-def meta(now_s: float, *, policy: str, discipline: str, grace_s: float, tolerance_s: float) -> Line:
-    """Return the first line of a section: the rules of this run."""
+def meta(
+    now_s: float, *, policy: str, discipline: str, grace_s: float, tolerance_s: float, relaxed: bool = False
+) -> Line:
+    """Return the first line of a section: the rules of this run, ``relaxed`` once a group is too big to plan whole."""
     return {
         "ev": "meta",
         "t": now_s,
         "v": VERSION,
         "mode": policy,
         "discipline": discipline,
-        "wc": "plan",
+        "wc": "relaxed" if relaxed else "plan",
         "grace": grace_s,
         "tol": tolerance_s,
     }

@@ -473,3 +473,89 @@ def test_an_unknown_policy_or_discipline_is_refused(policy, discipline):
         ScheduleManager(
             grace_s=0.0, tolerance_s=0.0, policy=policy, discipline=discipline, mission="m", mission_priority=0
         )
+
+
+# Rules to choose.
+
+
+def granted_s(bench: Bench, arc: str) -> list[float]:
+    return [start_s for start_s, _ in bench.runs(arc)]
+
+
+def test_under_the_discipline_time_equals_get_equal_time_whatever_they_ask_for():
+    """What short slices the one is given in a row cost no switch."""
+    bench = Bench(manager(discipline="time"), unit("v"))
+    bench.tell(ask("long", "v", run_s=6.0))
+    bench.tell(ask("short", "v", run_s=2.0))
+    bench.run(120.0)
+    runs = {arc: [end_s - start_s for start_s, end_s in bench.runs(arc) if end_s] for arc in ("long", "short")}
+    assert sum(runs["short"]) == pytest.approx(sum(runs["long"]), abs=8.0)
+    assert set(runs["long"]) == {6.0}
+    assert all(run_s % 2.0 == 0 for run_s in runs["short"])
+
+
+def test_with_aging_a_lower_one_that_waited_long_gets_one_whole_slice():
+    """After 10 s it is as high as the other, whose slice is over."""
+    bench = Bench(manager(aging_s=10.0), unit("v"))
+    bench.tell(ask("high", "v", priority=2))
+    bench.tell(ask("low", "v", priority=1))
+    bench.run(50.0)
+    assert bench.runs("low") == [(10.0, 15.0), (25.0, 30.0), (40.0, 45.0)]
+    assert bench.runs("high")[1] == (15.0, 25.0)
+
+
+def test_aging_outwaits_no_console():
+    bench = Bench(manager(aging_s=1.0), unit("v"))
+    bench.tell(ask("human", "v", priority=9, console=True))
+    bench.tell(ask("low", "v"))
+    bench.run(100.0)
+    assert bench.runs("low") == []
+
+
+def test_slices_end_on_the_grid():
+    bench = Bench(manager(grid_s=4.0), unit("v"), unit("w"))
+    bench.at(0.5, ask("a", "v", run_s=3.0))
+    bench.at(1.0, ask("b", "v", run_s=3.0))
+    bench.at(1.5, ask("c", "w", run_s=5.0))
+    bench.at(2.0, ask("d", "w", run_s=5.0))
+    bench.run(30.0)
+    ends = [end_s for arc in "abcd" for _, end_s in bench.runs(arc) if end_s is not None]
+    assert ends
+    assert all(end_s % 4.0 == 0 for end_s in ends)
+    assert bench.verdict() == []
+
+
+def test_the_sum_test_admits_what_adds_up_though_not_every_packet_is_in_time():
+    tight = {"r": RcUse([Usage(0.01, 0.002, 0.0025)])}
+    slow = {"r": RcUse([Usage(0.1, 0.05)])}
+    for admission, both in (("exact", False), ("sum", True)):
+        bench = Bench(manager(admission=admission), sharable("r"))
+        bench.tell(ask("tight", tight, priority=2))
+        bench.tell(ask("slow", slow))
+        bench.run(1.0)
+        assert bool(bench.runs("slow")) == both, admission
+
+
+def test_the_trace_says_when_a_group_is_too_big_to_be_planned_whole():
+    bench = Bench(manager(exact_up_to=2), unit("v"))
+    for name in "abc":
+        bench.tell(ask(name, "v"))
+    assert [line["wc"] for line in bench.trace if line["ev"] == "meta"] == ["plan", "relaxed"]
+
+
+@pytest.mark.parametrize("rules", [{"policy": "x"}, {"discipline": "x"}, {"admission": "x"}, {"aging_s": -1.0}])
+def test_rules_nobody_knows_are_refused(rules):
+    with pytest.raises(ValueError, match=r"unknown|at least 0"):
+        manager(**rules)
+
+
+def test_a_changed_order_that_a_radio_cannot_serve_revokes_the_last():
+    """Alone in its order each is in time; with the long packets first the tight ones would be late."""
+    bench = Bench(manager(), sharable("r"))
+    bench.tell(ask("tight", {"r": RcUse([Usage(0.1, 0.01, 0.06)])}, priority=2))
+    bench.tell(ask("long", {"r": RcUse([Usage(0.1, 0.03), Usage(0.2, 0.03)])}, priority=1))
+    bench.run(1.0)
+    assert states(bench) == {"tight": RequestState.RUNNING, "long": RequestState.RUNNING}
+    bench.tell(PriorityChanged("owner-long", 3))
+    assert RequestState.RUNNING in states(bench).values()
+    assert bench.verdict() == []

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_missions import END_S, play, random_mission
-from simulated_switches import Bench, manager
+from simulated_switches import Bench, ask, manager, unit
 
 from backbone.rc_manager.decisions import PriorityChanged, RcKnown, Requested
 from backbone.rc_manager.messages import SchedulingRequest
@@ -62,6 +62,46 @@ def test_the_judge_finds_nothing_when_priorities_change(seed):
         bench.at(rng.randint(0, 200) / 4, PriorityChanged(rng.choice(nodes), rng.randint(0, 4)))
     found = violations(play(bench, happens))
     assert [one for one in found if one.code not in {"FAIR", "TURNS"}] == []
+
+
+@settings(max_examples=40, derandomize=True, deadline=None)
+@given(seeds)
+def test_the_judge_finds_nothing_on_a_slice_grid(seed):
+    assert violations(play(*random_mission(Random(seed), grid_s=2.0))) == []
+
+
+@settings(max_examples=40, derandomize=True, deadline=None)
+@given(seeds)
+def test_the_judge_finds_nothing_when_who_waits_long_rises(seed):
+    """But for bounds on waits, which it works out with the last numbers as if they had held all the time."""
+    found = violations(play(*random_mission(Random(seed), aging_s=7.0)))
+    assert [one for one in found if one.code not in {"FAIR", "TURNS"}] == []
+
+
+RIVALS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 2.5, 5.0]), st.integers(0, 12)), min_size=2, max_size=6)
+
+
+@settings(max_examples=60, derandomize=True, deadline=None)
+@given(RIVALS, st.sampled_from([0.0, 0.3]))
+def test_rivals_for_one_rc_get_equal_time_under_the_discipline_time(rivals, settle_s):
+    bench = Bench(manager(discipline="time", grace_s=0.2), unit("v", connect_s=settle_s))
+    for number, (run_s, begin_s) in enumerate(rivals):
+        bench.at(float(begin_s), ask(f"a{number}", "v", run_s=run_s))
+    assert violations(bench.run(120.0)) == []
+    had_s = [sum((end_s or 120.0) - start_s for start_s, end_s in bench.runs(f"a{n}")) for n in range(len(rivals))]
+    if all(begin_s == 0 for _, begin_s in rivals):
+        assert max(had_s) - min(had_s) <= 2 * max(run_s for run_s, _ in rivals) + 0.1
+
+
+SAFETY = {"FORM", "EXCL", "CAP", "RTA", "DOWN", "MINRUN", "PRIO", "DEMOTE", "GRACE", "SETTLE", "EPOCH"}
+
+
+@settings(max_examples=80, derandomize=True, deadline=None)
+@given(seeds)
+def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardware_safe(seed):
+    """It may leave a gap or let a younger equal go first; nobody is cut short and nobody waits for a lower one."""
+    found = violations(play(*random_mission(Random(seed), exact_up_to=0)))
+    assert [one for one in found if one.code in SAFETY] == []
 
 
 @pytest.mark.slow
