@@ -11,7 +11,8 @@ The laws, by name:
 * whole-set: a gate opens only over RCs that were all connected to its ARC under just these epochs.
 * true: what an owner believes agrees with its ARC's gate, and the gate with the RCs, but for known delays.
 * schedule: the RC manager's schedule keeps its own promises after each event.
-* progress: when nothing fails any more, whoever wants time and has no higher rival gets it.
+* progress: when nothing fails any more, whoever wants time and has no higher rival gets it (not under the policy
+  ``strict``).
 * no-bug: nobody ends by a bug.
 
 What happens (the words of the audit): ``begins killed ends fails`` of components; ``held``, ``let go``,
@@ -262,6 +263,8 @@ class _Judge:
     # ------------------------------------------------------------------ the end
     def _progress(self, now_s: float) -> Iterator[Broken]:
         """Judge the calm: who wanted time all through it, and had nobody above, got some."""
+        if self._shape.policy == "strict":
+            return  # it lets RCs stand idle for those that may not start yet
         wanting = [owner for owner in self._shape.owners if owner.name in self._wanting]
         for owner in wanting:
             rivals = [other for other in wanting if other is not owner and self._is_above(other, owner)]
