@@ -60,8 +60,8 @@ START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of
 STOP_TIME_S = 10.0  # chosen: asking, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
 LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 CORE_POLICY = RestartPolicy(
-    back_off_s=0.02, limit=20, window_s=60.0, after_good_end=True
-)  # chosen: a dead hub stops everybody
+    back_off_s=0.02, back_off_most_s=0.5, limit=20, window_s=60.0, after_good_end=True
+)  # chosen: a dead hub stops everybody, and leases outlast a restart of the RC manager only if its pause stays short
 FIRST_PORT, LAST_PORT = 20000, 32000  # chosen: below the ports the system hands out to outgoing connections
 
 
