@@ -358,6 +358,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
         "creator": lambda host: {"tags": list(host.tags)},
         "dependency_database": lambda _: {"resources": resources},
         "rc_manager": lambda _: {
+            **description.core_parameters("rc_manager"),
             "mission": description.name,
             "mission_priority": description.priority,
             "trace": trace,

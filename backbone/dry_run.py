@@ -13,6 +13,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
+
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.inventory import Inventory
 from backbone.dependency_database.messages import FindRcs
@@ -26,8 +28,9 @@ from backbone.rc_manager.claims import scheduling_request
 from backbone.rc_manager.decisions import RcKnown, Requested
 from backbone.rc_manager.messages import SchedulingRequest, Usage, Why
 from backbone.rc_manager.rehearsal import Line, Rehearsal, Timetable
+from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
-from backbone.rc_manager.service import TOLERANCE_S, RcManagerParameters
+from backbone.rc_manager.service import TOLERANCE_S
 
 FIRST_MINUTE_S = 60.0
 
@@ -125,14 +128,17 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     """
     placed = placements(description)
     hosts = {one.name: one.host for one in placed}
-    settings = RcManagerParameters(mission=description.name, mission_priority=description.priority)
+    rules = msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
     manager = ScheduleManager(
-        grace_s=settings.grace_s,
+        grace_s=rules.grace_s,
         tolerance_s=TOLERANCE_S,
-        policy=settings.policy,
-        discipline=settings.discipline,
-        mission=settings.mission,
-        mission_priority=settings.mission_priority,
+        policy=rules.policy,
+        discipline=rules.discipline,
+        admission=rules.admission,
+        aging_s=rules.aging_s,
+        grid_s=rules.grid_s,
+        mission=description.name,
+        mission_priority=description.priority,
     )
     rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
     for rc in _rcs(description, hosts):

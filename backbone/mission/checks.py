@@ -15,6 +15,7 @@ from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name
 from backbone.mission.behavior_checks import check_behaviors
 from backbone.mission.class_paths import class_path_fault
+from backbone.mission.core_checks import check_service_parameters
 from backbone.mission.document import Element
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, told, told_names
@@ -97,6 +98,7 @@ def _check_core(tables: Tables, report: Report) -> None:
                     "Remove one; creator runs once on each host, every other core service once in the mission",
                 )
         check_host(service, tables, report)
+        check_service_parameters(service, report)
         main = _main_host(tables)
         if name in CORE_SERVICES and name != CREATOR and where in tables.hosts and where != main:
             report.fault(

@@ -29,10 +29,17 @@ class Host(_Part):
 
 
 class CoreService(_Part):
-    """A core service and where it runs."""
+    """A core service and where it runs.
+
+    Attributes:
+        type: Component type.
+        host: Where.
+        parameters: What the file sets of its parameters.
+    """
 
     type: str
     host: str
+    parameters: dict[str, Any] = {}
 
 
 class Component(_Part):
@@ -121,3 +128,7 @@ class MissionDescription(_Part):
     components: tuple[Component, ...]
     behaviors: tuple[Behavior, ...]
     source: str
+
+    def core_parameters(self, service: str) -> dict[str, Any]:
+        """Return what the file sets of a core service's parameters, of the first of this type."""
+        return next((dict(core.parameters) for core in self.core if core.type == service), {})

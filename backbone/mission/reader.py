@@ -59,7 +59,10 @@ def _describe(root: Element, source: str) -> MissionDescription:
 
 
 def _core(root: Element, hosts: list[str]) -> list[CoreService]:
-    services = [CoreService(type=service.text("type"), host=service.text("host")) for service in section(root, "core")]
+    services = [
+        CoreService(type=service.text("type"), host=service.text("host"), parameters=parameters(service))
+        for service in section(root, "core")
+    ]
     return sorted(services, key=lambda service: (CORE_SERVICES.index(service.type), hosts.index(service.host)))
 
 

@@ -466,6 +466,13 @@ class UnknownRequest(SchedulingRefusal):
     remedy = "Send a SchedulingRequest first; see 'scout-backbone status' for names."
 
 
+class FixedRules(Refusal):
+    """The rules by which is scheduled do not change while the mission runs."""
+
+    code = "scheduling.fixed_rules"
+    remedy = "Change the parameters of the rc_manager in the mission file, and bring the mission up again."
+
+
 class StaleEpoch(Refusal):
     """The epoch is older than the RC's, or the ARC does not hold it: nothing was applied."""
 

@@ -17,9 +17,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, TextIO, assert_never
-
-import msgspec
+from typing import Any, TextIO, assert_never
 
 from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.component import Component
@@ -60,7 +58,6 @@ from backbone.rc_manager.decisions import (
     Wanted,
     Woken,
 )
-from backbone.rc_manager.discipline import Discipline
 from backbone.rc_manager.messages import (
     BEAT_MISSED_S,
     LEASE_S,
@@ -74,6 +71,7 @@ from backbone.rc_manager.messages import (
     CurrentRequest,
     Done,
     Extend,
+    FixedRules,
     Lease,
     Leases,
     RcManagerQuestion,
@@ -86,7 +84,7 @@ from backbone.rc_manager.messages import (
     TraceLine,
     Withdraw,
 )
-from backbone.rc_manager.radio_admission import Analysis
+from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
 from backbone.wire import Envelope, Message
 
@@ -100,29 +98,17 @@ RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
 
-class RcManagerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """With which rules the RC manager decides.
+class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """For whom and with which rules the RC manager decides.
 
     Attributes:
         mission: Name of the mission's own node, root of the behavior tree.
         mission_priority: Its priority among the consoles.
-        grace_s: Time a decision process has to stop cleanly at the end of a slice.
-        policy: ``no_delay`` or ``strict``.
-        discipline: ``turns`` or ``time``.
-        admission: ``exact`` or ``sum``.
-        aging_s: Seconds of waiting after which an ARC rises by one level, and again; 0: never.
-        grid_s: Slices end at multiples of this many seconds; 0: no grid.
         trace: File the decisions are written to; empty: none.
     """
 
     mission: str
     mission_priority: int = 0
-    grace_s: float = 0.2
-    policy: Literal["no_delay", "strict"] = "no_delay"
-    discipline: Discipline = "turns"
-    admission: Analysis = "exact"
-    aging_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
-    grid_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
     trace: str = ""
 
 
@@ -202,6 +188,14 @@ class RcManager(Component[RcManagerParameters]):
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
             loops.create_task(self._renew())
+
+    def parameters_changed(self) -> None:
+        """Refuse: whoever waits was promised a place by the rules as they are.
+
+        Raises:
+            FixedRules: Always.
+        """
+        raise FixedRules(f"{self.name} keeps the rules it began with")
 
     async def drain(self) -> None:
         """End all switches; what is held ends by lease, or is taken over by the next RC manager."""

@@ -1,0 +1,63 @@
+"""The rules of a mission that the RC manager decides by, where more than one is right.
+
+Rule of this file: plain data with its ranges, so that a mission file is checked by the very types the
+RC manager starts with.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, get_args
+
+from msgspec import Meta, Struct
+
+from backbone.rc_manager.discipline import Discipline
+from backbone.rc_manager.radio_admission import Analysis
+
+Policy = Literal["no_delay", "strict"]
+
+LONGEST_S = 86_400.0  # chosen: a day, as for all other times of a mission file
+
+
+class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """With which rules the RC manager decides; the descriptions are also what ``check`` tells people."""
+
+    policy: Annotated[
+        Policy,
+        Meta(
+            description="no_delay: lower ones fill gaps that cost nobody; strict: none starts while a higher one waits"
+        ),
+    ] = "no_delay"
+    discipline: Annotated[
+        Discipline, Meta(description="turns: equals each get their minimum run time in turn; time: they get equal time")
+    ] = "turns"
+    admission: Annotated[
+        Analysis,
+        Meta(description="exact: a sharable resource serves what is always in time; sum: what adds up to its capacity"),
+    ] = "exact"
+    aging_s: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=LONGEST_S,
+            description="who waits rises one level each time this many seconds have passed; 0: never",
+        ),
+    ] = 0.0
+    grid_s: Annotated[
+        float, Meta(ge=0, le=LONGEST_S, description="slices end at multiples of this many seconds; 0: no grid")
+    ] = 0.0
+    grace_s: Annotated[
+        float,
+        Meta(ge=0, le=LONGEST_S, description="seconds a decision process has to stop cleanly at the end of a slice"),
+    ] = 0.2
+
+
+def values_of(rule: str) -> tuple[str, ...]:
+    """Return the words a rule may be; none if it is a time.
+
+    Example:
+        >>> values_of("policy"), values_of("grid_s")
+        (('no_delay', 'strict'), ())
+    """
+    return {"policy": get_args(Policy), "discipline": get_args(Discipline), "admission": get_args(Analysis)}.get(
+        rule, ()
+    )

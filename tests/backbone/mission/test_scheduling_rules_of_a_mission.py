@@ -1,0 +1,83 @@
+"""The rules of scheduling stand in the mission file, and everybody who plans goes by them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from backbone.bring_up import UpOptions, core_launches
+from backbone.component.launch import Launch
+from backbone.dry_run import dry_run
+from backbone.mission.core_checks import descriptions
+from backbone.mission.model import MissionDescription
+from backbone.mission.reader import read_mission
+from backbone.naming import Subsystem
+from backbone.rc_manager.rules import SchedulingRules, values_of
+from backbone.rc_manager.service import RcManagerParameters
+
+HERE = Path(__file__).parent
+SMALL = HERE / "small.xml"
+REFERENCE = HERE.parents[2] / "docs" / "reference" / "mission-file.md"
+PLAIN = '<service type="rc_manager" host="base"/>'
+
+
+def with_rules(tmp_path: Path, **rules: str) -> MissionDescription:
+    parameters = "".join(f'<parameter name="{name}" value="{value}"/>' for name, value in rules.items())
+    file = tmp_path / "m.xml"
+    file.write_text(SMALL.read_text().replace(PLAIN, f"{PLAIN[:-2]}>{parameters}</service>"))
+    return read_mission(file)
+
+
+def launch_of_rc_manager(description: MissionDescription) -> Launch:
+    own = Launch("small", Subsystem.BACKBONE, "launcher", "launcher", "", "base", "", 0.0, 1.0, {})
+    launches = core_launches(description, own, UpOptions())
+    return next(launch for launch in launches if launch.name == "rc_manager")
+
+
+def test_the_rc_manager_starts_with_the_rules_of_the_file(tmp_path: Path) -> None:
+    rules = {"policy": "strict", "discipline": "time", "admission": "sum"}
+    times = {"aging_s": "30", "grid_s": "0.5", "grace_s": "0"}
+    launch = launch_of_rc_manager(with_rules(tmp_path, **rules, **times))
+    assert msgspec.convert(launch.parameters, RcManagerParameters) == RcManagerParameters(
+        mission="small",
+        mission_priority=10,
+        policy="strict",
+        discipline="time",
+        admission="sum",
+        aging_s=30.0,
+        grid_s=0.5,
+        grace_s=0.0,
+    )
+
+
+def test_without_any_the_rules_are_the_defaults() -> None:
+    launch = launch_of_rc_manager(read_mission(SMALL))
+    expected = RcManagerParameters(mission="small", mission_priority=10)
+    assert msgspec.convert(launch.parameters, RcManagerParameters) == expected
+
+
+@pytest.mark.parametrize("rule", ["policy", "discipline", "admission"])
+def test_every_word_a_rule_may_be_is_accepted(tmp_path: Path, rule: str) -> None:
+    for word in values_of(rule):
+        assert with_rules(tmp_path, **{rule: word}).core_parameters("rc_manager") == {rule: word}
+
+
+def test_a_dry_run_goes_by_the_rules_of_the_file(tmp_path: Path) -> None:
+    plain = dry_run(read_mission(SMALL), 20.0)
+    ruled = dry_run(with_rules(tmp_path, policy="strict", discipline="time", grid_s="3", grace_s="0.1"), 20.0)
+    assert (plain.trace[0]["mode"], plain.trace[0]["discipline"], plain.trace[0]["grace"]) == ("no_delay", "turns", 0.2)
+    assert (ruled.trace[0]["mode"], ruled.trace[0]["discipline"], ruled.trace[0]["grace"]) == ("strict", "time", 0.1)
+    assert not [line for line in plain.trace if line["ev"] == "extend"]
+    ends = [line["until"] for line in ruled.trace if line["ev"] == "extend"]
+    assert ends
+    assert all(end_s % 3.0 == pytest.approx(0.0) for end_s in ends)
+
+
+def test_the_reference_tells_every_rule_with_its_default_and_meaning() -> None:
+    told = REFERENCE.read_text()
+    meanings = descriptions(SchedulingRules)
+    for rule in msgspec.structs.fields(SchedulingRules):
+        assert meanings[rule.name]
+        assert f"| `{rule.name}` | `{rule.default}` | {meanings[rule.name]} |" in told
