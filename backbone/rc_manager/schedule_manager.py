@@ -42,6 +42,7 @@ from backbone.rc_manager.decisions import (
     Freed,
     Idled,
     Instruction,
+    NodeMoved,
     Opened,
     OpenFailed,
     PriorityChanged,
@@ -69,7 +70,9 @@ from backbone.rc_manager.master_schedule import (
     Turn,
 )
 from backbone.rc_manager.messages import (
+    Attributes,
     Lease,
+    NotMovable,
     RcUse,
     RequestState,
     Schedule,
@@ -78,7 +81,7 @@ from backbone.rc_manager.messages import (
     UnknownRequest,
     Why,
 )
-from backbone.rc_manager.priority import CONSOLE, PriorityTree, higher
+from backbone.rc_manager.priority import CONSOLE, PriorityTree, carried, higher
 from backbone.rc_manager.radio_admission import Analysis
 
 RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
@@ -146,7 +149,8 @@ class ScheduleManager:
         self._told: list[Instruction] = []
         self._wake_s: float | None = None
         self._traced_rcs: set[str] = set()
-        self._traced_nodes: dict[tuple[str, ...], int] = {}
+        self._traced_nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
+        self._node_ids: dict[tuple[str, ...], str] = {}
         self._replaced_by: dict[str, Requested] = {}
         self._retrying: dict[str, ArcEntry] = {}
         self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
@@ -203,6 +207,8 @@ class ScheduleManager:
                 self._extended(arc, until_s)
             case PriorityChanged(node=node, priority=priority):
                 self._priority_changed(node, priority)
+            case NodeMoved(node=node, parent=parent):
+                self._node_moved(node, parent)
             case Opened(arc=arc):
                 self._opened(arc)
             case OpenFailed(arc=arc, rc=rc):
@@ -226,6 +232,7 @@ class ScheduleManager:
             forced = overridden and not holder.served(self._now_s)
             if (forced or self._table.reserves_by_pledge(turn.arc)) and turn.arc.pledge is None:
                 turn.arc.pledge = self._next()
+                self._table.touch(turn.arc)
             self._revoke(holder, "higher" if overridden else "slice", turn.arc.name)
 
     def _connect(self, arc: ArcEntry) -> None:
@@ -374,7 +381,7 @@ class ScheduleManager:
         owner = (
             trace.console_owner(name.removeprefix(CONSOLE), number)
             if name.startswith(CONSOLE)
-            else _node_id(arc.place_in_tree)
+            else self._node_id(arc.place_in_tree)
         )
         return trace.request(
             self._now_s,
@@ -519,6 +526,17 @@ class ScheduleManager:
         self._tree.change(node, priority)
         self._priorities_changed()
 
+    def _node_moved(self, node: str, parent: str) -> None:
+        if self._tree.obstacle(node, parent):
+            return
+        old, new = self._tree.move(node, parent)
+        # In the trace a node keeps the id under which it came, wherever it stands later.
+        self._node_ids = {carried(way, old, new): self._node_id(way) for way in self._traced_nodes}
+        self._traced_nodes = {carried(way, old, new): told for way, told in self._traced_nodes.items()}
+        for arc in self._table.arcs.values():
+            arc.place_in_tree = carried(arc.place_in_tree, old, new)
+        self._priorities_changed()
+
     def _priorities_changed(self) -> None:
         self._renumber()
         for names in [*self._traced_nodes]:
@@ -552,15 +570,19 @@ class ScheduleManager:
         self._table.priorities_changed()
 
     def _introduce_nodes(self, names: tuple[str, ...]) -> None:
-        """Bring new nodes and new numbers on this way into the trace, parents first."""
+        """Bring new nodes, new numbers and new parents on this way into the trace, parents first."""
         for depth, (name, number) in enumerate(self._tree.path(names), start=1):
             way = names[:depth]
+            parent = self._node_id(way[:-1]) if depth > 1 else None
             told = self._traced_nodes.get(way)
-            self._traced_nodes[way] = number
-            if told == number or (told is None and name.startswith(CONSOLE)):
+            self._traced_nodes[way] = (parent, number)
+            if told == (parent, number) or (told is None and name.startswith(CONSOLE)):
                 continue  # the request tells a console's first number
-            parent = _node_id(way[:-1]) if depth > 1 else None
-            self._record(trace.node(self._now_s, _node_id(way), parent, number), "its number among its siblings")
+            why = "its parent" if told is not None and told[0] != parent else "its number among its siblings"
+            self._record(trace.node(self._now_s, self._node_id(way), parent, number), why)
+
+    def _node_id(self, names: tuple[str, ...]) -> str:
+        return self._node_ids.get(names, "/".join(names))
 
     # RCs.
 
@@ -680,6 +702,24 @@ class ScheduleManager:
         """
         return self._explanation.why(name, max(now_s, self._now_s))
 
+    def attributes(self, name: str) -> Attributes:
+        """Return what an ARC, an owner (name or address), or all at and below a node ask for.
+
+        Raises:
+            UnknownRequest: There is none of this name.
+        """
+        return self._explanation.attributes(name)
+
+    def require_movable(self, node: str, parent: str) -> None:
+        """Return if the node of the behavior tree can be moved below this parent; nothing changes.
+
+        Raises:
+            NotMovable: It cannot.
+        """
+        obstacle = self._tree.obstacle(node, parent)
+        if obstacle:
+            raise NotMovable(f"{node} cannot be moved below {parent}: {obstacle}", node=node, parent=parent)
+
     def leases(self) -> list[Lease]:
         """Return all holds that must be renewed: those of ARCs that connect or run."""
         return [
@@ -779,10 +819,6 @@ def _require(what: str, given: str, known: Sequence[str]) -> None:
 def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:
     """Return the alternative of these RCs."""
     return next((dict(wish) for wish in request.alternatives if wish.keys() == {*rcs}), {rc: RcUse() for rc in rcs})
-
-
-def _node_id(names: tuple[str, ...]) -> str:
-    return "/".join(names)
 
 
 _CAUSES: Mapping[str, str] = {
