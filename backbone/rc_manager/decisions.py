@@ -133,6 +133,14 @@ class PriorityChanged:
 
 
 @dataclass(frozen=True, slots=True)
+class NodeMoved:
+    """A node of the tree stands below another parent, with all below it."""
+
+    node: str
+    parent: str
+
+
+@dataclass(frozen=True, slots=True)
 class Opened:
     """The ARC's RCs are connected and settled, its gate is open."""
 
@@ -177,6 +185,7 @@ Event = (
     | RuntimeChanged
     | Extended
     | PriorityChanged
+    | NodeMoved
     | Opened
     | OpenFailed
     | Freed

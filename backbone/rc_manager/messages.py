@@ -5,7 +5,7 @@ Who speaks to whom:
 * ARC → RC manager: ``SchedulingRequest``, ``Withdraw``, ``SetIdle``, ``ChangeRuntime``, ``Extend``.
 * RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``.
 * RC manager → RC: ``Connect``, ``Disconnect``, ``AskRc``; ``Leases`` as a publication.
-* anybody → RC manager: ``AskSchedule``, ``AskWhy``, ``SetPriority``.
+* anybody → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``SetPriority``, ``MoveNode``.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class Scheduled(Message, frozen=True):
         rcs: The RCs chosen of the alternatives.
         state: Running soon (connecting) or waiting.
         position: Place among the waiting of its group, 1 is next; 0 if it need not wait.
-        blockers: ARCs it waits for.
+        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
         expected_start_s: Mission time of the predicted grant; negative: none can be predicted.
     """
 
@@ -149,6 +149,13 @@ class SetPriority(Message, frozen=True):
 
     node: str
     priority: int
+
+
+class MoveNode(Message, frozen=True):
+    """Put a node of the behavior tree, with all below it, below another parent; its priority stays."""
+
+    node: str
+    parent: str
 
 
 class Done(Message, frozen=True):
@@ -344,7 +351,20 @@ class AskSchedule(Message, frozen=True):
 
 
 class RcView(Message, frozen=True):
-    """One RC in the master schedule."""
+    """One RC in the master schedule.
+
+    Attributes:
+        rc: Its name.
+        kind: Its type.
+        state: ``up`` or ``down``.
+        sharable: True if several ARCs may hold it.
+        capacity: Share of its time it can give.
+        holders: Who holds it, with epoch and since when.
+        last_epoch: Largest epoch given so far.
+        next: ARCs that get it, in the order of their predicted starts.
+        until_s: Mission time at which the slice of each holder ends; negative: it is being disconnected.
+        next_s: Mission times of their predicted starts, for each of ``next``.
+    """
 
     rc: str
     kind: str
@@ -354,6 +374,8 @@ class RcView(Message, frozen=True):
     holders: list[Holder]
     last_epoch: int
     next: list[str]
+    until_s: list[float] = []
+    next_s: list[float] = []
 
 
 class RequestView(Message, frozen=True):
@@ -368,10 +390,13 @@ class RequestView(Message, frozen=True):
         until_s: End of its slice; negative if it holds nothing.
         expected_start_s: Predicted grant; negative if it runs or none can be predicted.
         because: One line: why it runs or waits.
-        blockers: ARCs it waits for.
+        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
         minimum_runtime_s: As asked for.
         priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
         turns: Grants so far.
+        rule: Rule of SCHEDULING.md that decides it.
+        would_change: What would end this, for people.
+        raised: Levels by which it rose because it waits long.
     """
 
     arc: str
@@ -386,6 +411,9 @@ class RequestView(Message, frozen=True):
     minimum_runtime_s: float
     priority: str
     turns: int
+    rule: str = ""
+    would_change: str = ""
+    raised: int = 0
 
 
 class Schedule(Message, frozen=True):
@@ -411,7 +439,7 @@ class Why(Message, frozen=True):
         state: Where it is.
         lines: The reasons for people, most important first.
         rule: Rule of SCHEDULING.md that decides it.
-        blockers: ARCs because of which.
+        blockers: ARCs because of which; of a waiting one: without them it starts as soon as its RCs are up and free.
         expected_start_s: Predicted grant; negative if none.
         would_change: What would end the wait, for people.
     """
@@ -423,6 +451,44 @@ class Why(Message, frozen=True):
     blockers: list[str]
     expected_start_s: float
     would_change: str
+
+
+class AskAttributes(Message, frozen=True):
+    """What is asked for by this ARC, by this decision process, or by all at and below this node?"""
+
+    name: str
+
+
+class RequestAttributes(Message, frozen=True):
+    """What one ARC asks for, as it counts now.
+
+    Attributes:
+        arc: The ARC.
+        owner: Address of its decision process.
+        state: Where the request is.
+        uses: RC → how it is used.
+        minimum_runtime_s: Shortest slice.
+        maximum_runtime_s: End of all extensions.
+        path: Names and priorities from the mission's root to the decision process, or of the console alone.
+        console: True if the owner is a console.
+        stops_at_once: True if the end of a slice need not wait for the decision process.
+    """
+
+    arc: str
+    owner: str
+    state: RequestState
+    uses: dict[str, RcUse]
+    minimum_runtime_s: float
+    maximum_runtime_s: float
+    path: list[PathNode]
+    console: bool
+    stops_at_once: bool
+
+
+class Attributes(Message, frozen=True):
+    """Answer to ``AskAttributes``: at least one request."""
+
+    requests: list[RequestAttributes]
 
 
 class TraceLine(Message, frozen=True):
@@ -466,6 +532,13 @@ class UnknownRequest(SchedulingRefusal):
     remedy = "Send a SchedulingRequest first; see 'scout-backbone status' for names."
 
 
+class NotMovable(SchedulingRefusal):
+    """The node cannot stand below that parent; nothing changed."""
+
+    code = "scheduling.not_movable"
+    remedy = "Name a node and a parent by the names of the priority paths that 'scout-backbone status' shows."
+
+
 class FixedRules(Refusal):
     """The rules by which is scheduled do not change while the mission runs."""
 
@@ -487,4 +560,15 @@ class Held(Refusal):
     remedy = "Disconnect the holder first."
 
 
-RcManagerQuestion = SchedulingRequest | Withdraw | SetIdle | ChangeRuntime | Extend | SetPriority | AskSchedule | AskWhy
+RcManagerQuestion = (
+    SchedulingRequest
+    | Withdraw
+    | SetIdle
+    | ChangeRuntime
+    | Extend
+    | SetPriority
+    | MoveNode
+    | AskSchedule
+    | AskWhy
+    | AskAttributes
+)

@@ -43,6 +43,7 @@ from backbone.rc_manager.decisions import (
     Freed,
     Idled,
     Instruction,
+    NodeMoved,
     Opened,
     OpenFailed,
     PriorityChanged,
@@ -62,6 +63,7 @@ from backbone.rc_manager.messages import (
     BEAT_MISSED_S,
     LEASE_S,
     RENEW_EVERY_S,
+    AskAttributes,
     AskRc,
     AskRequest,
     AskSchedule,
@@ -74,6 +76,7 @@ from backbone.rc_manager.messages import (
     FixedRules,
     Lease,
     Leases,
+    MoveNode,
     RcManagerQuestion,
     RcState,
     RcUse,
@@ -234,10 +237,15 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(Extended(arc, until_s))
             case SetPriority(node=node, priority=priority):
                 self.happened(PriorityChanged(node, priority))
+            case MoveNode(node=node, parent=parent):
+                self.manager.require_movable(node, parent)
+                self.happened(NodeMoved(node, parent))
             case AskSchedule():
                 return self.manager.schedule(self.clock.now_s())
             case AskWhy(name=name):
                 return self.manager.why(name, self.clock.now_s())
+            case AskAttributes(name=name):
+                return self.manager.attributes(name)
             case _:
                 return await super().answer(asked)
         return Done()
