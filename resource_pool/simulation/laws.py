@@ -11,6 +11,8 @@ The laws, by name:
 * whole-set: a gate opens only over RCs that were all connected to its ARC under just these epochs.
 * true: what an owner believes agrees with its ARC's gate, and the gate with the RCs, but for known delays.
 * schedule: the RC manager's schedule keeps its own promises after each event.
+* kept: where every message arrives, an RC manager that dies and is soon back takes nothing from anybody without
+  having decided so: holders and epochs stay.
 * progress: when nothing fails any more, whoever wants time and has no higher rival gets it (not under the policy
   ``strict``).
 * no-bug: nobody ends by a bug.
@@ -23,6 +25,7 @@ of the mission.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -35,6 +38,9 @@ from resource_pool.simulation.shape import MissionShape, OwnerShape
 SAFE, FREED = "S", "freed"
 FREED_WITHIN_S = 0.5  # chosen: an RC ends one hold after the other, each within 0.4 s; the next is not connected before
 RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time in which a lost ARC is claimed anew
+SOON_BACK_S = 0.6  # chosen: with the time it needs to ask everybody it renews before any lease is over
+UNDISTURBED_S = 4.0  # chosen: two leases
+RC_MANAGER = "rc_manager"
 CALM_DELAY_S = (
     1.5  # chosen: in the calm a notice takes no time, a death is seen at once, an owner is missed in half a second
 )
@@ -64,9 +70,15 @@ class Broken:
         return f"{self.law}, at {self.at_s:.4f} s: {self.what}"
 
 
-def first_broken(shape: MissionShape, happenings: Sequence[Happening]) -> Broken | None:
-    """Return the law that was broken first, or None if all hold."""
-    judge = _Judge(shape)
+def first_broken(shape: MissionShape, happenings: Sequence[Happening], *, all_arrived: bool = False) -> Broken | None:
+    """Return the law that was broken first, or None if all hold.
+
+    Args:
+        shape: The mission.
+        happenings: All that happened, in order.
+        all_arrived: True if no message was lost, late or doubled.
+    """
+    judge = _Judge(shape, all_arrived)
     for happening in happenings:
         for broken in judge.judge(happening):
             return broken
@@ -103,8 +115,11 @@ class _Belief:
 
 
 class _Judge:
-    def __init__(self, shape: MissionShape) -> None:
-        self._shape = shape
+    def __init__(self, shape: MissionShape, all_arrived: bool) -> None:
+        self._shape, self._all_arrived = shape, all_arrived
+        self._struck_s = -math.inf
+        self._to_keep: set[tuple[str, str, int]] = set()
+        self._keep_until_s = -math.inf
         self._unit = {resource.name for resource in shape.resources if not resource.sharable}
         self._scouts = {
             resource.parameters["network_id"]: resource.name for resource in shape.resources if resource.type == "scout"
@@ -129,7 +144,7 @@ class _Judge:
             case "held":
                 yield from self._held(h, h.values["arc"], h.values["epoch"])
             case "let go":
-                self._let_go(h, h.values["arc"], h.values["epoch"])
+                yield from self._let_go(h, h.values["arc"], h.values["epoch"])
             case "safe":
                 yield from self._safe(h, h.values["arc"])
             case "packet":
@@ -149,6 +164,11 @@ class _Judge:
                 self._wanting[h.who] = h.at_s
             case "killed" | "ends" | "gives up" | "begins":
                 self._gone(h)
+                self._note_restart(h)
+            case "cut off":
+                self._struck_s, self._to_keep = h.at_s, set()
+            case "revoke":
+                self._need_not_keep(h.values["arc"])
             case "fails":
                 yield Broken("no-bug", h.at_s, f"{h.who} ended by a bug: {h.values['error']}", (h.who,))
             case "promise broken":
@@ -178,7 +198,10 @@ class _Judge:
             if arc in holders:
                 self._doubts[FREED, arc, rc, str(holders[arc])] = h.at_s
 
-    def _let_go(self, h: Happening, arc: str, epoch: int) -> None:
+    def _let_go(self, h: Happening, arc: str, epoch: int) -> Iterator[Broken]:
+        if (h.who, arc, epoch) in self._to_keep and h.at_s < self._keep_until_s:
+            what = f"{h.who} is taken undecided from {arc}, which held it (epoch {epoch}) when the RC manager died"
+            yield Broken("kept", h.at_s, what, (h.who, arc, RC_MANAGER))
         if self._holds[h.who].get(arc) == epoch:
             del self._holds[h.who][arc]
 
@@ -223,6 +246,27 @@ class _Judge:
         self._gates.pop(h.who, None)
         if h.who in self._beliefs:
             self._beliefs[h.who] = _Belief(None, h.at_s)
+
+    # ------------------------------------------------------------------ the RC manager's restart
+    def _note_restart(self, h: Happening) -> None:
+        """Keep in mind what must stay when nothing but the RC manager was struck for a while, and it is soon back."""
+        if h.what == "ends" or (h.what == "begins" and h.who != RC_MANAGER):
+            self._need_not_keep(h.who)
+        if h.who == RC_MANAGER and h.what == "begins" and h.at_s > self._struck_s + SOON_BACK_S:
+            self._to_keep = set()
+        if h.what != "killed":
+            return
+        alone = h.who == RC_MANAGER and h.at_s > self._struck_s + UNDISTURBED_S and self._all_arrived
+        self._struck_s, self._keep_until_s = h.at_s, h.at_s + UNDISTURBED_S
+        self._to_keep = {
+            (rc, arc, epoch)
+            for arc, epochs in (self._gates.items() if alone else ())
+            if all(self._holds[rc].get(arc) == epoch for rc, epoch in epochs.items())
+            for rc, epoch in epochs.items()
+        }
+
+    def _need_not_keep(self, arc: str) -> None:
+        self._to_keep = {hold for hold in self._to_keep if hold[1] != arc}
 
     # ------------------------------------------------------------------ what is believed
     def _compare(self, now_s: float) -> None:

@@ -100,7 +100,7 @@ class _Mission:
             await self._hosts.stop_all()
         faults = (*self._network.suffered, *self._moments)
         happenings = tuple(self._audit.happenings)
-        broken = first_broken(self._shape, happenings)
+        broken = first_broken(self._shape, happenings, all_arrived=not self._network.suffered)
         return MissionRun(self._shape, faults, happenings, self._audit.digest(), broken)
 
     def _strike(self, fault: Kill | Hang) -> None:

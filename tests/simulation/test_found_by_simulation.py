@@ -86,6 +86,6 @@ def test_what_was_found_does_not_come_back(what: str) -> None:
 
 
 def test_these_missions_still_suffer_what_they_were_found_with() -> None:
-    """A message has its name from how many went before it; when most names have changed, the cases above prove nothing."""
+    """A message has its name from how many went before it; once most names have changed, the cases prove nothing."""
     whole = [set(run_mission(seed, chaos=True, faults=faults).faults) == set(faults) for seed, faults in FOUND.values()]
     assert sum(whole) > len(whole) / 2

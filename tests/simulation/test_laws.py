@@ -150,3 +150,24 @@ def test_a_seed_means_one_mission() -> None:
     shapes = [draw_shape(seed) for seed in range(200)]
     assert {len(shape.owners) for shape in shapes} == set(range(1, 9))
     assert max(shape.active_s + shape.calm_s for shape in shapes) < 60
+
+
+def test_what_is_taken_undecided_after_the_rc_managers_death_breaks_kept() -> None:
+    running: list[Told] = [
+        held(1, "scout1", "a-drive", 1),
+        (1, "a-drive", "open", {"epochs": {"scout1": 1}}),
+        (1, "a", "resumed", {"arc": "a-drive", "epochs": {"scout1": 1}}),
+        (5, "rc_manager", "killed", {}),
+    ]
+    back: Told = (5.3, "rc_manager", "begins", {})
+    end = let_go(6, "scout1", "a-drive", 1)
+
+    def law_of(*told: Told) -> str:
+        broken = first_broken(shape_of(A, B), [Happening(*one) for one in told], all_arrived=True)
+        return broken.law if broken is not None else ""
+
+    assert law_of(*running, back, end) == "kept"
+    assert not law_of(*running, back, (5.9, "rc_manager", "revoke", {"arc": "a-drive"}), end)
+    assert not law_of(*running, (6.0, "rc_manager", "begins", {}), end)
+    assert not law_of((4.9, "b", "killed", {}), *running, back, end)
+    assert judged(*running, back, end) is None
