@@ -1,8 +1,14 @@
 """A context switch on real processes: from the revocation of one ARC to the grant of the next.
 
 Runs the mission of IROS 2001, figure 2, with short slices, and reads what the RC manager measured: the
-behavior stops cleanly, the gate closes, four RCs disconnect, four connect, the ARC prepares and opens.
-The time the picture needs to settle is the mission's own and not counted; preparing is part of it.
+gate closes, four RCs disconnect, four connect, the ARC prepares and opens. The time the picture needs
+to settle is the mission's own and not counted; what is done meanwhile hides in it.
+
+Variants, which can be combined:
+
+* ``--no-settling``: the picture stands at once, so nothing hides and the whole chain is seen.
+* ``--clean-stop``: the watchers stop their robots' wheels before they give them up, and are waited for.
+
 Prints one JSON line; the floor is one question through the same hub, asked in the same run.
 """
 
@@ -10,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import json
 import os
 import re
 import subprocess
@@ -20,6 +25,8 @@ from pathlib import Path
 from statistics import quantiles
 from time import perf_counter
 
+from measuring import report
+
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -27,14 +34,26 @@ from backbone.component.messages import AskState, AskStatistics, ComponentState,
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 
 MISSION = Path(__file__).parents[1] / "mission.xml"
+WATCHER = "mission_control.behaviors.watch_for_motion:WatchForMotion"
 SLICE_S = 0.3
 
 
-def fast_mission(folder: Path) -> Path:
-    """Write the mission with short slices; return its path."""
+def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
+    """Write the mission with short slices; return its path.
+
+    Args:
+        folder: Where to.
+        settling: The picture of a new transmitter needs the time that the mission file says; else none.
+        clean_stop: The watchers have something to bring to rest at the end of a slice.
+    """
     text = MISSION.read_text()
     text = re.sub(r'minimum-runtime-s="[^"]*"', f'minimum-runtime-s="{SLICE_S}"', text)
     text = re.sub(r'(<mission[^>]*?\bname=")[^"]*', r"\g<1>switching", text, count=1)
+    if not settling:
+        text = re.sub(r'connect-s="[^"]*"', 'connect-s="0"', text)
+    if clean_stop:
+        assert WATCHER in text
+        text = text.replace(WATCHER, "halting_watcher:HaltingWatcher")
     file = folder / "mission.xml"
     file.write_text(text)
     return file
@@ -63,34 +82,38 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=30.0)
-    seconds = parser.parse_args().seconds
+    parser.add_argument("--no-settling", action="store_true", help="the picture stands at once")
+    parser.add_argument("--clean-stop", action="store_true", help="the watchers stop their robots first")
+    given = parser.parse_args()
+    variant = [name for name in ("no_settling", "clean_stop") if getattr(given, name)]
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
+        mission = fast_mission(Path(folder), settling=not given.no_settling, clean_stop=given.clean_stop)
+        own = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
         command = [
             str(Path(sys.executable).parent / "scout-backbone"),
             "up",
-            str(fast_mission(Path(folder))),
+            str(mission),
             "--headless",
         ]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as launcher:
+        with subprocess.Popen(
+            command, env={**os.environ, "PYTHONPATH": own}, stderr=subprocess.PIPE, text=True
+        ) as launcher:
             assert launcher.stderr is not None
             next(line for line in launcher.stderr if line.startswith("all ready"))
-            values, questions = asyncio.run(measure(seconds))
+            values, questions = asyncio.run(measure(given.seconds))
             launcher.terminate()
             launcher.stderr.read()
     floor_s = quantiles(questions, n=100)[49]
-    print(
-        json.dumps(
-            {
-                "bench": "switch_time",
-                "switches": int(values["switches"]),
-                "p50_ms": round(values["switch_p50_s"] * 1000, 2),
-                "p99_ms": round(values["switch_p99_s"] * 1000, 2),
-                "floor": "one question to the RC manager through the hub, in the same mission",
-                "floor_p50_ms": round(floor_s * 1000, 3),
-                "ratio": round(values["switch_p50_s"] / floor_s, 2),
-            }
-        )
+    report(
+        "switch_time",
+        variant="+".join(variant) or "as_shipped",
+        switches=int(values["switches"]),
+        p50_ms=round(values["switch_p50_s"] * 1000, 2),
+        p99_ms=round(values["switch_p99_s"] * 1000, 2),
+        floor="one question to the RC manager through the hub, in the same mission",
+        floor_p50_ms=round(floor_s * 1000, 3),
+        ratio=round(values["switch_p50_s"] / floor_s, 2),
     )
 
 
