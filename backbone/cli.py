@@ -300,27 +300,36 @@ def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> No
 
 
 @app.command(name="set")
-def set_(name: str, parameter: str, value: str, mission: MissionName = None, connect: Endpoint = None) -> None:
-    """Set a parameter of a running component, or 'priority' of a behavior or console."""
+def set_(
+    name: Annotated[str, typer.Argument(help="A component, an ARC, a console, or a node of the behavior tree.")],
+    parameter: Annotated[
+        str | None,
+        typer.Argument(help="priority, parent, minimum_runtime_s, maximum_runtime_s, or a parameter of the component."),
+    ] = None,
+    value: Annotated[str | None, typer.Argument(help="The new value, JSON or text; left out: show it.")] = None,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+) -> None:
+    """Set priority, parent or a run time of whoever asks for resources, or any parameter; without a value show it."""
+    if value is not None and as_json:
+        raise typer.BadParameter("--json shows attributes; leave the value out")
 
     async def work() -> int:
         import getpass
 
-        from backbone.component.messages import Parameters, SetParameter
-        from backbone.nameserver.messages import ADDRESS as NAMESERVER
-        from backbone.nameserver.messages import Resolve, Resolved
-        from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-        from backbone.rc_manager.messages import Done, SetPriority
+        from backbone.attributes import attributes_of, change
 
         async with visiting(mission, connect) as (bus, _clock):
-            if parameter == "priority":
-                await bus.ask(RC_MANAGER, SetPriority(name, int(value)), Done, within_s=2.0)
-                print(f"{name}: priority is {int(value)}")
-                return ExitCode.DONE
-            found = await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=2.0)
-            wish = SetParameter(parameter, _value(value), getpass.getuser())
-            now = await bus.ask(found.component.address, wish, Parameters, within_s=2.0)
-            print(f"{name}: {parameter} is {now.values[parameter]!r}")
+            if parameter is not None and value is not None:
+                lines = await change(bus, name, parameter, _value(value), getpass.getuser())
+            else:
+                shown = await attributes_of(bus, name)
+                if as_json:
+                    lines = [json.dumps(shown.to_json())]
+                else:
+                    lines = shown.lines() if parameter is None else shown.of(parameter)
+            print("\n".join(lines))
         return ExitCode.DONE
 
     run(work)

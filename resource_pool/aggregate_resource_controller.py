@@ -66,6 +66,7 @@ from resource_pool.messages import (
     Drive,
     Halt,
     Jump,
+    NeedsRestart,
     NoSuchAction,
     Noted,
     NotFromYou,
@@ -90,6 +91,7 @@ PREPARE_S = 0.9  # chosen: less than the RC manager waits for the opening beyond
 NOTICE_S = 1.0  # chosen: an owner that needs longer to take note is noticed by its beat
 NOTICE_AGAIN_S = 0.1  # chosen: a hub that is being restarted is back after some of these; machine seconds
 REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first have RCs started
+RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # of its parameters those that change while it runs
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; later it has overlooked this one
 
 
@@ -144,12 +146,14 @@ class AggregateResourceController(Component[ArcParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
+        self._in_force = self.parameters
         self._owner = self.parameters.owner
         self._gate = Gate(self.name)
         self._request: SchedulingRequest | None = None
         self._sets: list[dict[str, str]] = []
         self._rcs: dict[str, str] = {}
         self._asked = asyncio.Event()
+        self._telling: asyncio.Task[None] | None = None
         self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
         self._lease_until_s = 0.0
         self._leased = asyncio.Event()
@@ -248,6 +252,23 @@ class AggregateResourceController(Component[ArcParameters]):
                 self.end(f"released by {self._owner}: {reason}")
         return Accepted()
 
+    def parameters_changed(self) -> None:
+        """Ask by new run times from the next slice on; the RC manager hears of them as soon as it answers.
+
+        Raises:
+            NeedsRestart: Something else than a run time changed.
+            MissingRuntime: No slice can be planned for such run times.
+        """
+        before, now = self._in_force, self.parameters
+        fixed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)} - RUN_TIMES
+        if fixed:
+            raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed))} while it runs")
+        self._require_runtime(now.minimum_runtime_s, now.maximum_runtime_s)
+        self._in_force = now
+        if self._request is not None:
+            self._ask_by({name: getattr(now, name) for name in RUN_TIMES})
+            self._telling = self.start_task(self._tell_run_times(), "tell run times")
+
     def statistics(self) -> dict[str, float]:
         """Count commands passed on, and refused because nothing was held."""
         return {"commands": self._commands, "refused_swapped_out": self._refused}
@@ -322,12 +343,31 @@ class AggregateResourceController(Component[ArcParameters]):
         request = self._request
         assert request is not None  # noqa: S101  made in connect
         before = {name: getattr(request, name) for name in changed}
-        self._request = msgspec.structs.replace(request, **changed)
+        self._ask_by(changed)
         try:
             await self._tell_rc_manager(wish)
         except Refusal:
-            self._request = msgspec.structs.replace(self._request, **before)
+            self._ask_by(before)
             raise
+
+    def _ask_by(self, changed: Mapping[str, bool | float]) -> None:
+        """Change request and parameters alike: who asks for these sees what is asked for now."""
+        assert self._request is not None  # noqa: S101  made in connect
+        if self._telling is not None:
+            self._telling.cancel()  # what it tells is no longer so
+        self._request = msgspec.structs.replace(self._request, **changed)
+        self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
+
+    async def _tell_run_times(self) -> None:
+        request = self._request
+        assert request is not None  # noqa: S101  made in connect
+        change = ChangeRuntime(self.name, request.minimum_runtime_s, request.maximum_runtime_s)
+        try:
+            await ask_until_answered(
+                self.bus, self.clock, RC_MANAGER, change, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
+            )
+        except (Refusal, LinkError) as error:  # the next one that asks for the request hears of them
+            self.story.note(self.name, f"the RC manager did not take its run times: {error}")
 
     async def _tell_rc_manager(self, wish: Message) -> None:
         await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)

@@ -32,6 +32,7 @@ import msgspec
 
 from backbone.rc_manager import trace
 from backbone.rc_manager.alternatives import choose
+from backbone.rc_manager.attributes import attributes
 from backbone.rc_manager.decisions import (
     Adopted,
     CapacityChanged,
@@ -708,7 +709,7 @@ class ScheduleManager:
         Raises:
             UnknownRequest: There is none of this name.
         """
-        return self._explanation.attributes(name)
+        return attributes(self._table.arcs.values(), name)
 
     def require_movable(self, node: str, parent: str) -> None:
         """Return if the node of the behavior tree can be moved below this parent; nothing changes.

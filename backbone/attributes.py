@@ -1,0 +1,216 @@
+"""What can be seen and changed of a mission that is up: priorities, places in the tree, run times, parameters.
+
+Each change goes to whoever keeps the truth of it: priority and place to the RC manager, run times to
+the ARC, which asks by them, everything else to the component itself.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from backbone.bus.interface import Bus
+from backbone.component.messages import AskParameters, Parameters, SetParameter
+from backbone.errors import Refusal
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Resolve, Resolved, UnknownName
+from backbone.naming import Subsystem, address, component_of
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import (
+    AskAttributes,
+    Attributes,
+    Done,
+    MoveNode,
+    PathNode,
+    RcUse,
+    RequestAttributes,
+    SetPriority,
+    UnknownRequest,
+    Usage,
+)
+
+PRIORITY, PARENT = "priority", "parent"
+RUN_TIMES = ("minimum_runtime_s", "maximum_runtime_s")
+
+REPLY_TIME_S = 2.0  # chosen: a person waits this long
+
+
+class WrongAttribute(Refusal):
+    """There is no such attribute to be changed, or the value does not fit it; nothing changed."""
+
+    code = "attribute.wrong"
+    remedy = "See 'scout-backbone set NAME' for what there is; a priority is a whole number, a parent a node's name."
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What there is to see of one name; at least one of both.
+
+    Attributes:
+        name: What was asked about.
+        requests: What it, or all at and below it, ask for.
+        parameters: Of the component of this name; None: there is none.
+    """
+
+    name: str
+    requests: Sequence[RequestAttributes]
+    parameters: Mapping[str, Any] | None
+
+    def lines(self) -> list[str]:
+        """Return all of it for people."""
+        lines = [line for request in self.requests for line in _request_lines(request)]
+        if self.parameters is not None:
+            lines.append(f"{self.name}: parameters")
+            lines += [f"  {name:<19}{json.dumps(value)}" for name, value in self.parameters.items()]
+            if not self.parameters:
+                lines.append("  none")
+        return lines
+
+    def of(self, attribute: str) -> list[str]:
+        """Return one attribute for people: of the component, or of each of its requests.
+
+        Raises:
+            WrongAttribute: There is none of this name.
+        """
+        if self.parameters is not None and attribute in self.parameters:
+            return [f"{self.name}: {attribute} is {json.dumps(self.parameters[attribute])}"]
+        lines = [
+            f"{request.arc}: {attribute} is {told}" for request in self.requests for told in _told(request, attribute)
+        ]
+        if not lines:
+            raise WrongAttribute(f"{self.name} has no {attribute}", name=self.name)
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Return all of it as plain data."""
+        return {"name": self.name, "requests": [*map(_plain, self.requests)], "parameters": self.parameters}
+
+
+async def attributes_of(bus: Bus, name: str) -> Shown:
+    """Return what there is to see of a component, an ARC's request, or a node of the behavior tree.
+
+    Raises:
+        UnknownRequest: Nothing has this name.
+        LinkError: Nameserver, RC manager or component did not answer.
+    """
+    at = await _address(bus, name)
+    values = None if at is None else (await bus.ask(at, AskParameters(), Parameters, within_s=REPLY_TIME_S)).values
+    try:
+        found = await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
+    except UnknownRequest:
+        if values is None:
+            raise
+        return Shown(name, [], values)
+    return Shown(name, found.requests, values)
+
+
+async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> list[str]:
+    """Change one attribute of what runs; everybody plans by the new value from then on.
+
+    Args:
+        bus: To the mission.
+        name: Of a component, an ARC, a console, or a node of the behavior tree.
+        attribute: ``priority``, ``parent``, a run time, or a parameter of the component.
+        value: The new value.
+        user: Who wants it, for the record.
+
+    Returns:
+        What holds now, for people.
+
+    Raises:
+        Refusal: It cannot be so; nothing changed.
+        LinkError: Somebody did not answer; the outcome is unknown.
+    """
+    if attribute == PRIORITY:
+        return await _set_priority(bus, name, value)
+    if attribute == PARENT:
+        return await _move(bus, name, value)
+    shown = await attributes_of(bus, name)
+    own = [request.arc for request in shown.requests if component_of(request.owner) == name]
+    if attribute in RUN_TIMES and own:
+        return [line for arc in own for line in await _set_parameter(bus, arc, attribute, value, user)]
+    if shown.parameters is None:
+        raise WrongAttribute(f"{name} is no component and claims no ARC: it has no {attribute}", name=name)
+    return await _set_parameter(bus, name, attribute, value, user)
+
+
+async def _set_priority(bus: Bus, name: str, value: Any) -> list[str]:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise WrongAttribute(f"the priority of {name} cannot be {value!r}", name=name)
+    await bus.ask(RC_MANAGER, SetPriority(name, value), Done, within_s=REPLY_TIME_S)
+    try:
+        found = await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
+    except UnknownRequest:
+        return [f"{name}: nothing at or below it asks for run time yet; when it does, its priority is {value}"]
+    return [f"{name}: priority is {value}", *(f"  {one.arc} has {_path(one.path)}" for one in found.requests)]
+
+
+async def _move(bus: Bus, name: str, value: Any) -> list[str]:
+    await bus.ask(RC_MANAGER, MoveNode(name, str(value)), Done, within_s=REPLY_TIME_S)
+    found = await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
+    return [f"{name}: parent is {value}", *(f"  {one.arc} has {_path(one.path)}" for one in found.requests)]
+
+
+async def _set_parameter(bus: Bus, name: str, parameter: str, value: Any, user: str) -> list[str]:
+    at = await _address(bus, name) or address(Subsystem.RESOURCE_POOL, name)
+    now = await bus.ask(at, SetParameter(parameter, value, user), Parameters, within_s=REPLY_TIME_S)
+    return [f"{name}: {parameter} is {json.dumps(now.values[parameter])}"]
+
+
+async def _address(bus: Bus, name: str) -> str | None:
+    """Return where the component of this name is asked; None: there is none."""
+    try:
+        return (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component.address
+    except UnknownName:
+        return None
+
+
+def _plain(request: RequestAttributes) -> dict[str, Any]:
+    return msgspec.structs.asdict(request) | {
+        "state": str(request.state),
+        "uses": {rc: [msgspec.structs.asdict(usage) for usage in use.streams] for rc, use in request.uses.items()},
+        "path": [msgspec.structs.asdict(node) for node in request.path],
+    }
+
+
+# ---------------------------------------------------------------------- for people
+def _request_lines(request: RequestAttributes) -> Iterator[str]:
+    yield f"{request.arc}: {request.state}, for {request.owner}"
+    for attribute in (PRIORITY, PARENT, *RUN_TIMES):
+        for told in _told(request, attribute):
+            yield f"  {attribute:<19}{told}"
+    for rc, use in request.uses.items():
+        yield f"  {rc:<19}{_use(use)}"
+
+
+def _told(request: RequestAttributes, attribute: str) -> Iterator[str]:
+    match attribute:
+        case "priority":
+            yield f"{request.path[-1].priority} ({_path(request.path)})"
+        case "parent" if len(request.path) > 1:
+            yield request.path[-2].name
+        case "minimum_runtime_s" | "maximum_runtime_s":
+            yield f"{getattr(request, attribute):g}"
+
+
+def _path(path: Sequence[PathNode]) -> str:
+    return "/".join(f"{node.name}:{node.priority}" for node in path)
+
+
+def _use(use: RcUse) -> str:
+    return "; ".join(map(_stream, use.streams)) if use.streams else "for itself alone"
+
+
+def _stream(usage: Usage) -> str:
+    share = usage.packet_time_s / usage.period_s
+    extra = [
+        f"{what} {time_s * 1000:g} ms"
+        for what, time_s in (("deadline", usage.deadline_s), ("jitter", usage.jitter_s))
+        if time_s > 0
+    ]
+    every = f"{usage.packet_time_s * 1000:g} ms every {usage.period_s * 1000:g} ms, {share:.1%} of its time"
+    return ", ".join([f"{usage.kind}: {every}" if usage.kind else every, *extra])
