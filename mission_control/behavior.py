@@ -166,6 +166,19 @@ class Behavior(Component[B], Generic[B]):
             deadline_s: Seconds left.
         """
 
+    def not_now(self) -> float:
+        """Say whether the end of the slice comes at a bad moment.
+
+        When: shortly before the minimum run time is over, and before the end of whatever this asked for; only if
+        the maximum run time is longer, and only of behaviors that override this.
+        What: return an estimate of what is still needed, from what is known already. Not: wait; ask for time to
+        spare, others wait for it; count on it, as a higher behavior or a person overrides all the same.
+
+        Returns:
+            Seconds still needed beyond the end of the slice; 0: it may end.
+        """
+        return 0.0
+
     async def suspended(self, reason: str, by: str) -> None:
         """Take note that the RCs are gone.
 
@@ -243,7 +256,7 @@ class Behavior(Component[B], Generic[B]):
         await self.start()
         need = self.parameters.arc
         if need is not None and not self.status.is_final:
-            self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self)
+            self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)
             self._keeping = self._begin(self._keep(self.arc, need), "arc")
         self._carry_out(self._children.begin())
@@ -333,6 +346,7 @@ class Behavior(Component[B], Generic[B]):
             features=need.features,
             usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
             stops_at_once=self._commands_nothing,
+            may_say_not_now=type(self).not_now is not Behavior.not_now,
         )
         try:
             await arc.keep(self.clock, need.kind, parameters)

@@ -74,6 +74,7 @@ from resource_pool.messages import (
     NotYours,
     Release,
     Resumed,
+    SliceEnds,
     Suspended,
     Suspending,
     SwappedOut,
@@ -91,6 +92,7 @@ PREPARE_S = 0.9  # chosen: less than the RC manager waits for the opening beyond
 NOTICE_S = 1.0  # chosen: an owner that needs longer to take note is noticed by its beat
 NOTICE_AGAIN_S = 0.1  # chosen: a hub that is being restarted is back after some of these; machine seconds
 REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first have RCs started
+ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and an answer given earlier is worth less
 RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # of its parameters those that change while it runs
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; later it has overlooked this one
 
@@ -110,6 +112,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         further_usages: The same for each further kind of request.
         idle: True: no time is wanted yet.
         stops_at_once: True: nothing must be brought to rest at the end of a slice.
+        may_say_not_now: True: the owner wants to be asked shortly before the end of a slice that can be made longer.
     """
 
     owner: str
@@ -123,6 +126,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     further_usages: list[tuple[float, float, float, float, str]] = []
     idle: bool = False
     stops_at_once: bool = False
+    may_say_not_now: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +161,8 @@ class AggregateResourceController(Component[ArcParameters]):
         self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
         self._lease_until_s = 0.0
         self._leased = asyncio.Event()
+        self._slice_end_s = 0.0
+        self._offering: asyncio.Task[None] | None = None
         self._unfounded: dict[str, int] = {}
         self._unfounded_since_s = 0.0
         self._manager: Companion | None = None
@@ -247,7 +253,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 change = ChangeRuntime(self.name, least, most)
                 await self._change_request(change, minimum_runtime_s=least, maximum_runtime_s=most)
             case WantLonger(until_s=until_s):
-                await self._tell_rc_manager(Extend(self.name, until_s))
+                await self._extend(until_s)
             case Release(reason=reason):
                 self.end(f"released by {self._owner}: {reason}")
         return Accepted()
@@ -409,8 +415,11 @@ class AggregateResourceController(Component[ArcParameters]):
         await self.clock.sleep_until_s(order.settled_s)
         if not self._gate.open(order.epochs, self.clock.now_s()):
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
+        self._slice_end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._rcs.values())}")
-        self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
+        told = self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
+        if self.parameters.may_say_not_now:
+            self._offering = self.start_task(self._offer_more(told), "offer more")
         return GateOpen()
 
     async def _close(self, order: CloseGate) -> GateClosed:
@@ -429,9 +438,53 @@ class AggregateResourceController(Component[ArcParameters]):
         """Let nothing pass any more, and tell the owner if something did."""
         was_open = self._gate.is_open
         self._gate.close(reason, by, expected_s)
+        if self._offering is not None:
+            self._offering.cancel()
+            self._offering = None
         self.report(f"swapped out: {reason}{f' by {by}' if by else ''}")
         if was_open:
             self._notify(Suspended(self.name, reason, by, expected_s))
+
+    # ------------------------------------------------------------------ a slice that ends at a bad moment
+    async def _offer_more(self, resumed: asyncio.Event) -> None:
+        """Ask the owner shortly before its slice ends whether it needs more, and have that given to it.
+
+        It is asked again before the end of what it got. Not afterwards: when the RC manager says that the
+        slice is over, that is decided, and others were promised the RCs.
+        """
+        await resumed.wait()
+        while self._slice_end_s < self._longest_end_s():
+            ask_s = self._slice_end_s - ASK_BEFORE_END_S
+            if self.clock.now_s() < ask_s:
+                await self.clock.sleep_until_s(ask_s)
+                continue  # it may have been made longer meanwhile
+            wanted_s = await self._ask_whether_not_now()
+            if not wanted_s > 0:
+                return
+            try:
+                await self._extend(self._slice_end_s + max(wanted_s, ASK_BEFORE_END_S))
+            except (LinkError, Refusal) as error:
+                self.story.note(self.name, f"its slice was not made longer: {error}")
+                return
+
+    async def _ask_whether_not_now(self) -> float:
+        question = SliceEnds(self.name, self._slice_end_s, self._longest_end_s())
+        within_s = ASK_BEFORE_END_S / self.clock.rate
+        try:
+            return (await self.bus.ask(self._owner, question, Noted, within_s=within_s)).wanted_s
+        except (LinkError, Refusal) as error:
+            self.story.note(self._owner, f"did not say whether its slice may end: {error}")
+            return 0.0
+
+    async def _extend(self, until_s: float) -> None:
+        """Have the RC manager let the slice last until then, at most the maximum run time from the grant on."""
+        until_s = min(until_s, self._longest_end_s())
+        await self._tell_rc_manager(Extend(self.name, until_s))
+        self._slice_end_s = max(self._slice_end_s, until_s)
+
+    def _longest_end_s(self) -> float:
+        given = self.parameters
+        return self._gate.granted_s + max(given.minimum_runtime_s, given.maximum_runtime_s)
 
     async def _command(self, command: Drive | Halt | Jump) -> Applied:
         try:

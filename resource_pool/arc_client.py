@@ -39,6 +39,7 @@ from resource_pool.messages import (
     Noted,
     Release,
     Resumed,
+    SliceEnds,
     Suspended,
     Suspending,
     SwappedOut,
@@ -61,6 +62,7 @@ __all__ = [
     "Noted",
     "PathNode",
     "Resumed",
+    "SliceEnds",
     "Suspended",
     "Suspending",
     "SwappedOut",
@@ -100,12 +102,21 @@ class ArcListener(Protocol):
 class ArcClient:
     """A decision process's hold on one ARC. Make one with ``claim``."""
 
-    def __init__(self, bus: Bus, arc: str, listener: ArcListener) -> None:
+    def __init__(self, bus: Bus, arc: str, listener: ArcListener, not_now: Callable[[], float] | None = None) -> None:
+        """Begin with nothing claimed.
+
+        Args:
+            bus: Of the decision process.
+            arc: Name of the ARC.
+            listener: Told when the RCs come and go.
+            not_now: Says how many seconds are still needed beyond the end of the slice that is about to end; asked
+                only if the ARC was claimed with ``may_say_not_now``.
+        """
         self.arc = arc
         self.address = address(Subsystem.RESOURCE_POOL, arc)
         self.granted: Resumed | None = None
         self.suspended: Suspended | None = None
-        self._bus, self._listener = bus, listener
+        self._bus, self._listener, self._not_now = bus, listener, not_now
         self._granted = asyncio.Event()
         self._frames: Subscription | None = None
 
@@ -125,6 +136,7 @@ class ArcClient:
         console: bool = False,
         idle: bool = False,
         stops_at_once: bool = False,
+        not_now: Callable[[], float] | None = None,
     ) -> ArcClient:
         """Have an ARC of this kind started for the speaker of ``bus`` and its RCs asked for.
 
@@ -146,12 +158,13 @@ class ArcClient:
             idle: True to want no time yet.
             stops_at_once: True if nothing must be brought to rest at the end of a slice: ``arc_suspending``
                 is not called then, and the hand-over does not wait for the owner.
+            not_now: Asked shortly before a slice ends that can be made longer: seconds still needed; 0: none.
 
         Raises:
             Refusal: The ARC could not be started or its request can never be served.
             LinkError: The placer did not answer; the outcome is unknown.
         """
-        client = cls(bus, arc_name(bus, kind), listener)
+        client = cls(bus, arc_name(bus, kind), listener, not_now)
         parameters = claim_parameters(
             bus.source,
             path=path,
@@ -163,6 +176,7 @@ class ArcClient:
             console=console,
             idle=idle,
             stops_at_once=stops_at_once,
+            may_say_not_now=not_now is not None,
         )
         await client.start(kind, parameters)
         return client
@@ -213,6 +227,8 @@ class ArcClient:
                 self.granted, self.suspended = notice, None
                 self._granted.set()
                 await self._listener.arc_resumed(notice)
+            case SliceEnds():
+                return Noted(self._not_now() if self._not_now is not None and self.granted is not None else 0.0)
             case Suspending():
                 await self._listener.arc_suspending(notice)
             case Suspended():
@@ -345,8 +361,11 @@ def claim_parameters(
     console: bool = False,
     idle: bool = False,
     stops_at_once: bool = False,
+    may_say_not_now: bool = False,
 ) -> dict[str, Any]:
     """Return the parameters an ARC is started with for this owner; see ``ArcClient.claim``.
+
+    With ``may_say_not_now`` the owner is asked shortly before the end of each slice that can be made longer.
 
     Raises:
         ValueError: No usage is given, or two of one kind.
@@ -368,6 +387,7 @@ def claim_parameters(
         "further_usages": further,
         "idle": idle,
         "stops_at_once": stops_at_once,
+        "may_say_not_now": may_say_not_now,
     }
 
 

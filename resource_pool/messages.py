@@ -132,6 +132,20 @@ class Resumed(Message, frozen=True):
     until_s: float
 
 
+class SliceEnds(Message, frozen=True):
+    """The slice may end then: is that a bad moment? Asked only of owners that said they may answer "not now".
+
+    Attributes:
+        arc: The ARC.
+        until_s: Mission time at which the slice may end.
+        most_s: Mission time until which it can be made longer.
+    """
+
+    arc: str
+    until_s: float
+    most_s: float
+
+
 class Suspending(Message, frozen=True):
     """The slice ends: stop cleanly; answering means you have."""
 
@@ -155,10 +169,16 @@ class AskBeat(Message, frozen=True):
 
 
 class Noted(Message, frozen=True):
-    """Answer to every notice."""
+    """Answer to every notice.
+
+    Attributes:
+        wanted_s: To ``SliceEnds``: seconds still needed beyond that end ("not now"), an estimate; 0: none.
+    """
+
+    wanted_s: float = 0.0
 
 
-ArcNotice = Resumed | Suspending | Suspended | AskBeat
+ArcNotice = Resumed | SliceEnds | Suspending | Suspended | AskBeat
 
 
 # ---------------------------------------------------------------------- ARC → RCs
