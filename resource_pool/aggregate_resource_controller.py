@@ -601,7 +601,7 @@ class AggregateResourceController(Component[ArcParameters]):
         """Tell the RC manager that this ARC and its owner live, for as long as both do."""
         while True:
             try:
-                await self.bus.ask(self._owner, AskBeat(), Noted, within_s=OWNER_BEAT_S)
+                await self.bus.ask(self._owner, AskBeat(self._arc_state()), Noted, within_s=OWNER_BEAT_S)
             except Refusal as refusal:
                 self.end(f"its owner does not know it: {refusal.detail}")
             except LinkError as error:

@@ -222,7 +222,9 @@ class ArcClient:
         match notice:
             case Resumed():
                 if self.granted is not None and self.granted.epochs == notice.epochs:
-                    return Noted()  # told again: the answer to the first was lost
+                    if notice.until_s > self.granted.until_s:
+                        self.granted = notice
+                    return Noted()  # told again: the answer to the first was lost, or a beat said it before
                 await self._lost()
                 self.granted, self.suspended = notice, None
                 self._granted.set()
@@ -237,8 +239,9 @@ class ArcClient:
                 self.granted, self.suspended = None, notice
                 self._granted.clear()
                 await self._listener.arc_suspended(notice)
-            case AskBeat():
-                pass
+            case AskBeat(state=state):
+                if state is not None and state.arc == self.arc:
+                    await self._agree(state)
         return Noted()
 
     async def wait_granted(self) -> Resumed:
@@ -333,10 +336,14 @@ class ArcClient:
             except LinkError as error:
                 log.info("%s is back and does not answer: %s", self.arc, error)
                 continue
-            if state.granted and (self.granted is None or self.granted.epochs != state.epochs):
-                await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0))
-            elif self.granted is not None and not state.granted:
-                await self.handle(Suspended(self.arc, state.reason, state.by, state.expected_start_s))
+            await self._agree(state)
+
+    async def _agree(self, state: ArcState) -> None:
+        """Believe what the ARC says of itself, as if its notice had come."""
+        if state.granted and (self.granted is None or self.granted.epochs != state.epochs):
+            await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0))
+        elif self.granted is not None and not state.granted:
+            await self.handle(Suspended(self.arc, state.reason, state.by, state.expected_start_s))
 
     async def _lost(self) -> None:
         if self.granted is not None:

@@ -165,7 +165,13 @@ class Suspended(Message, frozen=True):
 
 
 class AskBeat(Message, frozen=True):
-    """Does your loop run?"""
+    """Does your loop run?
+
+    Attributes:
+        state: How the ARC is, so that an owner that was told otherwise knows better: a notice may come late.
+    """
+
+    state: ArcState | None = None
 
 
 class Noted(Message, frozen=True):
