@@ -46,9 +46,11 @@ from backbone.rc_manager.messages import (
     Leases,
     MissingRuntime,
     OpenGate,
+    PathNode,
     Scheduled,
     SchedulingRequest,
     SetIdle,
+    TakePath,
     UnknownRequest,
     Usage,
     Withdraw,
@@ -142,7 +144,7 @@ class AggregateResourceController(Component[ArcParameters]):
     """Base of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts = OpenGate | CloseGate | AskRequest | ArcQuestion
+    accepts = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC it needs, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
@@ -232,7 +234,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Obey the RC manager about the gate, and the owner about everything else."""
         match asked.body:
-            case OpenGate() | CloseGate() | AskRequest() if asked.source != RC_MANAGER:
+            case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:
                 raise NotFromYou(f"{self.name} does not take {type(asked.body).__name__} from {asked.source}")
             case OpenGate() as order:
                 return await self._open(order)
@@ -240,6 +242,8 @@ class AggregateResourceController(Component[ArcParameters]):
                 return await self._close(order)
             case AskRequest():
                 return self._current_request()
+            case TakePath(path=path):
+                return self._take_path(path)
             case AskArc():
                 return self._arc_state()
             case _ if asked.source != self._owner:
@@ -363,6 +367,13 @@ class AggregateResourceController(Component[ArcParameters]):
             self._telling.cancel()  # what it tells is no longer so
         self._request = msgspec.structs.replace(self._request, **changed)
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
+
+    def _take_path(self, path: list[PathNode]) -> Done:
+        if self._request is not None:
+            self._request = msgspec.structs.replace(self._request, path=path)
+        names_and_numbers = [(node.name, node.priority) for node in path]
+        self._in_force = self.parameters = msgspec.structs.replace(self.parameters, path=names_and_numbers)
+        return Done()
 
     async def _tell_run_times(self) -> None:
         request = self._request

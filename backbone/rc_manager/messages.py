@@ -3,7 +3,7 @@
 Who speaks to whom:
 
 * ARC → RC manager: ``SchedulingRequest``, ``Withdraw``, ``SetIdle``, ``ChangeRuntime``, ``Extend``.
-* RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``.
+* RC manager → ARC: ``OpenGate``, ``CloseGate``, ``AskRequest``, ``TakePath``.
 * RC manager → RC: ``Connect``, ``Disconnect``, ``AskRc``; ``Leases`` as a publication.
 * anybody → RC manager: ``AskSchedule``, ``AskWhy``, ``AskAttributes``, ``SetPriority``, ``MoveNode``.
 """
@@ -209,6 +209,12 @@ class GateClosed(Message, frozen=True):
 
 class AskRequest(Message, frozen=True):
     """What do you ask for and what do you hold? Asked by a restarted RC manager."""
+
+
+class TakePath(Message, frozen=True):
+    """An operator changed your owner's priority or place: ask by this path from now on, also a later RC manager."""
+
+    path: list[PathNode]
 
 
 class CurrentRequest(Message, frozen=True):

@@ -131,6 +131,12 @@ class PriorityTree:
             for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
         )
 
+    def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
+        """Return the way as a request names it, with its numbers as they were set: nobody is raised for waiting."""
+        return [
+            PathNode(name.removeprefix(CONSOLE), self._numbers[names[: depth + 1]]) for depth, name in enumerate(names)
+        ]
+
     def age(self, levels: Iterable[tuple[tuple[str, ...], int]]) -> bool:
         """Raise nodes whose ARCs wait long by some levels, others by none any more; return whether that changed any.
 

@@ -709,7 +709,7 @@ class ScheduleManager:
         Raises:
             UnknownRequest: There is none of this name.
         """
-        return attributes(self._table.arcs.values(), name)
+        return attributes(self._table.arcs.values(), name, self._tree.nodes)
 
     def require_movable(self, node: str, parent: str) -> None:
         """Return if the node of the behavior tree can be moved below this parent; nothing changes.

@@ -11,6 +11,7 @@ Source: RAM 2002, "The RC Scheduler".
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import logging
 from collections import Counter, deque
@@ -77,6 +78,7 @@ from backbone.rc_manager.messages import (
     Lease,
     Leases,
     MoveNode,
+    PathNode,
     RcManagerQuestion,
     RcState,
     RcUse,
@@ -84,7 +86,9 @@ from backbone.rc_manager.messages import (
     SchedulingRequest,
     SetIdle,
     SetPriority,
+    TakePath,
     TraceLine,
+    UnknownRequest,
     Withdraw,
 )
 from backbone.rc_manager.rules import SchedulingRules
@@ -94,6 +98,7 @@ from backbone.wire import Envelope, Message
 log = logging.getLogger(__name__)
 
 SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; after this the question was lost
+ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
 MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: what keeps an RC from connecting is mostly an old hold
 SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
@@ -237,9 +242,11 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(Extended(arc, until_s))
             case SetPriority(node=node, priority=priority):
                 self.happened(PriorityChanged(node, priority))
+                self._tell_paths(node)
             case MoveNode(node=node, parent=parent):
                 self.manager.require_movable(node, parent)
                 self.happened(NodeMoved(node, parent))
+                self._tell_paths(node)
             case AskSchedule():
                 return self.manager.schedule(self.clock.now_s())
             case AskWhy(name=name):
@@ -259,6 +266,18 @@ class RcManager(Component[RcManagerParameters]):
         finally:
             self._requesting[request.arc] -= 1
         return self.manager.scheduled(request.arc, self.clock.now_s())
+
+    def _tell_paths(self, node: str) -> None:
+        """Tell the ARCs at and below the node by which path they ask now: a later RC manager must hear of it."""
+        with contextlib.suppress(UnknownRequest):  # nobody asks there yet
+            for one in self.manager.attributes(node).requests:
+                self.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
+
+    async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
+        try:
+            await self.bus.ask(_arc(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
+        except (Refusal, LinkError) as error:
+            self.story.note(arc, f"did not take its new path; the next RC manager would not know it: {error}")
 
     def _admit(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
         self._remember(request, rcs)

@@ -148,6 +148,29 @@ def test_a_changed_run_time_outlives_the_rc_manager(play: Any) -> None:
     play(scene)
 
 
+def test_priorities_and_places_an_operator_set_outlive_the_rc_manager(play: Any) -> None:
+    async def scene(pool: Pool, high: Owner, low: Owner) -> None:
+        await set_(pool, "low", "parent", "above")
+        await set_(pool, "above", "priority", 7)
+        await set_(pool, "low", "priority", 3)
+        await pool.clock.sleep_s(1.0)
+        assert low.heard() == ["Resumed"]
+        before = (await attributes_of(pool.ear, "local")).requests
+        await pool.kill("rc_manager")
+        await pool.clock.sleep_s(0.3)
+        await pool.manager()
+        await pool.clock.sleep_s(1.0)
+        after = (await attributes_of(pool.ear, "local")).requests
+        assert {one.arc: one.path for one in after} == {one.arc: one.path for one in before}
+        assert {one.arc: [node.priority for node in one.path] for one in after} == {
+            "high-drive": [10, 7, 1],
+            "low-drive": [10, 7, 3],
+        }
+        assert low.heard() == ["Resumed"]  # it ran on
+
+    play(scene)
+
+
 def test_what_makes_no_sense_is_refused_and_changes_nothing(play: Any) -> None:
     async def scene(pool: Pool, high: Owner, low: Owner) -> None:
         before = (await attributes_of(pool.ear, "local")).requests

@@ -64,6 +64,8 @@ def test_after_any_moves_everybody_stands_where_a_plain_tree_has_them(seed):
             again = rng.choice(sorted(plain.number))
             plain.number[again] = rng.randint(0, 2)
             tree.change(again, plain.number[again])
+        told = rng.choice(sorted(plain.number))  # its ARC is told its place, and names that from now on
+        asked[told] = plain.nodes(told)
         for one in rng.sample(sorted(asked), 3):
             names, _ = tree.place(asked[one], console=False)
             assert list(names) == plain.way(one)
@@ -189,6 +191,13 @@ def test_attributes_say_what_is_asked_for_as_it_counts_now() -> None:
     assert len(bench.manager.attributes(MISSION).requests) == 2
     with pytest.raises(UnknownRequest):
         bench.manager.attributes("nobody")
+
+
+def test_attributes_show_what_was_set_not_what_waiting_adds() -> None:
+    bench = two_branches(aging_s=3.0)
+    bench.run(10.0)
+    [low] = bench.manager.attributes("low").requests
+    assert [node.priority for node in low.path] == [0, 1, 1]
 
 
 def moves(rng: Random, bench: Bench, nodes: Iterable[str]) -> None:
