@@ -14,9 +14,21 @@ from backbone.nameserver.messages import Components, ListComponents, Resolve, Re
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy, UnknownRequest, Why
+from backbone.rc_manager.messages import AskWhy, RequestState, UnknownRequest, Why
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
+
+RULES = {
+    "3": "each starts as early as it fits whole, and takes nothing from those before it",
+    "5": "a slice ends only if somebody entitled can use the RCs",
+    "6": "RCs are stopped and freed, then settle for the next one",
+    "8": "policy strict: nobody starts while a higher one of its group waits",
+    "9": "who is higher may keep others waiting for ever; that is allowed, and shown",
+    "11": "what is down or can give too little serves nobody",
+    "14": "who wants no time now keeps its request and frees its RCs",
+    "15": "a big group is not planned whole: each RC is reserved for the first in line",
+}
+"""The rules of scheduling that decide why something is as it is, by the numbers they have in the documentation."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +55,9 @@ class Reasons:
             if self.why.expected_start_s >= 0:
                 lines.append(f"  expected to start in {max(0.0, self.why.expected_start_s - now_s):.1f} s")
             if self.why.would_change:
-                lines.append(f"  {self.why.would_change}")
+                changes = "it starts as soon as" if self.why.state == RequestState.WAITING else "this changes when"
+                lines.append(f"  {changes} {self.why.would_change}")
+            lines.append(f"  rule {self.why.rule}: {RULES.get(self.why.rule, 'see the documentation')}")
         if self.component is not None:
             doing = f": {self.component.feedback}" if self.component.feedback else ""
             lines.append(f"{self.name} is {self.component.state} on {self.component.host}{doing}")

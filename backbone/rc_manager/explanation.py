@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from backbone.naming import component_of
+from backbone.rc_manager.blockers import altogether, direct
+from backbone.rc_manager.foresight import Foresight
 from backbone.rc_manager.master_schedule import ArcEntry, MasterSchedule, RcEntry, Slot
 from backbone.rc_manager.messages import (
     LEASE_S,
@@ -37,59 +40,83 @@ _REASONS = {
 }
 
 
+class _Told(NamedTuple):
+    """Lines for people, the rule that decides, and what would change it."""
+
+    lines: list[str]
+    rule: str
+    would_change: str
+
+
 class Explanation:
     """Answers about one master schedule."""
 
-    def __init__(self, table: MasterSchedule) -> None:
+    def __init__(self, table: MasterSchedule, *, grace_s: float, grid_s: float) -> None:
+        """Explain this schedule.
+
+        Args:
+            table: The master schedule; nothing in it changes.
+            grace_s: Time a decision process has to stop cleanly at the end of a slice.
+            grid_s: Slices end at multiples of this many seconds; 0: no grid.
+        """
         self._table = table
+        self._grace_s = grace_s
+        self._foresight = Foresight(table, grace_s=grace_s, grid_s=grid_s)
 
     # Views.
 
     def scheduled(self, arc: ArcEntry, now_s: float) -> Scheduled:
         """Return the place of one request."""
-        slots = self._slots_beside(arc, now_s)
-        slot = next((slot for slot in slots if slot.arc is arc), None)
+        slot, granted_s = self._place(arc, now_s)
         return Scheduled(
             rcs=list(arc.uses),
             state=arc.state,
-            position=slots.index(slot) + 1 if slot is not None else 0,
-            blockers=[other.name for other in self._table.blockers(slot, now_s)] if slot is not None else [],
-            expected_start_s=self._expected_s(arc, slot),
+            position=len(self._table.before(arc)) + 1 if slot is not None else 0,
+            blockers=[other.name for other in direct(self._table, slot, now_s)] if slot is not None else [],
+            expected_start_s=_expected_s(arc, granted_s),
         )
 
     def schedule(self, now_s: float) -> Schedule:
         """Return the whole schedule."""
         groups = self._table.groups()
-        slots = {slot.arc.name: slot for group in groups for slot in self._table.slots(group, now_s)}
-        arcs = list(self._table.arcs.values())
+        slot_of: dict[ArcEntry, Slot] = {}
+        grants_s: dict[ArcEntry, float] = {}
+        for group in groups:
+            slots = self._table.slots(group, now_s)
+            slot_of.update((slot.arc, slot) for slot in slots)
+            grants_s.update(self._foresight.grants_s(slots, now_s))
+        coming: dict[str, list[tuple[ArcEntry, float]]] = {rc: [] for rc in self._table.rcs}
+        for arc, granted_s in sorted(grants_s.items(), key=lambda item: item[1]):
+            for rc in arc.uses if granted_s < math.inf else ():
+                coming[rc].append((arc, granted_s))
         return Schedule(
             at_s=now_s,
-            rcs=[self._rc_view(rc, arcs, list(slots.values()), now_s) for rc in self._table.rcs.values()],
-            requests=[self._request_view(arc, slots.get(arc.name), now_s) for arc in arcs],
+            rcs=[self._rc_view(rc, coming[rc.name], now_s) for rc in self._table.rcs.values()],
+            requests=[
+                self._request_view(arc, slot_of.get(arc), grants_s.get(arc, math.inf), now_s)
+                for arc in self._table.arcs.values()
+            ],
             groups=[[arc.name for arc in group] for group in groups],
         )
 
-    def _rc_view(self, rc: RcEntry, arcs: Sequence[ArcEntry], slots: Sequence[Slot], now_s: float) -> RcView:
-        following = sorted(
-            (slot for slot in slots if rc.name in slot.arc.uses and slot.start_s < math.inf), key=lambda s: s.start_s
-        )
+    def _rc_view(self, rc: RcEntry, coming: Sequence[tuple[ArcEntry, float]], now_s: float) -> RcView:
+        holders = [*rc.holders]
         return RcView(
             rc=rc.name,
             kind=rc.kind,
             state="up" if rc.up else "down",
             sharable=rc.sharable,
             capacity=rc.capacity,
-            holders=[
-                Holder(arc.name, arc.epochs[rc.name], arc.since_s, now_s + LEASE_S)
-                for arc in arcs
-                if rc.name in arc.epochs
-            ],
+            holders=[Holder(arc.name, arc.epochs[rc.name], arc.since_s, now_s + LEASE_S) for arc in holders],
             last_epoch=rc.epoch,
-            next=[slot.arc.name for slot in following],
+            next=[arc.name for arc, _ in coming],
+            until_s=[self._until_s(arc) for arc in holders],
+            next_s=[granted_s for _, granted_s in coming],
         )
 
-    def _request_view(self, arc: ArcEntry, slot: Slot | None, now_s: float) -> RequestView:
-        why = self._why_arc(arc, slot, now_s)
+    def _request_view(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> RequestView:
+        blockers = direct(self._table, slot, now_s) if slot is not None else []
+        told = self._told(arc, blockers, granted_s, now_s)
         return RequestView(
             arc=arc.name,
             owner=arc.request.owner,
@@ -97,12 +124,15 @@ class Explanation:
             rcs=list(arc.uses),
             since_s=arc.since_s,
             until_s=self._until_s(arc),
-            expected_start_s=why.expected_start_s if arc.state is not RequestState.RUNNING else UNKNOWN_S,
-            because=why.lines[0],
-            blockers=why.blockers,
+            expected_start_s=_expected_s(arc, granted_s),
+            because=f"{arc.name} {arc.state}: {told.lines[0]}",
+            blockers=[other.name for other in blockers],
             minimum_runtime_s=arc.minimum_s,
             priority="/".join(f"{name}:{number}" for name, number in arc.path),
             turns=arc.turns,
+            rule=told.rule,
+            would_change=told.would_change,
+            raised=arc.raised,
         )
 
     # Why.
@@ -115,7 +145,7 @@ class Explanation:
         """
         if name in self._table.arcs:
             arc = self._table.arcs[name]
-            return self._why_arc(arc, self._table.slot_of(arc, now_s), now_s)
+            return self._why_arc(arc, now_s)
         owned = [
             arc for arc in self._table.arcs.values() if name in (arc.request.owner, component_of(arc.request.owner))
         ]
@@ -127,7 +157,7 @@ class Explanation:
 
     def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
         """Return the reasons for all its ARCs; state and rule are those of the one that waits longest."""
-        answers = [self._why_arc(arc, self._table.slot_of(arc, now_s), now_s) for arc in owned]
+        answers = [self._why_arc(arc, now_s) for arc in owned]
         first = min(answers, key=lambda why: (why.state != RequestState.WAITING, why.name))
         return Why(
             name=name,
@@ -142,15 +172,18 @@ class Explanation:
     def _why_rc(self, rc: RcEntry, now_s: float) -> Why:
         users = [arc for arc in self._table.arcs.values() if rc.name in arc.uses]
         holders = [arc for arc in users if arc.holds]
-        slots = [self._table.slot_of(arc, now_s) for arc in users if arc.queued]
-        coming = sorted((slot for slot in slots if slot is not None), key=lambda slot: slot.start_s)
+        waiting = [(arc, self._place(arc, now_s)[1]) for arc in users if arc.queued]
+        coming = sorted(waiting, key=lambda item: item[1])
         lines = [f"{rc.name} is {'up' if rc.up else 'down' if rc.failed else 'not started'}"]
-        lines += [f"{arc.name} holds it: {self._where(arc, now_s)}" for arc in holders]
         lines += [
-            f"{slot.arc.name} gets it at {_at(slot.start_s)}"
-            if slot.start_s < math.inf
-            else f"{slot.arc.name} waits for it without a predicted time"
-            for slot in coming
+            f"{arc.name} holds it under epoch {arc.epochs[rc.name]} since {_at(arc.began_s)}: {self._where(arc, now_s)}"
+            for arc in holders
+        ]
+        lines += [
+            f"{arc.name} gets it at about {_at(granted_s)}"
+            if granted_s < math.inf
+            else f"{arc.name} waits for it without a predicted time"
+            for arc, granted_s in coming
         ]
         if not holders and not coming:
             lines.append("nobody asks for it")
@@ -160,66 +193,91 @@ class Explanation:
             lines=lines,
             rule="11" if not rc.up else "3",
             blockers=[arc.name for arc in holders],
-            expected_start_s=next((s.start_s for s in coming if s.start_s < math.inf), UNKNOWN_S),
+            expected_start_s=next((granted_s for _, granted_s in coming if granted_s < math.inf), UNKNOWN_S),
             would_change="its process answers again" if not rc.up else "a request, or the end of one, that names it",
         )
 
-    def _why_arc(self, arc: ArcEntry, slot: Slot | None, now_s: float) -> Why:
-        match arc.state:
-            case RequestState.WAITING:
-                lines, rule, would_change = self._waits(arc, slot, now_s)
-            case RequestState.RUNNING:
-                lines, rule, would_change = self._runs(arc, now_s)
-            case RequestState.CONNECTING:
-                settled_s = arc.began_s + arc.settle_s
-                lines = [f"its RCs are being connected since {_at(arc.began_s)}, settled at {_at(settled_s)}"]
-                rule, would_change = "6", "its RCs settle, or a higher ARC asks"
-            case RequestState.REVOKING:
-                lines = [f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"]
-                rule, would_change = "6", "its RCs are free"
-            case RequestState.IDLE if arc.retry_s is not None:
-                lines = [f"it could not open its gate and is asked again at {_at(arc.retry_s)}"]
-                rule, would_change = "6", "its gate opens"
-            case RequestState.IDLE:
-                lines = [f"it wants no time since {_at(arc.since_s)}"]
-                rule, would_change = "14", "its owner wants time again"
-        blockers = self._table.blockers(slot, now_s) if slot is not None else []
+    def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
+        slot, granted_s = self._place(arc, now_s)
+        blockers = direct(self._table, slot, now_s) if slot is not None else []
+        told = self._told(arc, blockers, granted_s, now_s)
+        lines, would_change = [*told.lines], told.would_change
+        lines += [self._stands(other, arc, now_s) for other in blockers]
+        if arc.state is RequestState.WAITING:
+            blockers = altogether(self._table, arc, now_s, grace_s=self._grace_s)
+            would_change = self._would_let_it_start(arc, blockers, told.would_change)
+        if arc.swapped_out and arc.state is RequestState.WAITING:
+            lines.append(f"it lost its RCs last because {_reason(arc)}")
+        if arc.raised:
+            lines.append(f"it rose by {_levels(arc.raised)} because it waits long; it comes down again once served")
         return Why(
             name=arc.name,
             state=arc.state,
             lines=[f"{arc.name} {arc.state}: {lines[0]}", *lines[1:]],
-            rule=rule,
+            rule=told.rule,
             blockers=[other.name for other in blockers],
-            expected_start_s=self._expected_s(arc, slot),
+            expected_start_s=_expected_s(arc, granted_s),
             would_change=would_change,
         )
 
-    def _waits(self, arc: ArcEntry, slot: Slot | None, now_s: float) -> tuple[list[str], str, str]:
+    def _told(self, arc: ArcEntry, blockers: Sequence[ArcEntry], granted_s: float, now_s: float) -> _Told:
+        match arc.state:
+            case RequestState.WAITING:
+                return self._waits(arc, blockers, granted_s, now_s)
+            case RequestState.RUNNING:
+                return self._runs(arc, now_s)
+            case RequestState.CONNECTING:
+                settled_s = arc.began_s + arc.settle_s
+                what = f"its RCs are being connected since {_at(arc.began_s)}, settled at {_at(settled_s)}"
+                return _Told([what], "6", "its RCs settle, or a higher ARC asks")
+            case RequestState.REVOKING:
+                what = f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"
+                return _Told([what], "6", "its RCs are free")
+            case RequestState.IDLE if arc.retry_s is not None:
+                what = f"it could not open its gate and is asked again at {_at(arc.retry_s)}"
+                return _Told([what], "6", "its gate opens")
+            case RequestState.IDLE:
+                return _Told([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
+
+    def _waits(self, arc: ArcEntry, blockers: Sequence[ArcEntry], granted_s: float, now_s: float) -> _Told:
         age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
-        past = [f"it lost its RCs last because {_reason(arc)}"] if arc.swapped_out else []
         down = [rc for rc in arc.uses if not self._table.rcs[rc].up]
         if down:
-            return [f"{age} for {', '.join(down)}, not up", *past], "11", f"{', '.join(down)} answers"
-        if slot is None or not self._table.usable(arc):
-            crowded = [rc for rc in arc.uses if self._table.rcs[rc].sharable]
-            return [f"{age}: {', '.join(crowded)} could not serve it even alone", *past], "11", "the capacity grows"
-        blockers = self._table.blockers(slot, now_s)
+            return _Told([f"{age} for {', '.join(down)}, not up"], "11", f"{', '.join(down)} answers")
+        if not self._table.usable(arc):
+            crowded = ", ".join(rc for rc in arc.uses if self._table.rcs[rc].sharable)
+            return _Told([f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows")
+        whom = _names(blockers)
         if not blockers:
-            return [f"{age}: a higher ARC of its group waits", *past], "8", "the higher ARC starts, or idles"
-        because = [self._stands(other, arc, now_s) for other in blockers]
-        if slot.start_s == math.inf:
-            what = f"{age} for {_names(blockers)}, without a predicted start: no gap is long enough for it"
-            remedy = f"{_names(blockers)} releases or idles, or has no higher priority; or a shorter minimum run time"
-            return [what, *because, *past], "9", remedy
-        what = f"{age} for {_names(blockers)}, its slot begins at {_at(slot.start_s)}"
-        return [what, *because, *past], "3", f"{_names(blockers)} releases or idles earlier, or a higher ARC asks"
+            return _Told([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
+        if self._table.strict and any(higher(o.path, arc.path) and not o.touches & arc.touches for o in blockers):
+            what = f"{age}: nobody starts while {whom}, higher in its group, waits (policy strict)"
+            return _Told([what], "8", f"{whom} starts or idles")
+        if granted_s == math.inf:
+            what = f"{age} for {whom}, without a predicted start: no gap is long enough for it"
+            remedy = f"{_release(blockers)}, or a shorter minimum run time"
+            return _Told([what], "9", remedy)
+        if not self._table.planned_whole(arc) and all(other.queued for other in blockers):
+            what = f"{age}; first in line before it is {whom}, it is granted at about {_at(granted_s)}"
+            return _Told([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
+        what = f"{age} for {whom}, it is granted at about {_at(granted_s)}"
+        return _Told([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
 
-    def _runs(self, arc: ArcEntry, now_s: float) -> tuple[list[str], str, str]:
+    def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
+        """Return with what the ARC would start after one hand-over."""
+        needs = [f"{rc} answers" for rc in arc.uses if not self._table.rcs[rc].up]
+        if not needs and not self._table.usable(arc):
+            needs = [otherwise]
+        if blockers:
+            needs.append(_release(blockers))
+        return ", and ".join(needs) or otherwise
+
+    def _runs(self, arc: ArcEntry, now_s: float) -> _Told:
         if arc.served(now_s):
             what = f"since {_at(arc.granted_s)}; its slice is over, but nobody entitled can use its RCs"
-            return [what], "5", "an equal or higher ARC asks for its RCs"
+            return _Told([what], "5", "an equal or higher ARC asks for its RCs")
         what = f"since {_at(arc.granted_s)}, its slice ends at {_at(arc.end_s)}"
-        return [what], "3", f"at {_at(arc.end_s)} an equal may take over; a higher ARC at once"
+        return _Told([what], "3", f"at {_at(arc.end_s)} an equal may take over; a higher ARC at once")
 
     def _stands(self, other: ArcEntry, arc: ArcEntry, now_s: float) -> str:
         if higher(other.path, arc.path):
@@ -229,7 +287,8 @@ class Explanation:
         else:
             rank = "equal"
         shared = ", ".join(rc for rc in arc.uses if rc in other.uses)
-        return f"{other.name} ({rank}, shares {shared}) {self._where(other, now_s)}"
+        sharing = f"shares {shared}" if shared else "in its group"
+        return f"{other.name} ({rank}, {sharing}) {self._where(other, now_s)}"
 
     def _where(self, arc: ArcEntry, now_s: float) -> str:
         match arc.state:
@@ -245,16 +304,16 @@ class Explanation:
             case RequestState.IDLE:
                 return "wants no time"
 
-    def _slots_beside(self, arc: ArcEntry, now_s: float) -> list[Slot]:
-        return self._table.slots(self._table.group_of(arc), now_s)
-
-    def _expected_s(self, arc: ArcEntry, slot: Slot | None) -> float:
-        """Return when the next grant is predicted; negative: it has one, or none can be predicted."""
-        if arc.state is RequestState.CONNECTING:
-            return arc.began_s + arc.settle_s
-        if slot is None or slot.start_s == math.inf:
-            return UNKNOWN_S
-        return slot.start_s + arc.settle_s
+    def _place(self, arc: ArcEntry, now_s: float) -> tuple[Slot | None, float]:
+        """Return the place of the ARC in the plan, if it is queued, and its foreseen grant."""
+        if not arc.queued:
+            return None, math.inf
+        if not self._table.planned_whole(arc):
+            slots = [self._table.slot_of(arc, now_s)]
+        else:
+            slots = [*self._table.slots(self._table.group_of(arc), now_s)]
+        own = next(slot for slot in slots if slot is not None and slot.arc is arc)
+        return own, self._foresight.grants_s([slot for slot in slots if slot is not None], now_s)[arc]
 
     def _until_s(self, arc: ArcEntry) -> float:
         match arc.state:
@@ -266,12 +325,28 @@ class Explanation:
                 return UNKNOWN_S
 
 
+def _expected_s(arc: ArcEntry, granted_s: float) -> float:
+    """Return when the next grant is foreseen; negative: it has one, or none can be foreseen."""
+    if arc.state is RequestState.CONNECTING:
+        return arc.began_s + arc.settle_s
+    return granted_s if granted_s < math.inf else UNKNOWN_S
+
+
 def _reason(arc: ArcEntry) -> str:
     return _REASONS.get(arc.swapped_out, arc.swapped_out).format(by=arc.swapped_out_by)
 
 
 def _names(arcs: Sequence[ArcEntry]) -> str:
-    return " and ".join(arc.name for arc in arcs)
+    *firsts, last = [arc.name for arc in arcs]
+    return f"{', '.join(firsts)} and {last}" if firsts else last
+
+
+def _release(arcs: Sequence[ArcEntry]) -> str:
+    return f"{_names(arcs)} {'releases or idles' if len(arcs) == 1 else 'release or idle'}"
+
+
+def _levels(count: int) -> str:
+    return f"{count} level" if count == 1 else f"{count} levels"
 
 
 def _at(time_s: float) -> str:

@@ -241,8 +241,8 @@ class MasterSchedule:
         self.rcs: dict[str, RcEntry] = {}
         self.arcs: dict[str, ArcEntry] = {}
         self._slack_s = tolerance_s
-        self._strict = strict
-        self._discipline = discipline
+        self.strict = strict
+        self.discipline: Discipline = discipline
         self.admission: Analysis = admission
         self._exact_up_to = exact_up_to
         self._groups: Groups[ArcEntry] = Groups(exact_up_to)
@@ -303,7 +303,7 @@ class MasterSchedule:
         if arc.active and not was_active:
             self._groups.add(arc, arc.uses)
             self._demand_changed(arc.shares)
-            if self._discipline == "time":
+            if self.discipline == "time":
                 arc.had_s = joining_s(arc.had_s, map(self._had_s, self._rivals(arc)))
         if held != arc.holds:
             for rc in arc.uses:
@@ -349,7 +349,7 @@ class MasterSchedule:
 
     def _goes_on(self, arc: ArcEntry) -> bool:
         """Say whether the discipline gives an ARC whose slice is over one more at once."""
-        if self._discipline == "turns":
+        if self.discipline == "turns":
             return False
         own = self._seniority(arc)
         waiting = [rival for rival in self._rivals(arc) if rival.state is RequestState.WAITING and self.usable(rival)]
@@ -449,7 +449,7 @@ class MasterSchedule:
         """Return the key among equals: smaller comes first. Those RCs are being freed for by force come before all."""
         if arc.pledge is not None:
             return (False, -math.inf, -math.inf, arc.pledge)
-        if self._discipline == "turns":
+        if self.discipline == "turns":
             return (False, 0.0, *arc.stamp)
         had_s = self._had_s(arc)
         late = not eligible(had_s, map(self._had_s, self._rivals(arc)))
@@ -460,7 +460,7 @@ class MasterSchedule:
 
     def _rivals(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the equals that cannot run beside the ARC."""
-        return [other for other in self._beside(arc) if not rank(other.path, arc.path) and not self.fits(arc, [other])]
+        return [other for other in self.beside(arc) if not rank(other.path, arc.path) and not self.fits(arc, [other])]
 
     def plan(
         self, group: Sequence[ArcEntry], now_s: float, *, handed_over: bool = False, slack_s: float | None = None
@@ -620,7 +620,7 @@ class MasterSchedule:
             queued.pop()  # who comes after them changes nothing for them
         while queued:
             turn = self._due_of(queued, group, now_s)
-            if turn is None or self._discipline == "turns" or self._in_turn(turn, group, now_s):
+            if turn is None or self.discipline == "turns" or self._in_turn(turn, group, now_s):
                 return turn
             queued.remove(turn.arc)
         return None
@@ -629,7 +629,7 @@ class MasterSchedule:
         """Return whose time is now of these, given in order."""
 
         def starting(**how: Any) -> set[ArcEntry]:
-            slots = self._plan(queued, group, now_s, among_equals=self._discipline == "turns", **how)
+            slots = self._plan(queued, group, now_s, among_equals=self.discipline == "turns", **how)
             return {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S}
 
         now = starting()
@@ -669,7 +669,7 @@ class MasterSchedule:
 
     def reserves_by_pledge(self, arc: ArcEntry) -> bool:
         """Say whether only a pledge keeps equals from what is being freed for the ARC."""
-        return self._discipline == "time" or len(self._groups.of(arc)) > self._exact_up_to
+        return self.discipline == "time" or len(self._groups.of(arc)) > self._exact_up_to
 
     def _could_start(self, arc: ArcEntry, now_s: float) -> bool:
         """Say whether, of those it cannot share with, nobody holds an RC of it for longer than until now."""
@@ -692,7 +692,7 @@ class MasterSchedule:
                 continue
             if self._must_let_higher_go_first(arc, self._groups.of(arc).arcs):
                 continue
-            others = self._beside(arc)
+            others = self.beside(arc)
             in_the_way = self._in_the_way(arc, [], others, now_s)
             if in_the_way or self.fits(arc, [other for other in others if other.holds]):
                 return Turn(arc, in_the_way)
@@ -711,7 +711,7 @@ class MasterSchedule:
                 near.update(dict.fromkeys(arc for arc in self._groups.users(other) if not arc.touches & self._busy))
         return [arc for arc in near if arc.state is RequestState.WAITING]
 
-    def _beside(self, arc: ArcEntry) -> list[ArcEntry]:
+    def beside(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the others that use an RC of this one."""
         beside = dict.fromkeys(user for rc in arc.uses for user in self._groups.users(rc))
         beside.pop(arc, None)
@@ -728,7 +728,7 @@ class MasterSchedule:
         firsts = dict.fromkeys(self._first_in_line(rc) for rc in arc.uses)
         if any(from_one(first) for first in firsts if first is not None):
             return True
-        return any(from_one(one) for one in self._beside(arc) if one.queued and higher(one.path, arc.path))
+        return any(from_one(one) for one in self.beside(arc) if one.queued and higher(one.path, arc.path))
 
     def _first_in_line(self, rc: str) -> ArcEntry | None:
         """Return the first in order of those queued for the RC; None if nobody is."""
@@ -797,19 +797,38 @@ class MasterSchedule:
         return left[::-1]
 
     def _must_let_higher_go_first(self, arc: ArcEntry, group: Iterable[ArcEntry]) -> bool:
-        return self._strict and any(
+        return self.strict and any(
             other.state is RequestState.WAITING and higher(other.path, arc.path) and self.usable(other)
             for other in group
         )
 
-    def blockers(self, slot: Slot, now_s: float) -> list[ArcEntry]:
-        """Return the ARCs because of which the ARC cannot start now, those that alone suffice first."""
-        met = [other for other, _, _ in meeting(slot.against, now_s, now_s + slot.arc.length_s - self._slack_s)]
-        if not met and len(self._groups.of(slot.arc)) > self._exact_up_to:
-            firsts = dict.fromkeys(self._first_in_line(rc) for rc in slot.arc.uses)
-            return [first for first in firsts if first is not None and first is not slot.arc]
-        alone = [other for other in met if not self.fits(slot.arc, [other])]
-        return alone or met
+    # Views: who waits before whom, and when an ARC will start.
+
+    def planned_whole(self, arc: ArcEntry) -> bool:
+        """Say whether the group of an active ARC is planned whole."""
+        return len(self._groups.of(arc)) <= self._exact_up_to
+
+    def before(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the queued ARCs that come before a queued one, in order.
+
+        In a group too big to be planned whole: at one of its RCs; under ``strict`` also higher ones anywhere.
+        """
+        group = self._groups.of(arc).arcs
+        if self.planned_whole(arc):
+            order = self.in_order([other for other in group if other.queued])
+            return order[: order.index(arc)]
+        before: dict[ArcEntry, None] = {}
+        for rc in arc.uses:
+            order = self.in_order([user for user in self._groups.users(rc) if user.queued])
+            before.update(dict.fromkeys(order[: order.index(arc)]))
+        if self.strict:
+            before.update((other, None) for other in group if other.queued and higher(other.path, arc.path))
+        return self.in_order([*before])
+
+    def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return who is first in line at an RC of the ARC and is not the ARC itself."""
+        firsts = dict.fromkeys(self._first_in_line(rc) for rc in arc.uses)
+        return [first for first in firsts if first is not None and first is not arc]
 
     def slot_of(self, arc: ArcEntry, now_s: float) -> Slot | None:
         """Return the place of the ARC in the plan; None if it is not queued."""
@@ -836,12 +855,15 @@ class MasterSchedule:
         if not self.usable(arc):
             return Slot(arc, math.inf, holds)
         own = self._seniority(arc)
+        rivals = [
+            other for other in self.beside(arc) if other.queued and not self.fits(arc, [other]) and self.usable(other)
+        ]
+        if any(higher(other.path, arc.path) for other in rivals):
+            return Slot(arc, math.inf, holds)  # once those above it run, they need not end
         before = {
-            other: other.length_s
-            for other in self._beside(arc)
-            if other.queued
-            and rank(other.path, arc.path) >= (self._seniority(other) >= own)
-            and not self.fits(arc, [other])
+            other: other.length_s + other.release_s
+            for other in rivals
+            if not rank(other.path, arc.path) and self._seniority(other) < own
         }
         turns_s = [sum(before.get(user, 0.0) for user in self._groups.users(rc)) for rc in arc.uses]
         start_s = max([now_s, *(end_s for _, _, end_s in holds)]) + max(turns_s)

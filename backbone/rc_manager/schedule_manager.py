@@ -144,7 +144,7 @@ class ScheduleManager:
             admission=admission,
             exact_up_to=exact_up_to,
         )
-        self._explanation = Explanation(self._table)
+        self._explanation = Explanation(self._table, grace_s=grace_s, grid_s=grid_s)
         self._now_s = 0.0
         self._count = 0
         self._told: list[Instruction] = []

@@ -1,0 +1,85 @@
+"""Foresight: when those who wait will be granted, hand-overs included.
+
+The plan is made of slices only: it decides what may start, and a hand-over must not cost anybody a gap.
+Here the time is added that it takes until what was held before is free.
+
+Rule of this file: it foretells and decides nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from backbone.rc_manager.master_schedule import INSTANT_S, ArcEntry, MasterSchedule, Slot
+from backbone.rc_manager.messages import RequestState
+from backbone.rc_manager.priority import higher
+
+ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
+
+
+class Foresight:
+    """Foretells grants from one master schedule."""
+
+    def __init__(self, table: MasterSchedule, *, grace_s: float, grid_s: float) -> None:
+        """Foretell for this schedule.
+
+        Args:
+            table: The master schedule; nothing in it changes.
+            grace_s: Time a decision process has to stop cleanly at the end of a slice; half of it is expected.
+            grid_s: Slices end at multiples of this many seconds; 0: no grid.
+        """
+        self._table = table
+        self._pause_s = grace_s / 2
+        self._grid_s = grid_s
+
+    def grants_s(self, slots: Sequence[Slot], now_s: float) -> dict[ArcEntry, float]:
+        """Return when each of these will be granted if nothing else happens; infinite: not foreseeable.
+
+        Args:
+            slots: Places of all queued ARCs of a group, in order.
+            now_s: Time of the question.
+        """
+        starts_s: dict[ArcEntry, float] = {}
+        for slot in sorted(slots, key=lambda slot: slot.start_s):  # whom one waits for starts earlier
+            start_s = slot.start_s
+            if start_s < math.inf and self._table.planned_whole(slot.arc):
+                start_s = max([start_s, *self._frees_s(slot, starts_s, now_s)])
+            starts_s[slot.arc] = start_s
+        if self._table.strict:
+            self._let_higher_go_first(slots, starts_s)
+        return {arc: start_s + arc.settle_s for arc, start_s in starts_s.items()}
+
+    def _frees_s(self, slot: Slot, starts_s: dict[ArcEntry, float], now_s: float) -> list[float]:
+        """Return when what the ARC waits for will be free."""
+        arc = slot.arc
+        times_s = []
+        for other, begin_s, end_s in slot.against:
+            if end_s > slot.start_s + INSTANT_S:
+                continue  # it runs beside or after it
+            if begin_s > -math.inf:
+                over_s = self._end_s(starts_s.get(other, begin_s) + other.settle_s, other)
+            elif other.state is RequestState.REVOKING:
+                continue  # its release is in the plan
+            else:
+                over_s = end_s
+            if abs(end_s - slot.start_s) <= INSTANT_S or not self._table.fits(arc, [other]):
+                times_s.append(over_s + self._release_s(other, arc))
+        for holder in dict.fromkeys(holder for rc in arc.uses for holder in self._table.rcs[rc].holders):
+            displaced = slot.start_s <= now_s + INSTANT_S and holder is not arc
+            if displaced and holder.state is not RequestState.REVOKING and not self._table.fits(arc, [holder]):
+                times_s.append(now_s + self._release_s(holder, arc))
+        return times_s
+
+    def _end_s(self, granted_s: float, arc: ArcEntry) -> float:
+        end_s = granted_s + arc.minimum_s
+        return math.ceil(end_s / self._grid_s - ROUNDING) * self._grid_s if self._grid_s else end_s
+
+    def _release_s(self, held_by: ArcEntry, arc: ArcEntry) -> float:
+        overridden = higher(arc.path, held_by.path) or held_by.request.stops_at_once
+        return held_by.release_s + (0.0 if overridden else self._pause_s)
+
+    def _let_higher_go_first(self, slots: Sequence[Slot], starts_s: dict[ArcEntry, float]) -> None:
+        for slot in slots:  # in order: the higher ones' starts are known
+            above = [starts_s[s.arc] for s in slots if higher(s.arc.path, slot.arc.path) and self._table.usable(s.arc)]
+            starts_s[slot.arc] = max([starts_s[slot.arc], *above])
