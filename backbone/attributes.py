@@ -18,7 +18,7 @@ from backbone.component.messages import AskParameters, Parameters, SetParameter
 from backbone.errors import Refusal
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
-from backbone.naming import Subsystem, address, component_of
+from backbone.naming import component_of
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     AskAttributes,
@@ -94,18 +94,21 @@ async def attributes_of(bus: Bus, name: str) -> Shown:
     """Return what there is to see of a component, an ARC's request, or a node of the behavior tree.
 
     Raises:
-        UnknownRequest: Nothing has this name.
+        UnknownName: Nothing has this name; the nameserver tells the likeliest that was meant.
         LinkError: Nameserver, RC manager or component did not answer.
     """
-    at = await _address(bus, name)
-    values = None if at is None else (await bus.ask(at, AskParameters(), Parameters, within_s=REPLY_TIME_S)).values
+    values, requests, unknown = None, list[RequestAttributes](), None
     try:
-        found = await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
+        at = await _address(bus, name)
+        values = (await bus.ask(at, AskParameters(), Parameters, within_s=REPLY_TIME_S)).values
+    except UnknownName as refusal:
+        unknown = refusal
+    try:
+        requests = (await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)).requests
     except UnknownRequest:
-        if values is None:
-            raise
-        return Shown(name, [], values)
-    return Shown(name, found.requests, values)
+        if unknown is not None:
+            raise unknown from None
+    return Shown(name, requests, values)
 
 
 async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> list[str]:
@@ -156,17 +159,14 @@ async def _move(bus: Bus, name: str, value: Any) -> list[str]:
 
 
 async def _set_parameter(bus: Bus, name: str, parameter: str, value: Any, user: str) -> list[str]:
-    at = await _address(bus, name) or address(Subsystem.RESOURCE_POOL, name)
-    now = await bus.ask(at, SetParameter(parameter, value, user), Parameters, within_s=REPLY_TIME_S)
+    now = await bus.ask(
+        await _address(bus, name), SetParameter(parameter, value, user), Parameters, within_s=REPLY_TIME_S
+    )
     return [f"{name}: {parameter} is {json.dumps(now.values[parameter])}"]
 
 
-async def _address(bus: Bus, name: str) -> str | None:
-    """Return where the component of this name is asked; None: there is none."""
-    try:
-        return (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component.address
-    except UnknownName:
-        return None
+async def _address(bus: Bus, name: str) -> str:
+    return (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component.address
 
 
 def _plain(request: RequestAttributes) -> dict[str, Any]:

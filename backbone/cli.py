@@ -299,7 +299,7 @@ def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> No
     run(work)
 
 
-@app.command(name="set")
+@app.command(name="set", context_settings={"ignore_unknown_options": True})  # a priority may be below 0
 def set_(
     name: Annotated[str, typer.Argument(help="A component, an ARC, a console, or a node of the behavior tree.")],
     parameter: Annotated[

@@ -102,6 +102,25 @@ def test_a_parameter_of_a_running_behavior_is_set(mission: RunningMission) -> No
     assert "again_after_s" in wrong.stderr
 
 
+def test_what_a_behavior_asks_for_is_shown_and_changed(mission: RunningMission) -> None:
+    def set_(*words: str) -> subprocess.CompletedProcess[str]:
+        return mission.command("scout-backbone", "set", "--mission", mission.name, *words)
+
+    assert set_("watch-scout1", "minimum_runtime_s", "4").returncode == 0
+    assert set_("watch-scout1", "priority", "-3").stdout.splitlines()[0] == "watch-scout1: priority is -3"
+    moved = set_("watch-scout1", "parent", mission.name)
+    assert moved.returncode == 0, moved.stderr
+    [request] = json.loads(set_("watch-scout1", "--json").stdout)["requests"]
+    assert [node["name"] for node in request["path"]] == [mission.name, "watch-scout1"]
+    assert (request["path"][-1]["priority"], request["minimum_runtime_s"]) == (-3, 4.0)
+    assert "parent             surveillance" in set_("watch-scout2").stdout
+    refused = set_("surveillance", "parent", "watch-scout2")
+    assert (refused.returncode, "scheduling.not_movable" in refused.stderr) == (5, True)
+    assert set_("watch-scout1", "parent", "surveillance").returncode == 0
+    assert set_("watch-scout1", "priority", "1").returncode == 0
+    assert set_("watch-scout1", "minimum_runtime_s", "5").returncode == 0
+
+
 def test_a_stopped_rc_is_started_again_when_it_is_claimed(mission: RunningMission) -> None:
     """RAM 2002: the RC manager checks that the RCs requested are running and starts them if they are not."""
     stopped = mission.command("scout-backbone", "stop", "scout3", "--mission", mission.name)

@@ -14,6 +14,7 @@ from backbone.attributes import WrongAttribute, attributes_of, change
 from backbone.bus.clock import run_virtual
 from backbone.component.component import WrongParameter
 from backbone.keys import Conversation
+from backbone.nameserver.messages import UnknownName
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     FixedRules,
@@ -21,7 +22,6 @@ from backbone.rc_manager.messages import (
     NotMovable,
     PathNode,
     TraceLine,
-    UnknownRequest,
 )
 from resource_pool.messages import NeedsRestart
 
@@ -86,8 +86,8 @@ def test_a_branch_shows_all_that_is_asked_for_below_it_and_an_rc_its_parameters(
         robot = await attributes_of(pool.ear, "scout1")
         assert robot.requests == []
         assert robot.of("network_id") == ["scout1: network_id is 1"]
-        with pytest.raises(UnknownRequest):
-            await attributes_of(pool.ear, "nobody")
+        with pytest.raises(UnknownName, match="scout1"):
+            await attributes_of(pool.ear, "scuot1")
         with pytest.raises(WrongAttribute):
             robot.of("color")
 
