@@ -5,6 +5,7 @@ Imported by the command line only.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 
 from rich.console import Group, RenderableType
@@ -15,7 +16,7 @@ from rich.text import Text
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.mission_picture import MissionPicture
 from backbone.naming import Subsystem, component_of
-from backbone.rc_manager.messages import RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import RcView, RequestState, RequestView, Schedule
 
 _STATE_STYLE = {
     RequestState.RUNNING: "bold green",
@@ -29,6 +30,7 @@ _STATE_STYLE = {
 _FRAME_LINES = 2  # a panel's upper and lower edge
 _EVENTS_MOST = 12  # chosen: more than a glance takes in would push components off the picture
 _EVENTS_LEAST = 3
+_NEXT_MOST = 3  # chosen: who comes after these is seen in the schedule
 
 
 def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, height: int) -> RenderableType:
@@ -128,7 +130,9 @@ def _request_lines(schedule: Schedule, now_s: float) -> list[Text]:
         line.append(_when(request, now_s))
         reason = Text("  ", style="dim")
         reason.append(f"for {', '.join(request.blockers)}, " if request.blockers else "")
-        reason.append(f"{request.turns} turn{'' if request.turns == 1 else 's'} so far, {request.priority}")
+        reason.append(
+            f"{request.turns} turn{'' if request.turns == 1 else 's'} so far, {request.priority}{_risen(request)}"
+        )
         lines += [line, reason]
     return lines or [Text("nobody asks for anything", style="dim")]
 
@@ -180,8 +184,8 @@ def components_table(picture: MissionPicture) -> Table:
 def rcs_table(schedule: Schedule) -> Table:
     """Return who holds what now and who is next."""
     table = Table(title="resources", title_justify="left")
-    for column in ("RC", "kind", "state", "holder", "epoch", "since", "next"):
-        table.add_column(column, no_wrap=True)
+    for column in ("RC", "kind", "state", "holder", "epoch", "since", "until", "next"):
+        table.add_column(column, no_wrap=column != "next")
     for rc in schedule.rcs:
         table.add_row(
             rc.rc,
@@ -190,9 +194,19 @@ def rcs_table(schedule: Schedule) -> Table:
             ", ".join(holder.arc for holder in rc.holders) or "–",
             ", ".join(str(holder.epoch) for holder in rc.holders),
             ", ".join(f"{holder.since_s:.1f} s" for holder in rc.holders),
-            ", ".join(rc.next),
+            ", ".join(f"{until_s:.1f} s" if until_s >= 0 else "being freed" for until_s in rc.until_s),
+            ", ".join(_coming(rc)),
         )
     return table
+
+
+def _coming(rc: RcView) -> list[str]:
+    """Return the first ones that will hold the RC, and when; how many more there are."""
+    timed = zip(rc.next, rc.next_s, strict=False)
+    first = [f"{arc} at {start_s:.1f} s" for arc, start_s in itertools.islice(timed, _NEXT_MOST)] or rc.next[
+        :_NEXT_MOST
+    ]
+    return [*first, f"{len(rc.next) - len(first)} more"] if len(rc.next) > len(first) else first
 
 
 def requests_table(schedule: Schedule, now_s: float) -> Table:
@@ -207,10 +221,21 @@ def requests_table(schedule: Schedule, now_s: float) -> Table:
             f"{now_s - request.since_s:.1f} s",
             _when(request, now_s),
             str(request.turns),
-            request.priority,
-            request.because,
+            request.priority + _risen(request),
+            _reason(request),
         )
     return table
+
+
+def _risen(request: RequestView) -> str:
+    return f" (risen by {request.raised})" if request.raised else ""
+
+
+def _reason(request: RequestView) -> str:
+    """Return why it is so, and by which rule; of who waits without a predicted start also what would end that."""
+    reason = f"{request.because} (rule {request.rule})" if request.rule else request.because
+    starves = request.state is RequestState.WAITING and request.expected_start_s < 0
+    return f"{reason}; until {request.would_change}" if starves and request.would_change else reason
 
 
 def events_table(events: list[StoryEvent]) -> Table:

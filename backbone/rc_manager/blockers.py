@@ -10,7 +10,7 @@ Rule of this file: it errs towards naming one too many, never one too few.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from backbone.rc_manager.master_schedule import CONNECTED, HOLDING, INSTANT_S, ArcEntry, MasterSchedule, Slot, meeting
 from backbone.rc_manager.messages import RequestState
@@ -30,7 +30,7 @@ def direct(table: MasterSchedule, slot: Slot, now_s: float) -> list[ArcEntry]:
     if not table.planned_whole(arc):
         met += [first for first in table.firsts_before(arc) if first not in met]
     alone = [other for other in met if not table.fits(arc, [other])]
-    return alone or met or [higher_one for higher_one in _higher_ones(table, arc) if table.strict][:1]
+    return alone or met or ([*itertools.islice(_higher_ones(table, arc), 1)] if table.strict else [])
 
 
 def altogether(table: MasterSchedule, arc: ArcEntry, now_s: float, *, grace_s: float) -> list[ArcEntry]:
@@ -112,12 +112,11 @@ def _rivals(table: MasterSchedule, arc: ArcEntry) -> list[ArcEntry]:
     return [one for one in rivals if table.usable(one)]
 
 
-def _higher_ones(table: MasterSchedule, arc: ArcEntry) -> list[ArcEntry]:
-    return [
-        other
-        for other in table.group_of(arc)
-        if other.state is RequestState.WAITING and higher(other.path, arc.path) and table.usable(other)
-    ]
+def _higher_ones(table: MasterSchedule, arc: ArcEntry) -> Iterator[ArcEntry]:
+    """Return who is higher and waits in its group."""
+    for other in table.group_of(arc):
+        if other.state is RequestState.WAITING and higher(other.path, arc.path) and table.usable(other):
+            yield other
 
 
 def _starts_without(
@@ -153,7 +152,6 @@ def _fits_throughout(table: MasterSchedule, slot: Slot, start_s: float, end_s: f
     met += meeting(reserved, start_s, end_s)
     moments = dict.fromkeys([start_s, *(begin_s for _, begin_s, _ in met if begin_s > start_s)])
     return all(
-        table.fits(arc, beside)
-        for arc, moment_s in itertools.product([slot.arc], moments)
-        for beside in [[o for o, begin_s, over_s in met if begin_s <= moment_s + INSTANT_S < over_s]]
+        table.fits(slot.arc, [one for one, begin_s, over_s in met if begin_s <= moment_s + INSTANT_S < over_s])
+        for moment_s in moments
     )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from backbone.rc_manager.above import Above
 from backbone.rc_manager.master_schedule import INSTANT_S, ArcEntry, MasterSchedule, Slot
 from backbone.rc_manager.messages import RequestState
 from backbone.rc_manager.priority import higher
@@ -80,6 +81,8 @@ class Foresight:
         return held_by.release_s + (0.0 if overridden else self._pause_s)
 
     def _let_higher_go_first(self, slots: Sequence[Slot], starts_s: dict[ArcEntry, float]) -> None:
+        above = Above()
         for slot in slots:  # in order: the higher ones' starts are known
-            above = [starts_s[s.arc] for s in slots if higher(s.arc.path, slot.arc.path) and self._table.usable(s.arc)]
-            starts_s[slot.arc] = max([starts_s[slot.arc], *above])
+            starts_s[slot.arc] = max(starts_s[slot.arc], above.largest(slot.arc.path))
+            if self._table.usable(slot.arc):
+                above.add(slot.arc.path, starts_s[slot.arc])

@@ -30,6 +30,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple
 
+from backbone.rc_manager.above import Above
 from backbone.rc_manager.discipline import Discipline, deadline_s, eligible, joining_s
 from backbone.rc_manager.groups import Group, Groups
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
@@ -836,38 +837,62 @@ class MasterSchedule:
             return None
         group = self.group_of(arc)
         if len(group) > self._exact_up_to:
-            return self._estimate(arc, now_s)
+            return self._estimate([*self.before(arc), arc], now_s)[-1]
         return next(slot for slot in self.plan(group, now_s) if slot.arc is arc)
 
     def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
         """Return the place of every queued ARC of a group, in order; of a big group an estimate."""
         if len(group) <= self._exact_up_to:
             return self.plan(group, now_s)
-        return [self._estimate(arc, now_s) for arc in self.in_order([arc for arc in group if arc.queued])]
+        return self._estimate(self.in_order([arc for arc in group if arc.queued]), now_s)
 
-    def _estimate(self, arc: ArcEntry, now_s: float) -> Slot:
-        """Return where the ARC will be if at each of its RCs all those before it take one turn after the other."""
-        holds = [
+    def _estimate(self, order: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+        """Return where these will be, given in order, if at each RC one turn after the other is taken.
+
+        What sharers of an RC take of its time is counted by what they send, not stream by stream.
+        """
+        ends_s: dict[str, float] = {}
+        taken_s: dict[str, float] = {}
+        exclusive: dict[str, Above] = {rc: Above() for arc in order for rc in arc.uses}
+        sharers: dict[str, Above] = {rc: Above() for arc in order for rc in arc.shares}
+        slots = []
+        for arc in order:
+            if not self.usable(arc):
+                slots.append(Slot(arc, math.inf, self._standing(arc, now_s)))
+                continue
+            crowded = [rc for rc in arc.shares if not self._has_room_for_all(rc)]
+            alone = [rc for rc in arc.uses if rc not in arc.shares]
+            above = [*(exclusive[rc] for rc in arc.uses), *(sharers[rc] for rc in alone if rc in sharers)]
+            standing = self._standing(arc, now_s)
+            frees_s = [
+                end_s + (0.0 if holder.state is RequestState.REVOKING else holder.release_s)
+                for holder, _, end_s in standing
+            ]
+            start_s = max([now_s, *frees_s, *(ends_s.get(rc, now_s) for rc in arc.uses)])
+            if crowded or alone:
+                start_s = max([start_s, *(now_s + taken_s.get(rc, 0.0) for rc in [*crowded, *alone])])
+            if any(one.largest(arc.path) > -math.inf for one in above):
+                start_s = math.inf  # once those above it run, they need not end
+            slots.append(Slot(arc, start_s, [hold for hold in standing if hold[2] > now_s + INSTANT_S]))
+            for rc in arc.uses:
+                (sharers if rc in arc.shares else exclusive)[rc].add(arc.path, start_s)
+            if start_s < math.inf:
+                ends_s.update((rc, start_s + arc.length_s + arc.release_s) for rc in alone)
+                for rc in crowded:
+                    taken_s[rc] = taken_s.get(rc, 0.0) + arc.length_s * self._share(arc, rc)
+        return slots
+
+    def _share(self, arc: ArcEntry, rc: str) -> float:
+        """Return the part of what the RC can give that the ARC asks for, 0 to 1."""
+        return min(1.0, sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams) / self.rcs[rc].capacity)
+
+    def _standing(self, arc: ArcEntry, now_s: float) -> list[Hold]:
+        """Return the holders that the ARC cannot run beside."""
+        return [
             (holder, -math.inf, self.stands_until_s(holder, arc, now_s))
             for holder in dict.fromkeys(holder for rc in arc.uses for holder in self.rcs[rc].holders)
             if holder is not arc and not self.fits(arc, [holder])
         ]
-        if not self.usable(arc):
-            return Slot(arc, math.inf, holds)
-        own = self._seniority(arc)
-        rivals = [
-            other for other in self.beside(arc) if other.queued and not self.fits(arc, [other]) and self.usable(other)
-        ]
-        if any(higher(other.path, arc.path) for other in rivals):
-            return Slot(arc, math.inf, holds)  # once those above it run, they need not end
-        before = {
-            other: other.length_s + other.release_s
-            for other in rivals
-            if not rank(other.path, arc.path) and self._seniority(other) < own
-        }
-        turns_s = [sum(before.get(user, 0.0) for user in self._groups.users(rc)) for rc in arc.uses]
-        start_s = max([now_s, *(end_s for _, _, end_s in holds)]) + max(turns_s)
-        return Slot(arc, start_s, [hold for hold in holds if hold[2] > now_s + INSTANT_S])
 
 
 def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
