@@ -13,7 +13,7 @@ from typing import NamedTuple
 from backbone.naming import component_of
 from backbone.rc_manager.blockers import altogether, direct
 from backbone.rc_manager.foresight import Foresight
-from backbone.rc_manager.master_schedule import ArcEntry, MasterSchedule, RcEntry, Slot
+from backbone.rc_manager.master_schedule import INSTANT_S, ArcEntry, MasterSchedule, RcEntry, Slot
 from backbone.rc_manager.messages import (
     LEASE_S,
     Holder,
@@ -116,7 +116,7 @@ class Explanation:
 
     def _request_view(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> RequestView:
         blockers = direct(self._table, slot, now_s) if slot is not None else []
-        told = self._told(arc, blockers, granted_s, now_s)
+        told = self._told(arc, slot, blockers, granted_s, now_s)
         return RequestView(
             arc=arc.name,
             owner=arc.request.owner,
@@ -200,7 +200,7 @@ class Explanation:
     def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
         slot, granted_s = self._place(arc, now_s)
         blockers = direct(self._table, slot, now_s) if slot is not None else []
-        told = self._told(arc, blockers, granted_s, now_s)
+        told = self._told(arc, slot, blockers, granted_s, now_s)
         lines, would_change = [*told.lines], told.would_change
         lines += [self._stands(other, arc, now_s) for other in blockers]
         if arc.state is RequestState.WAITING:
@@ -220,10 +220,12 @@ class Explanation:
             would_change=would_change,
         )
 
-    def _told(self, arc: ArcEntry, blockers: Sequence[ArcEntry], granted_s: float, now_s: float) -> _Told:
+    def _told(
+        self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
+    ) -> _Told:
         match arc.state:
             case RequestState.WAITING:
-                return self._waits(arc, blockers, granted_s, now_s)
+                return self._waits(arc, slot, blockers, granted_s, now_s)
             case RequestState.RUNNING:
                 return self._runs(arc, now_s)
             case RequestState.CONNECTING:
@@ -239,18 +241,21 @@ class Explanation:
             case RequestState.IDLE:
                 return _Told([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
 
-    def _waits(self, arc: ArcEntry, blockers: Sequence[ArcEntry], granted_s: float, now_s: float) -> _Told:
+    def _waits(
+        self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
+    ) -> _Told:
         age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
         down = [rc for rc in arc.uses if not self._table.rcs[rc].up]
         if down:
             return _Told([f"{age} for {', '.join(down)}, not up"], "11", f"{', '.join(down)} answers")
-        if not self._table.usable(arc):
+        if slot is None or not self._table.usable(arc):
             crowded = ", ".join(rc for rc in arc.uses if self._table.rcs[rc].sharable)
             return _Told([f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows")
         whom = _names(blockers)
         if not blockers:
             return _Told([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
-        if self._table.strict and any(higher(o.path, arc.path) and not o.touches & arc.touches for o in blockers):
+        fits_now = slot.start_s <= now_s + INSTANT_S
+        if self._table.strict and fits_now and all(o.queued and higher(o.path, arc.path) for o in blockers):
             what = f"{age}: nobody starts while {whom}, higher in its group, waits (policy strict)"
             return _Told([what], "8", f"{whom} starts or idles")
         if granted_s == math.inf:
@@ -258,9 +263,9 @@ class Explanation:
             remedy = f"{_release(blockers)}, or a shorter minimum run time"
             return _Told([what], "9", remedy)
         if not self._table.planned_whole(arc) and all(other.queued for other in blockers):
-            what = f"{age}; first in line before it is {whom}, it is granted at about {_at(granted_s)}"
+            what = f"{age}; first in line before it: {whom}; granted at about {_at(granted_s)}"
             return _Told([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
-        what = f"{age} for {whom}, it is granted at about {_at(granted_s)}"
+        what = f"{age} for {whom}, granted at about {_at(granted_s)}"
         return _Told([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
 
     def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:

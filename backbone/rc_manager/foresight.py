@@ -83,6 +83,18 @@ class Foresight:
     def _let_higher_go_first(self, slots: Sequence[Slot], starts_s: dict[ArcEntry, float]) -> None:
         above = Above()
         for slot in slots:  # in order: the higher ones' starts are known
-            starts_s[slot.arc] = max(starts_s[slot.arc], above.largest(slot.arc.path))
+            start_s = above.largest(slot.arc.path)
+            if start_s > starts_s[slot.arc]:
+                starts_s[slot.arc] = self._beside_reserved_s(slot, start_s)
             if self._table.usable(slot.arc):
                 above.add(slot.arc.path, starts_s[slot.arc])
+
+    def _beside_reserved_s(self, slot: Slot, start_s: float) -> float:
+        """Return the first time from then on at which what is reserved for others leaves the ARC its room."""
+        for other, begin_s, end_s in sorted(slot.against, key=lambda hold: hold[1]):
+            meets = (
+                begin_s < start_s + slot.arc.length_s and end_s > start_s and not self._table.fits(slot.arc, [other])
+            )
+            if meets:
+                start_s = math.inf if higher(other.path, slot.arc.path) else end_s + self._release_s(other, slot.arc)
+        return start_s

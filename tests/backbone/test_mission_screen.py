@@ -100,3 +100,32 @@ def test_who_does_not_listen_to_events_sees_no_place_for_them() -> None:
 def test_the_whole_picture_names_what_the_fitted_one_leaves_out() -> None:
     shown = drawn(screen(picture(*MANY)), 160)
     assert all(f"part{number:02}" in shown for number in range(40))
+
+
+def test_the_whole_picture_tells_until_when_an_rc_is_held_who_follows_and_what_ends_a_wait_without_end() -> None:
+    holder = Holder("guard-capture", 7, 3.0, 7.0)
+    rc = RcView(
+        "scout1", "scout", "up", False, 1.0, [holder], 7, ["tour-capture", *"abc"], [8.0], [8.5, 9.0, 9.5, 10.0]
+    )
+    starving = RequestView(
+        "tour-capture",
+        "mission_control/tour",
+        RequestState.WAITING,
+        ["scout1"],
+        1.0,
+        -1.0,
+        -1.0,
+        "it waits for guard-capture",
+        ["guard-capture"],
+        5.0,
+        "m:1",
+        2,
+        "9",
+        "guard-capture releases or idles",
+        1,
+    )
+    shown = drawn(screen(MissionPicture("m", 6.0, {}, {}, Schedule(6.0, [rc], [starving], []), ())), width=220)
+    assert "tour-capture at 8.5 s, a at 9.0 s, b at 9.5 s, 1 more" in shown
+    assert "│ 8.0 s │" in shown
+    assert "m:1 (risen by 1)" in shown
+    assert "it waits for guard-capture (rule 9); until guard-capture releases or idles" in shown
