@@ -54,7 +54,6 @@ WORLD = "resource_pool/world"
 SETTLING_S = 0.3  # connect-s of the video frequency in mission.xml; its release takes no time
 SWITCH_S = 0.05  # beside settling: SCHEDULING.md's tolerance of real processes
 SLICE_TOLERANCE_S = 0.1
-TELEMETRY_S = 2.0
 
 
 # ---------------------------------------------------------------------- what a trace tells
@@ -255,7 +254,7 @@ async def test_two_groups_switch_on_their_own_clocks(tmp_path: Path, judged: Jud
     """SCHEDULING.md, rule 7; scenario S9. With and without the other in turn, so that both see the machine's moods.
 
     The medians are compared: a single late wake-up of a shared machine says nothing about the other group, and
-    both groups do need the same two cores. Within 1 ms, about two bare questions through the hub, is noise; so is
+    both groups do need the same two cores. Within 1 ms, about one question through the hub, is noise; so is
     a fifth, by which the medians of two equal runs differ here.
     """
     alone: list[float] = []
