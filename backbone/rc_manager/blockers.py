@@ -30,7 +30,11 @@ def direct(table: MasterSchedule, slot: Slot, now_s: float) -> list[ArcEntry]:
     if not table.planned_whole(arc):
         met += [first for first in table.firsts_before(arc) if first not in met]
     alone = [other for other in met if not table.fits(arc, [other])]
-    return alone or met or ([*itertools.islice(_higher_ones(table, arc), 1)] if table.strict else [])
+    if not met and table.strict:
+        return [*itertools.islice(_higher_ones(table, arc), 1)]
+    if not met and not table.planned_whole(arc):
+        return table.before(arc)[:1]
+    return alone or met
 
 
 def altogether(table: MasterSchedule, arc: ArcEntry, now_s: float, *, grace_s: float) -> list[ArcEntry]:

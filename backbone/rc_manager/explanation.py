@@ -251,9 +251,9 @@ class Explanation:
         if slot is None or not self._table.usable(arc):
             crowded = ", ".join(rc for rc in arc.uses if self._table.rcs[rc].sharable)
             return _Told([f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows")
-        whom = _names(blockers)
         if not blockers:
             return _Told([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
+        whom = _names(blockers)
         fits_now = slot.start_s <= now_s + INSTANT_S
         if self._table.strict and fits_now and all(o.queued and higher(o.path, arc.path) for o in blockers):
             what = f"{age}: nobody starts while {whom}, higher in its group, waits (policy strict)"
@@ -342,6 +342,7 @@ def _reason(arc: ArcEntry) -> str:
 
 
 def _names(arcs: Sequence[ArcEntry]) -> str:
+    """Return the names of at least one ARC."""
     *firsts, last = [arc.name for arc in arcs]
     return f"{', '.join(firsts)} and {last}" if firsts else last
 
