@@ -109,11 +109,18 @@ def _rivals(table: MasterSchedule, arc: ArcEntry) -> list[ArcEntry]:
     if table.discipline == "time":  # equals reserve nothing from each other: also who comes later may be quicker
         equals = [one for one in table.beside(arc) if one.queued and not higher(arc.path, one.path)]
         rivals = [*dict.fromkeys([*rivals, *equals])]
+    else:
+        rivals += [one for one in _older_equals(table, arc) if one not in rivals]
     if not table.strict:
         rivals = [one for one in rivals if one.touches & arc.touches]
     if down or not table.usable(arc):
         return [one for one in rivals if all(table.rcs[rc].up or rc in down for rc in one.uses)]
     return [one for one in rivals if table.usable(one)]
+
+
+def _older_equals(table: MasterSchedule, arc: ArcEntry) -> list[ArcEntry]:
+    """Return equals that are behind the ARC only as long as somebody waits who is higher than they are."""
+    return [one for one in table.beside(arc) if one.queued and one.stamp < arc.stamp and not rank(one.path, arc.path)]
 
 
 def _higher_ones(table: MasterSchedule, arc: ArcEntry) -> Iterator[ArcEntry]:
@@ -142,6 +149,11 @@ def _starts_without(
         slots = table.plan(rest, now_s, handed_over=handed_over, slack_s=0.0)
         own = next(slot for slot in slots if slot.arc is arc)
         if own.start_s > latest_s + INSTANT_S or not _fits_throughout(table, own, now_s, latest_s + arc.length_s):
+            return False
+        starting = {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S and slot.arc is not arc}
+        order = table.in_order([slot.arc for slot in slots if slot.arc not in starting])
+        overtaking = order[: order.index(arc)] if len(starting) else []
+        if any(one in _older_equals(table, arc) and not table.fits(arc, [one]) for one in overtaking):
             return False
         others = [slot for slot in slots if table.strict and slot.start_s > now_s + INSTANT_S]
         if any(slot.arc is not arc and higher(slot.arc.path, arc.path) for slot in others):

@@ -444,7 +444,13 @@ class MasterSchedule:
 
     def in_order(self, arcs: Sequence[ArcEntry]) -> list[ArcEntry]:
         """Return ARCs of one group in the order of rule 2."""
-        return by_precedence(arcs, lambda arc: arc.path, self._seniority)
+        ordered = by_precedence(arcs, lambda arc: arc.path, self._seniority)
+        for pledged in [arc for arc in ordered if arc.pledge is not None]:
+            # A higher one that cannot run at all keeps nobody from what was freed for it.
+            if not any(self.usable(other) and higher(other.path, pledged.path) for other in arcs):
+                ordered.remove(pledged)
+                ordered.insert(0, pledged)
+        return ordered
 
     def _seniority(self, arc: ArcEntry) -> tuple[bool, float, float, int]:
         """Return the key among equals: smaller comes first. Those RCs are being freed for by force come before all."""

@@ -228,7 +228,8 @@ class ScheduleManager:
         if not turn.in_the_way:
             self._connect(turn.arc)
             return
-        for holder in turn.in_the_way:
+        # Those whose slices are over go first: what is freed by force must not look like the reason for it.
+        for holder in sorted(turn.in_the_way, key=lambda holder: higher(turn.arc.path, holder.path)):
             overridden = higher(turn.arc.path, holder.path)
             forced = overridden and not holder.served(self._now_s)
             if (forced or self._table.reserves_by_pledge(turn.arc)) and turn.arc.pledge is None:
