@@ -152,9 +152,10 @@ def _starts_without(
             return False
         starting = {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S and slot.arc is not arc}
         order = table.in_order([slot.arc for slot in slots if slot.arc not in starting])
-        overtaking = order[: order.index(arc)] if len(starting) else []
-        if any(one in _older_equals(table, arc) and not table.fits(arc, [one]) for one in overtaking):
-            return False
+        before = table.before(arc)
+        overtaking = [one for one in order[: order.index(arc)] if starting and one not in before]
+        if any(not table.fits(arc, [one]) for one in overtaking):
+            return False  # who held them back starts as well, and then they come before the ARC
         others = [slot for slot in slots if table.strict and slot.start_s > now_s + INSTANT_S]
         if any(slot.arc is not arc and higher(slot.arc.path, arc.path) for slot in others):
             return False
