@@ -553,10 +553,11 @@ class MasterSchedule:
         for other, begin_s, end_s in sorted(against, key=_begin_s):
             if begin_s >= start_s + length_s - INSTANT_S:
                 break
-            if end_s > start_s + INSTANT_S and arc.touches & other.touches & (arc.excludes | other.excludes):
-                if end_s == math.inf or (begin_s > -math.inf and higher(other.path, arc.path)):
-                    return math.inf
-                start_s = end_s
+            if not arc.touches & other.touches & (arc.excludes | other.excludes):
+                continue
+            if end_s == math.inf or (begin_s > -math.inf and higher(other.path, arc.path)):
+                return math.inf
+            start_s = max(start_s, end_s)
         if start_s == math.inf or all(self._has_room_for_all(rc) for rc in arc.shares):
             return start_s
         return self._earliest_in_a_crowd_s(arc, start_s, length_s, against)
