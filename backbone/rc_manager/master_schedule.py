@@ -318,6 +318,8 @@ class MasterSchedule:
                 if holder.state is RequestState.RUNNING:
                     self._await_end(holder)
         self.touch(arc)
+        if self.strict and arc in self._groups and len(self._groups.of(arc)) > self._exact_up_to:
+            self._touched.update(dict.fromkeys(self.rcs))  # anybody in the group may have been held back by it
         if was_active and not arc.active:
             self._groups.remove(arc)
             self._demand_changed(arc.shares)
@@ -701,6 +703,8 @@ class MasterSchedule:
             if self._must_let_higher_go_first(arc, self._groups.of(arc).arcs):
                 continue
             others = self.beside(arc)
+            if not self.fits(arc, [h for h in others if h.holds and self.stands_until_s(h, arc, now_s) > now_s]):
+                continue  # one by one they would let it in, but not together
             in_the_way = self._in_the_way(arc, [], others, now_s)
             if in_the_way or self.fits(arc, [other for other in others if other.holds]):
                 return Turn(arc, in_the_way)
@@ -729,14 +733,20 @@ class MasterSchedule:
         """Say whether, if it started now, it would take time from a higher one or from the first in line at an RC."""
         end_s = now_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
 
+        crowd = [holder for holder in self._crowd(arc) if self.fits(arc, [holder])]
+
         def from_one(other: ArcEntry) -> bool:
-            competes = other is not arc and not self.fits(arc, [other]) and self.usable(other)
+            competes = other is not arc and not self.fits(arc, [other, *crowd]) and self.usable(other)
             return competes and self._reserved_s(other, now_s, (arc,)) < end_s
 
         firsts = dict.fromkeys(self._first_in_line(rc) for rc in arc.uses)
         if any(from_one(first) for first in firsts if first is not None):
             return True
         return any(from_one(one) for one in self.beside(arc) if one.queued and higher(one.path, arc.path))
+
+    def _crowd(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return those that hold a sharable RC of the ARC."""
+        return [*dict.fromkeys(holder for rc in arc.shares for holder in self.rcs[rc].holders if holder is not arc)]
 
     def _first_in_line(self, rc: str) -> ArcEntry | None:
         """Return the first in order of those queued for the RC; None if nobody is."""
