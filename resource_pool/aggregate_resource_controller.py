@@ -42,7 +42,7 @@ from backbone.rc_manager.messages import (
     Done,
     Extend,
     GateClosed,
-    GateOpen,
+    GateOpens,
     Leases,
     MissingRuntime,
     OpenGate,
@@ -401,11 +401,11 @@ class AggregateResourceController(Component[ArcParameters]):
         )
 
     # ------------------------------------------------------------------ the gate
-    async def _open(self, order: OpenGate) -> GateOpen:
+    async def _open(self, order: OpenGate) -> GateOpens:
         self._choose(order.epochs)
         if self._gate.epochs == order.epochs:  # the same order came twice: the first goes on undisturbed
             if self._gate.is_open:
-                return GateOpen()
+                return GateOpens()
             reason = "is being opened already"
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0)
         if self._gate.is_open:  # the order to close it was lost
@@ -423,15 +423,27 @@ class AggregateResourceController(Component[ArcParameters]):
                 self._gate.close(reason, self.name, -1.0)
             self.tell(self.name, reason)
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0) from error
-        await self.clock.sleep_until_s(order.settled_s)
-        if not self._gate.open(order.epochs, self.clock.now_s()):
+        if self._gate.epochs != order.epochs:
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
+        if self.clock.now_s() < order.settled_s:
+            self.start_task(self._open_when_settled(order), "open")
+        else:
+            self._let_through(order)
+        return GateOpens()
+
+    async def _open_when_settled(self, order: OpenGate) -> None:
+        await self.clock.sleep_until_s(order.settled_s)
+        self._let_through(order)
+
+    def _let_through(self, order: OpenGate) -> None:
+        """Open the gate and tell the owner, unless it was closed meanwhile."""
+        if not self._gate.open(order.epochs, self.clock.now_s()):
+            return
         self._slice_end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._rcs.values())}")
         told = self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
         if self.parameters.may_say_not_now:
             self._offering = self.start_task(self._offer_more(told), "offer more")
-        return GateOpen()
 
     async def _close(self, order: CloseGate) -> GateClosed:
         if order.deadline_s > 0 and self._gate.is_open:

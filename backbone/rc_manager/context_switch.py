@@ -29,7 +29,7 @@ from backbone.rc_manager.messages import (
     Disconnect,
     Disconnected,
     GateClosed,
-    GateOpen,
+    GateOpens,
     OpenGate,
     RcUse,
 )
@@ -123,13 +123,13 @@ class ContextSwitch:
 
     async def _open_gate(self, order: ConnectArc, settled_s: float) -> bool:
         question = OpenGate(dict(order.epochs), settled_s, order.until_s)
-        within_s = ARC_REPLY_S + order.settle_s / self._clock.rate
         try:
-            await self._bus.ask(_in_pool(order.arc), question, GateOpen, within_s=within_s)
+            await self._bus.ask(_in_pool(order.arc), question, GateOpens, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             log.warning("%s did not open: %s", order.arc, error)
             self._note(order.arc, f"did not open its gate: {error}")
             return False
+        await self._clock.sleep_until_s(settled_s)  # the ARC opens by the same clock: no word of it is needed
         return True
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:

@@ -183,8 +183,8 @@ class OpenGate(Message, frozen=True):
     until_s: float
 
 
-class GateOpen(Message, frozen=True):
-    """Answer to ``OpenGate``: commands pass, the decision process hears ``Resumed``."""
+class GateOpens(Message, frozen=True):
+    """Answer to ``OpenGate``: all is prepared; commands pass from ``settled_s`` on, and the owner hears ``Resumed``."""
 
 
 class CloseGate(Message, frozen=True):

@@ -14,7 +14,7 @@ from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     AskRequest,
     CurrentRequest,
-    GateOpen,
+    GateOpens,
     Lease,
     Leases,
     MissingRuntime,
@@ -89,7 +89,7 @@ def test_a_set_counts_as_held_only_while_every_rc_of_it_is_renewed(local_mission
             await pool.kill("rc_manager")
             epochs = {"scout1": 7, "radio": 8}
             manager = pool.network.join(RC_MANAGER, pool.clock)
-            await manager.ask(arc.address, OpenGate(epochs, 0.0, 0.0), GateOpen, within_s=1)
+            await manager.ask(arc.address, OpenGate(epochs, 0.0, 0.0), GateOpens, within_s=1)
             renewed = [Lease(rc, arc.arc, epoch) for rc, epoch in epochs.items() if rc not in missing]
             for _ in range(8):
                 manager.publish(RC_MANAGER, Conversation.LEASES, Leases(renewed, 2.0))
@@ -107,7 +107,7 @@ def test_an_arc_that_heard_no_renewal_asks_anew_where_the_rc_manager_still_lives
             running = pool.running[arc.arc]
             epochs = {rc: epoch + 100 for rc, epoch in (await arc.state()).epochs.items()}
             # Epochs the RC manager never gave are never renewed: to the ARC it looks as if every renewal were lost.
-            await pool.manager_voice.ask(arc.address, OpenGate(epochs, 0.0, 0.0), GateOpen, within_s=1)
+            await pool.manager_voice.ask(arc.address, OpenGate(epochs, 0.0, 0.0), GateOpens, within_s=1)
             await pool.clock.sleep_s(4.0)
             assert owner.heard()[-2:] == ["Suspended", "Resumed"]
             assert (await arc.drive(1.0, 1.0)).rc == "scout1"

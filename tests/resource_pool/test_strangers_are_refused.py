@@ -19,7 +19,7 @@ from backbone.rc_manager.messages import (
     Disconnect,
     Disconnected,
     GateClosed,
-    GateOpen,
+    GateOpens,
     OpenGate,
     RcState,
     RcUse,
@@ -130,7 +130,7 @@ def test_only_the_rc_manager_opens_and_shuts_a_gate_and_asks_for_the_request(loc
             arc = await pool.arc(await pool.owner("watcher"), "drive", "scout1")
             granted = await arc.wait_granted()
             await refused(pool, stranger, arc.arc, CloseGate("higher", "me", 0.0, -1.0), GateClosed)
-            await refused(pool, stranger, arc.arc, OpenGate({"scout1": 99, "radio": 99}, 0.0, 9e9), GateOpen)
+            await refused(pool, stranger, arc.arc, OpenGate({"scout1": 99, "radio": 99}, 0.0, 9e9), GateOpens)
             await refused(pool, stranger, arc.arc, AskRequest(), CurrentRequest)
             state = await arc.state()
             assert (state.granted, state.epochs) == (True, granted.epochs)

@@ -31,7 +31,7 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
     "a connection that is undone is not renewed meanwhile": (
         76,
         [
-            MessageFault("resource_pool/behavior4-drive > backbone/rc_manager answer GateOpen 1", "lost"),
+            MessageFault("resource_pool/behavior4-drive > backbone/rc_manager answer GateOpens 1", "lost"),
             MessageFault("backbone/rc_manager > resource_pool/radio1 Disconnect 2", "lost"),
         ],
     ),

@@ -39,7 +39,7 @@ from backbone.rc_manager.messages import (
     Disconnected,
     Done,
     GateClosed,
-    GateOpen,
+    GateOpens,
     Held,
     Holder,
     OpenGate,
@@ -137,7 +137,7 @@ class PlainArc(Component[Any]):
                 await self.clock.sleep_until_s(settled_s)
                 self.epochs, self.granted_s = epochs, self.clock.now_s()
                 self.log.append(("open", "", self.clock.now_s()))
-                return GateOpen()
+                return GateOpens()
             case CloseGate(reason=reason, by=by):
                 self.epochs, self.granted_s = {}, -1.0
                 self.log.append((reason, by, self.clock.now_s()))
