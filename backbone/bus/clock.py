@@ -3,7 +3,8 @@
 ``MissionClock`` follows the machine's monotonic clock from the mission's start, at the mission's
 rate.  ``VirtualLoop`` is an event loop in which time passes only when nothing is left to do: then it
 jumps to the next timer.  Everything that waits through asyncio (sleeps, time-outs) then runs on
-virtual time, in one process, as fast as the machine can and always in the same order.
+virtual time, in one process, as fast as the machine can and always in the same order.  Work that other
+loops give to threads is done by this one itself: it takes no virtual time, and its place in the order is fixed.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import asyncio
 import selectors
 import time
 from collections.abc import Callable, Coroutine, Mapping
+from concurrent.futures import Executor
 from contextvars import Context
 from typing import Any, TypeVar, TypeVarTuple
 
@@ -151,6 +153,23 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         if self.time() < when < self.time() + RESOLUTION_S:
             when = self.time() + 2 * RESOLUTION_S
         return super().call_at(when, callback, *args, context=context)
+
+    def run_in_executor(
+        self,
+        executor: Executor | None,  # noqa: ARG002
+        func: Callable[[*Ts], T],
+        *args: *Ts,
+    ) -> asyncio.Future[T]:
+        """Do it here and now instead of in a thread; see ``asyncio.AbstractEventLoop.run_in_executor``.
+
+        Time would jump past a thread that is still at work, and who comes first would be the machine's choice.
+        """
+        future: asyncio.Future[T] = self.create_future()
+        try:
+            future.set_result(func(*args))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
 
 def run_virtual(main: Coroutine[Any, Any, T]) -> T:

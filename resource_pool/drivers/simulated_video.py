@@ -1,17 +1,21 @@
 """Driver of the simulated receiver and framegrabber: draws what is received, where it is received.
 
 Nothing is drawn but the robots that transmit on the tuned frequency, and only while it is tuned. Drawing
-runs in one thread of its own, which also owns the renderer.
+runs in one thread of its own, which also owns the renderer; on a virtual clock it runs in the loop and
+takes no time. Either way the picture of a frame is handed over ``capture_delay_s`` after the frame's time,
+or as soon afterwards as it is drawn.
 """
 
 from __future__ import annotations
 
 import asyncio
 import importlib
+import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from backbone.bus.interface import Subscription
@@ -23,10 +27,24 @@ from resource_pool.messages import WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe
 
 RECEIVER_SEED = 1  # chosen: the noise of a run repeats
+EARLY_S = 1 / 120  # chosen: a quarter of a frame; the times of frames are rounded, and no frame is left out for that
+
+
+class GrabberOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a mission may say to a simulated framegrabber.
+
+    Attributes:
+        capture_delay_s: From a frame's time to the moment it is handed over, seconds: the camera sends it row by
+            row, and the grabber has it when its last row is in.
+    """
+
+    capture_delay_s: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1 / 30
 
 
 class SimulatedFramegrabber:
     """A receiver in the simulated world."""
+
+    options_type = GrabberOptions
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site
@@ -35,12 +53,15 @@ class SimulatedFramegrabber:
         self._world: Subscription | None = None
         self._frequency = ""
         self._deliver: Callable[[Picture], None] | None = None
-        self._drawing: asyncio.Task[None] | None = None
-        self._next_s = 0.0
+        self._is_drawing = False
+        self._taking: set[asyncio.Task[None]] = set()
+        self._next_s = -math.inf
         self._pause_s = 1.0 / site.parameters.frame_rate_hz
+        self._delay_s = site.options(GrabberOptions).capture_delay_s
 
     def adjust(self, site: DriverSite) -> None:
-        """Take pictures at the new rate from the next one on."""
+        """Take pictures at the new rate and with the new delay from the next one on."""
+        self._delay_s = site.options(GrabberOptions).capture_delay_s
         self._pause_s = 1.0 / site.parameters.frame_rate_hz
 
     async def open(self) -> None:
@@ -58,7 +79,7 @@ class SimulatedFramegrabber:
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
         """Receive this frequency from now on; see ``FramegrabberDriver.tune``."""
-        self._frequency, self._deliver, self._next_s = frequency, deliver, 0.0
+        self._frequency, self._deliver, self._next_s = frequency, deliver, -math.inf
 
     def stop(self) -> None:
         """Hand nothing over any more; see ``FramegrabberDriver.stop``."""
@@ -69,29 +90,37 @@ class SimulatedFramegrabber:
         self.stop()
         if self._world is not None:
             self._world.close()
-        if self._drawing is not None:
-            await asyncio.gather(self._drawing, return_exceptions=True)
+        for taking in self._taking:
+            taking.cancel()
+        await asyncio.gather(*self._taking, return_exceptions=True)
         if self._studio is not None:
             await asyncio.get_running_loop().run_in_executor(self._thread, self._studio.close)
         self._thread.shutdown()
 
     def _world_moved(self, envelope: Envelope[Any]) -> None:
         state: WorldState = envelope.body
-        busy = self._drawing is not None and not self._drawing.done()
-        if self._deliver is None or busy or state.at_s < self._next_s:
+        if self._deliver is None or self._is_drawing or state.at_s < self._next_s - EARLY_S:
             return
-        self._next_s = max(self._next_s + self._pause_s, state.at_s)
-        self._drawing = asyncio.create_task(self._take(state, self._frequency, self._deliver), name="take picture")
-        self._drawing.add_done_callback(self._taken)
+        in_time = state.at_s < self._next_s + self._pause_s
+        self._next_s = (self._next_s if in_time else state.at_s) + self._pause_s
+        self._is_drawing = True
+        taking = asyncio.create_task(self._take(state, self._frequency, self._deliver), name="take picture")
+        self._taking.add(taking)
+        taking.add_done_callback(self._taken)
 
-    def _taken(self, drawing: asyncio.Task[None]) -> None:
-        if not drawing.cancelled() and (bug := drawing.exception()) is not None:
+    def _taken(self, taking: asyncio.Task[None]) -> None:
+        self._taking.discard(taking)
+        if not taking.cancelled() and (bug := taking.exception()) is not None:
             self._site.fail(bug)
 
     async def _take(self, state: WorldState, frequency: str, deliver: Callable[[Picture], None]) -> None:
         assert self._studio is not None  # noqa: S101  open before the first state can arrive
-        loop = asyncio.get_running_loop()
-        picture = await loop.run_in_executor(self._thread, self._studio.take, state, frequency)
+        run = asyncio.get_running_loop().run_in_executor
+        try:
+            picture = await run(self._thread, self._studio.take, state, frequency)
+        finally:
+            self._is_drawing = False
+        await self._site.clock.sleep_until_s(state.at_s + self._delay_s)
         if self._deliver is deliver:
             deliver(picture)
 

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from backbone.bus.clock import VirtualClock
+import pytest
+
+from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.keys import Conversation
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
-from resource_pool.drivers.simulated_video import SimulatedFramegrabber
+from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
 from resource_pool.messages import AskWorld, WorldModel, WorldState
 from scout_model.description import ScoutPlace, WorldDescription
 from scout_model.world import World
@@ -25,14 +27,14 @@ WORLD = WorldDescription(
 class Studio:
     """A world that is played by hand, and a driver that looks at it."""
 
-    def __init__(self) -> None:
+    def __init__(self, rate_hz: float = 30.0) -> None:
         self.network, self.clock = LocalNetwork(), VirtualClock()
         self.world = World(WORLD)
         self.bus: LocalBus = self.network.join("resource_pool/world", self.clock)
         self.bus.serve("resource_pool/world", AskWorld, self._answer)
         self.bugs: list[BaseException] = []
         self.failed = asyncio.Event()
-        parameters = SimpleNamespace(world="world", camera="paint", frame_rate_hz=30.0)
+        parameters = SimpleNamespace(world="world", camera="paint", frame_rate_hz=rate_hz, options={})
         self.ear = self.network.join("resource_pool/grabber", self.clock)
         site = DriverSite("grabber", self.ear, self.clock, parameters, lambda what: None, self._fail)
         self.driver = SimulatedFramegrabber(site)
@@ -102,6 +104,31 @@ async def test_what_is_being_drawn_at_the_end_of_a_hold_is_not_delivered() -> No
     await asyncio.wait_for(studio.close(), 2)
     assert pictures.empty()
     assert not studio.bugs
+
+
+def test_on_a_virtual_clock_each_picture_comes_one_capture_delay_after_its_frame_and_pictures_repeat() -> None:
+    async def watch() -> list[tuple[float, float, bytes]]:
+        studio = Studio(rate_hz=15.0)
+        await studio.driver.open()
+        seen: list[tuple[float, float, bytes]] = []
+
+        def deliver(picture: Picture) -> None:
+            seen.append((picture.captured_s, studio.clock.now_s(), bytes(picture.pixels)))
+
+        studio.driver.tune("video", deliver)
+        for frame in range(1, 41):
+            await studio.clock.sleep_until_s(frame / 30)
+            studio.world.step_frame()
+            studio.show(frame, {"scout1": "video"})
+        await studio.clock.sleep_s(0.5)
+        assert not studio.bugs
+        await studio.close()
+        return seen
+
+    seen = run_virtual(watch())
+    assert [round(captured_s * 30, 6) for captured_s, _, _ in seen] == list(range(1, 41, 2))
+    assert all(at_s == pytest.approx(captured_s + GrabberOptions().capture_delay_s) for captured_s, at_s, _ in seen)
+    assert run_virtual(watch()) == seen
 
 
 async def test_it_can_be_closed_before_it_was_opened_and_twice() -> None:

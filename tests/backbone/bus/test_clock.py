@@ -230,3 +230,19 @@ def test_whoever_is_woken_a_rounding_early_works_and_waits_for_the_rest_gets_the
         await early
 
     run_virtual(main())
+
+
+def test_work_for_a_thread_is_done_by_the_virtual_loop_in_order_and_takes_no_time() -> None:
+    async def main() -> None:
+        done: list[str] = []
+
+        async def hand_over(name: str) -> None:
+            await asyncio.to_thread(done.append, name)
+            assert VirtualClock().now_s() == 0.0
+
+        await asyncio.gather(*map(hand_over, "abcdef"))
+        assert done == list("abcdef")
+        with pytest.raises(ZeroDivisionError):
+            await asyncio.get_running_loop().run_in_executor(None, divmod, 1, 0)
+
+    run_virtual(main())
