@@ -57,6 +57,7 @@ from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus,
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
+    EmergencyStopped,
     Frame,
     NotMyArc,
     PathNode,
@@ -151,7 +152,8 @@ class Behavior(Component[B], Generic[B]):
 
         When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
         What: await ``self.arc`` commands and the clock, keep progress on ``self``. A command that comes too
-        late for the grant ends it quietly; after a ``LinkError`` it is begun again.
+        late for the grant ends it quietly; after a ``LinkError`` it is begun again, and when an operator had
+        stopped the robot it is begun again once that stop is lifted.
         Not: catch the cancellation and go on.
         """
 
@@ -368,7 +370,23 @@ class Behavior(Component[B], Generic[B]):
                 return None
             except LinkError as error:
                 log.info("%s acts again: %s", self.name, error)
+            except EmergencyStopped as stopped:
+                await self._wait_until_it_may_move(stopped)
+                continue
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+
+    async def _wait_until_it_may_move(self, stopped: EmergencyStopped) -> None:
+        """Tell people why nothing happens, and return when the operator's stop is lifted, or perhaps."""
+        assert self.arc is not None  # noqa: S101  it refused the command
+        held = self.feedback
+        self.report(stopped.detail)
+        try:
+            await self.arc.wait_stop_lifted(str(stopped.facts["rc"]))
+        except LinkError as error:
+            log.info("%s does not know whether the stop is lifted: %s", self.name, error)
+            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+        else:
+            self.report(held)
 
     async def _stop_acting(self) -> None:
         acting, self._acting = self._acting, None

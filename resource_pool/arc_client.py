@@ -31,15 +31,21 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
+    AskStop,
     Drive,
+    EmergencyStop,
+    EmergencyStopped,
     Frame,
     Halt,
     Jump,
+    LiftStop,
     NoSuchAction,
     Noted,
+    Pose,
     Release,
     Resumed,
     SliceEnds,
+    StopState,
     Suspended,
     Suspending,
     SwappedOut,
@@ -56,20 +62,27 @@ __all__ = [
     "ArcNotice",
     "ArcState",
     "AskBeat",
+    "EmergencyStopped",
     "Frame",
     "NoSuchAction",
     "NotMyArc",
     "Noted",
     "PathNode",
+    "Pose",
     "Resumed",
     "SliceEnds",
+    "StopState",
     "Suspended",
     "Suspending",
     "SwappedOut",
     "Usage",
     "arc_name",
+    "ask_stop",
     "claim_parameters",
+    "lift_stop",
     "notice_arc",
+    "stop_robot",
+    "watch_stops",
 ]
 
 log = logging.getLogger(__name__)
@@ -276,6 +289,20 @@ class ArcClient:
 
         return self._bus.subscribe(self.address, Conversation.FRAMES, Frame, arrived, latest=True)
 
+    async def wait_stop_lifted(self, robot: str) -> None:
+        """Return when no operator's stop keeps this robot from moving; at once if none does.
+
+        Raises:
+            LinkError: The robot's RC did not say whether one does.
+        """
+        lifted = asyncio.Event()
+        hearing = watch_stops(self._bus, lambda state: None if state.is_stopped else lifted.set(), robot)
+        try:
+            if (await ask_stop(self._bus, robot)).is_stopped:
+                await lifted.wait()
+        finally:
+            hearing.close()
+
     async def state(self) -> ArcState:
         """Return what the ARC holds and why not."""
         return await self._bus.ask(self.address, AskArc(), ArcState, within_s=REPLY_TIME_S)
@@ -396,6 +423,53 @@ def claim_parameters(
         "stops_at_once": stops_at_once,
         "may_say_not_now": may_say_not_now,
     }
+
+
+async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopState:
+    """Stop a robot now, whoever holds it, and let nothing move it until ``lift_stop``; the holder keeps its grant.
+
+    Needs no grant, neither ARC nor RC manager; a second stop keeps the first one's author. For operators only.
+
+    Raises:
+        NotFromYou: The speaker of ``bus`` is no operator.
+        LinkError: The robot's RC did not answer: whether it stopped is unknown.
+    """
+    return await _ask_robot(bus, robot, EmergencyStop(reason, user))
+
+
+async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
+    """Let a robot move again that was stopped.
+
+    Args:
+        bus: Of an operator.
+        stop: The one that was seen.
+        user: Who wants it, for people.
+
+    Raises:
+        OtherStop: Somebody stopped it anew since.
+        NotFromYou: The speaker of ``bus`` is no operator.
+        LinkError: The robot's RC did not answer.
+    """
+    return await _ask_robot(bus, stop.rc, LiftStop(stop.number, user))
+
+
+async def ask_stop(bus: Bus, robot: str) -> StopState:
+    """Return whether an operator's stop keeps the robot from moving.
+
+    Raises:
+        LinkError: Its RC did not answer.
+    """
+    return await _ask_robot(bus, robot, AskStop())
+
+
+def watch_stops(bus: Bus, listener: Callable[[StopState], None], robot: str = "*") -> Subscription:
+    """Call the listener whenever this robot, or any, is stopped or may move again."""
+    at = f"{Subsystem.RESOURCE_POOL}/{robot}"
+    return bus.subscribe(at, Conversation.EVENTS, StopState, lambda heard: listener(heard.body))
+
+
+async def _ask_robot(bus: Bus, robot: str, question: Message) -> StopState:
+    return await bus.ask(address(Subsystem.RESOURCE_POOL, robot), question, StopState, within_s=REPLY_TIME_S)
 
 
 def notice_arc(notice: ArcNotice) -> str:

@@ -3,6 +3,7 @@
 * decision process → ARC: ``ArcQuestion``; ARC → decision process: ``ArcNotice``.
 * ARC → scout RC: ``ScoutCommand``; scout RC → command radio RC: ``RadioCommand``; ARC → framegrabber RC: ``Tune``.
 * framegrabber RC → whoever listens to its ARC: ``Frame``, published under the ARC's address.
+* operator → robot RC, past ARC and RC manager: ``EmergencyQuestion``; robot RC → whoever listens: ``StopState``.
 
 Commands to RCs are questions: each is answered with what was applied, or refused with ``StaleEpoch``.
 """
@@ -290,6 +291,61 @@ class Frame(Message, frozen=True):
     pixels: memoryview
 
 
+# ---------------------------------------------------------------------- operator → robot RC: needs no grant
+class EmergencyStop(Message, frozen=True):
+    """Stop this robot now and let nothing move it until the stop is lifted. Right for every operator, at any time.
+
+    Attributes:
+        reason: For the holder and the record.
+        user: Who wants it, for people; empty: the console that asks.
+    """
+
+    reason: str = ""
+    user: str = ""
+
+
+class LiftStop(Message, frozen=True):
+    """Let the robot move again.
+
+    Attributes:
+        number: Of the stop that is meant: one that was not seen is not lifted.
+        user: Who wants it, for people; empty: the console that asks.
+    """
+
+    number: int
+    user: str = ""
+
+
+class AskStop(Message, frozen=True):
+    """Is this robot stopped?"""
+
+
+class StopState(Message, frozen=True):
+    """Answer to all three; also published as an event whenever it changes.
+
+    Attributes:
+        rc: The robot.
+        is_stopped: True: drives and jumps are refused.
+        number: Of the stop in force, or of the last one; grows with each.
+        by: Who stopped it, or lifted the last stop.
+        reason: As given.
+        at_s: Mission time of the stop, or of its end.
+        is_confirmed: False if the packet that stops the wheels could not be handed to the radio: nothing new moves
+            the robot, and what moves it now ends by itself within ``COMMAND_TIMEOUT_S``.
+    """
+
+    rc: str
+    is_stopped: bool
+    number: int
+    by: str
+    reason: str
+    at_s: float
+    is_confirmed: bool = True
+
+
+EmergencyQuestion = EmergencyStop | LiftStop | AskStop
+
+
 # ---------------------------------------------------------------------- the simulated world, played as hardware
 class RadioPacket(Message, frozen=True):
     """A packet on the air: published under the world's address as a command, acknowledged by nobody.
@@ -326,7 +382,7 @@ class WorldModel(Message, frozen=True):
 
 
 class AskPose(Message, frozen=True):
-    """Where is this body in the simulation? For tests and views; real robots cannot tell."""
+    """Where is this body? Asked of the simulated world or of a camera above the room; robots themselves cannot tell."""
 
     body: str
 
@@ -413,6 +469,20 @@ class ImpossibleUse(Refusal):
 
     code = "rc.impossible_use"
     remedy = "Connect with a lease and with periods that are finite and above 0."
+
+
+class EmergencyStopped(Refusal):
+    """An operator stopped the robot; facts: ``rc``, ``number``, ``by``, ``reason``, ``since_s``. Nothing moved."""
+
+    code = "scout.emergency_stop"
+    remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
+
+
+class OtherStop(Refusal):
+    """The stop in force is not the one that was to be lifted; facts: ``number``, ``by``. Nothing changed."""
+
+    code = "scout.other_stop"
+    remedy = "Look who stopped the robot since, and lift that stop if it may move."
 
 
 class NoTurnSoon(Refusal):

@@ -1,17 +1,25 @@
 """RC of a Scout: wheel speeds, jump, video transmitter; reached through a command radio.
 
+Any operator may stop it at any time, without a grant and past ARC and RC manager, so that a stop needs nothing to
+work but robot, radio and hub. The stop outlives this process.
+
 Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissance".
 """
 
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
+from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import RobotProtocol
@@ -19,15 +27,27 @@ from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     Applied,
+    AskStop,
     CommandScout,
     Drive,
+    EmergencyQuestion,
+    EmergencyStop,
     Halt,
     Jump,
+    LiftStop,
     LoadPacket,
+    NotFromYou,
     PacketLoaded,
+    StopState,
     SwitchTransmitter,
 )
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.stop_latch import StopLatch
+
+log = logging.getLogger(__name__)
+
+OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
+"""Whose word stops a robot past its holder: people's, and what speaks for them."""
 
 RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet is not there
 
@@ -62,7 +82,7 @@ class Scout(ResourceController[ScoutParameters]):
     """Turns commands into packets of the Scout's protocol and has the radio send them at the ARC's rate."""
 
     parameters_type = ScoutParameters
-    commands = CommandScout
+    commands = CommandScout | EmergencyQuestion
     driver_kind = "robot"
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -74,9 +94,13 @@ class Scout(ResourceController[ScoutParameters]):
         self._holder: Hold | None = None
         self._frequency = ""
         self._timeouts = 0
+        self._stop_file = Path(launch.run_directory) / "stops" / self.name if launch.run_directory else None
+        self._latch = StopLatch(self.name, _read_stop(self._stop_file))
 
     async def serve(self) -> None:
         """Stop the wheels when commands stay away, and end the hold when its lease is over."""
+        if self._latch.state.is_stopped:
+            self._tell_stop(self._latch.state, "is still stopped")
         self.start_task(self._halt_when_silent(), "dead man")
         await super().serve()
 
@@ -88,6 +112,25 @@ class Scout(ResourceController[ScoutParameters]):
         """Command nothing any more; the radio sends the safe packet when it is disconnected."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
 
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer also operators, who need no grant to stop the robot."""
+        match asked.body:
+            case AskStop():
+                return self._latch.state
+            case EmergencyStop() | LiftStop() if not asked.source.startswith(OPERATORS):
+                self.refused_strangers += 1
+                self.story.note(self.name, f"{asked.source} was refused: {type(asked.body).__name__}")
+                raise NotFromYou(f"{self.name} is stopped and freed by operators, not by {asked.source}")
+            case EmergencyStop(reason=reason, user=user):
+                return await self._stop_now(user or asked.source, reason)
+            case LiftStop(number=number, user=user):
+                if self._latch.lift(number, user or asked.source, self.clock.now_s()):
+                    self._keep_stop()
+                    self._tell_stop(self._latch.state, "may move again")
+                return self._latch.state
+            case _:
+                return await super().answer(asked)
+
     async def command(self, asked: Envelope[Any]) -> Message:
         """Drive, halt, jump, or switch the transmitter."""
         order: CommandScout = asked.body
@@ -96,6 +139,8 @@ class Scout(ResourceController[ScoutParameters]):
                 f"{self.name}: wheel speeds {order.command.left_rad_s} and {order.command.right_rad_s} rad/s"
             )
         hold = self.admit(order.arc, order.epoch)
+        if isinstance(order.command, Drive | Jump):
+            self._latch.require_moving()
         match order.command:
             case Drive(left_rad_s=left, right_rad_s=right):
                 left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
@@ -124,8 +169,44 @@ class Scout(ResourceController[ScoutParameters]):
                 return self._applied(hold, "transmitter", {"on": float(on)})
 
     def statistics(self) -> dict[str, float]:
-        """Count also the halts because commands stayed away."""
-        return {**super().statistics(), "command_timeouts": self._timeouts}
+        """Count also the halts because commands stayed away, and the emergency stops."""
+        stops = float(self._latch.state.number)
+        return {**super().statistics(), "command_timeouts": self._timeouts, "emergency_stops": stops}
+
+    async def _stop_now(self, by: str, reason: str) -> StopState:
+        """Refuse all that moves the robot from here on, and stop its wheels if somebody could be turning them."""
+        is_new = self._latch.stop(by, reason, self.clock.now_s())
+        if is_new:
+            self._keep_stop()
+        self._halt_at_s = None
+        holder = self._holder
+        if holder is not None:
+            try:
+                await self._load(holder, self._protocol.halt())
+            except (
+                Refusal,
+                LinkError,
+            ) as error:  # the robot halts by itself when its last drive packet has had its time
+                self.story.note(holder.arc, f"the stop was not sent: {error}")
+                self._latch.confirm(False)
+            else:
+                self._latch.confirm(True)
+        if is_new:
+            self._tell_stop(self._latch.state, f"was stopped{f': {reason}' if reason else ''}")
+        return self._latch.state
+
+    def _tell_stop(self, state: StopState, what: str) -> None:
+        self.bus.publish(self.address, Conversation.EVENTS, state)
+        self.tell(self.name, f"{what} (by {state.by})")
+
+    def _keep_stop(self) -> None:
+        """Let whatever runs as this RC after this process know."""
+        if self._stop_file is None:
+            return
+        self._stop_file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        whole = self._stop_file.with_suffix(".new")
+        whole.write_bytes(msgspec.msgpack.encode(self._latch.state))
+        whole.replace(self._stop_file)
 
     def _stopped(self, hold: Hold) -> None:
         """Note that the wheels stand, unless the robot has another holder by now."""
@@ -187,6 +268,17 @@ class Scout(ResourceController[ScoutParameters]):
     def _silent_too_long(self) -> bool:
         """Say whether, after the sleep, still no command has come."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
+
+
+def _read_stop(file: Path | None) -> StopState | None:
+    """Return the stop an earlier process of this RC kept; a robot whose file cannot be read counts as stopped."""
+    if file is None or not file.exists():
+        return None
+    try:
+        return msgspec.msgpack.decode(file.read_bytes(), type=StopState)
+    except (OSError, msgspec.DecodeError) as error:
+        log.error("%s: %s", file, error)
+        return StopState(file.name, True, 1, "nobody knows", "what was kept of an earlier stop cannot be read", 0.0)
 
 
 def _is_finite(speeds: Drive) -> bool:

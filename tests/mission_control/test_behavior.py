@@ -14,12 +14,15 @@ from fake_resource_pool import FakePlacer
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component
 from backbone.errors import Refusal
+from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
 from backbone.placer.messages import NoHost
 from mission_control.behavior import Behavior, NotAChild
 from mission_control.behavior_tree import Decision
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
-from resource_pool.arc_client import Frame, Noted, NotMyArc, Resumed
+from resource_pool.arc_client import EmergencyStopped, Frame, Noted, NotMyArc, Resumed, StopState
+from resource_pool.messages import AskStop
+from resource_pool.stop_latch import StopLatch
 
 ARC = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
 Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
@@ -277,6 +280,35 @@ def test_a_command_that_came_too_late_ends_acting_quietly(placer_world: Run) -> 
         assert placer.components["driver"] is driver
         await arc.grant()
         await placer.wait(lambda: arc.commands and arc.commands[-1][1] == 2)
+
+    placer_world(scene)
+
+
+def test_while_an_operators_stop_stands_it_says_so_and_acts_again_when_it_is_lifted(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        latch = StopLatch("scout1")
+        latch.stop("anna", "child in the room", 0.0)
+        robot = placer.network.join("resource_pool/scout1", placer.clock)
+
+        async def answer(_asked: Any) -> StopState:
+            return latch.state
+
+        robot.serve(robot.source, AskStop, answer)
+        robot.declare_alive(robot.source)
+        driver = await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        arc.refusal = EmergencyStopped("scout1 was stopped by anna: child in the room", rc="scout1")
+        await arc.grant()
+        await placer.clock.sleep_s(3.0)
+        assert driver.feedback == "scout1 was stopped by anna: child in the room"
+        assert not arc.commands
+        arc.refusal = None
+        latch.lift(1, "ben", placer.clock.now_s())
+        robot.publish(robot.source, Conversation.EVENTS, latch.state)
+        await placer.wait(lambda: arc.commands, within_s=0.5)
+        assert driver.feedback.startswith("holds scout scout1")
+        await robot.close()
 
     placer_world(scene)
 
