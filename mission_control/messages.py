@@ -84,3 +84,19 @@ class MotionSeen(Message, frozen=True):
     at_s: float
     robot: str
     region: Region
+
+
+class WaypointReached(Message, frozen=True):
+    """Published as an event by a patrol: the robot is at a way point.
+
+    Attributes:
+        at_s: Mission time.
+        robot: Robot that patrols.
+        number: Counts from 1 over all rounds; each number is published once.
+        waypoint: Which one, from 0, in the order of the patrol's parameter.
+    """
+
+    at_s: float
+    robot: str
+    number: int
+    waypoint: int

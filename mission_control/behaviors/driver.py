@@ -1,0 +1,116 @@
+"""Driver: base of the behaviors that drive a robot. The decisions are in files of their own, this is the loop."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, ClassVar, TypeVar
+
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.naming import Subsystem, address
+from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.behaviors.motion import Motion, Position
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import ArcClient, AskPose, EmergencyStopped, NoSuchAction, Pose, SwappedOut
+
+log = logging.getLogger(__name__)
+
+DECIDE_EVERY_S = 0.1  # chosen: commands last half a second, and ten a second of 2 ms are a fiftieth of a radio
+LOCALIZE_WITHIN_S = 0.3  # chosen: a position that is older is none to steer by; wheels stop by themselves after 0.5 s
+AGAIN_AFTER_S = 1.0  # chosen: hardware that refused needs a moment; mission seconds
+
+D = TypeVar("D", bound=BehaviorParameters)
+
+NEVER = frozenset({"world.unknown_body", "wire.unknown"})
+"""Codes of refusals that the next attempt would meet again."""
+
+
+class NeedsArc(Refusal):
+    """A behavior that drives has no ARC to drive with."""
+
+    code = "behavior.needs_arc"
+    remedy = "Give the behavior an <arc> of the kind this behavior's documentation names."
+
+
+class Driver(Behavior[D]):
+    """Drives while the robot is held, stops it before it is given back, and fails with the reason if it never can.
+
+    Derive, override ``drive_on`` instead of ``act``, and keep all progress on ``self`` or in a plain object there.
+    """
+
+    needs_arc: ClassVar[str] = "drive"
+    """Kind of ARC to name in the complaint when there is none."""
+
+    async def drive_on(self, robot: str) -> None:
+        """Go on with the work.
+
+        When: from each ``resumed`` on; cancelled before the robot is gone, and begun again later.
+        What: decide, ``move``, sleep ``DECIDE_EVERY_S``, again and again. Not: keep progress in local variables.
+
+        Args:
+            robot: Name of the one that is held.
+        """
+        raise NotImplementedError
+
+    @property
+    def held(self) -> ArcClient:
+        """The hold on its ARC.
+
+        Raises:
+            NeedsArc: It claims none.
+        """
+        if self.arc is None:
+            raise NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}")
+        return self.arc
+
+    async def move(self, motion: Motion) -> None:
+        """Turn the wheels for this motion, until the next one or for half a second."""
+        await self.held.drive(*motion.wheels_rad_s())
+
+    async def locate(self, localizer: str, robot: str) -> Position:
+        """Return where the robot is, as whoever looks at the room from above sees it.
+
+        Args:
+            localizer: Name or address of the component that tracks.
+            robot: Name of the robot.
+
+        Raises:
+            Refusal: It does not know the robot, or tracks nothing.
+            LinkError: It did not answer.
+        """
+        tracker = localizer if "/" in localizer else address(Subsystem.RESOURCE_POOL, localizer)
+        pose = await self.bus.ask(tracker, AskPose(robot), Pose, within_s=LOCALIZE_WITHIN_S)
+        return Position(pose.x_m, pose.y_m, pose.heading_rad)
+
+    async def start(self) -> None:
+        """Fail at once without an ARC; see ``Behavior.start``."""
+        if self.parameters.arc is None:
+            self._give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
+
+    async def act(self) -> None:
+        """Drive on; what can never be done ends the behavior, what can be is done again."""
+        while True:
+            try:
+                return await self.drive_on(self.rcs.get("scout", ""))
+            except (SwappedOut, EmergencyStopped):
+                raise
+            except LinkError as error:
+                self.report(f"stands: {error}")
+                raise
+            except Refusal as refusal:
+                if isinstance(refusal, NoSuchAction) or code_of(refusal) in NEVER:
+                    self._give_up(refusal)
+                    return None
+                self.report(f"stands: {refusal}")
+            await self.clock.sleep_s(AGAIN_AFTER_S)
+
+    async def suspending(self, deadline_s: float) -> None:  # noqa: ARG002  a halt takes milliseconds
+        """Bring the robot to rest."""
+        try:
+            await self.held.halt()
+        except (Refusal, LinkError) as error:  # the radio's last packet stops it all the same
+            log.info("%s could not be halted: %s", self.name, error)
+
+    def _give_up(self, refusal: Refusal) -> None:
+        why: dict[str, Any] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
+        self.report(f"gives up: {refusal.detail}")
+        self.finish(BehaviorStatus.FAILURE, why)

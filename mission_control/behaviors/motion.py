@@ -1,0 +1,155 @@
+"""Motion: from where a robot is and where it should be to how it moves.
+
+Rules of this file: no bus, no clock; times are mission seconds.
+
+Positions are meters and radians in the room's frame: x to the right, y up, seen from above; a heading of 0 looks along
+x, and left turns are positive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+WHEEL_RADIUS_M = 0.020  # RAM 2002, "Robots for Surveillance and Reconnaissance": 4 cm in diameter
+TRACK_M = 0.098  # chosen: between the middles of the wheels of a body 11 cm long; equals scout_model.dimensions
+MOST_M_S = 0.30  # chosen: below the 0.35 m/s of the motors, so that a wheel is left to steer with
+MOST_RAD_S = 1.5  # chosen: a quarter turn a second; ten decisions a second turn it 9 degrees at most in between
+TURN_PER_S = 2.5  # chosen: an error of heading shrinks to a tenth in a second, without swinging over at ten decisions
+SLOW_PER_S = 1.5  # chosen: the last 0.2 m before a place are driven ever slower; it comes to rest without overshoot
+TURN_FIRST_RAD = math.radians(50.0)  # chosen: beyond it a robot turns on the spot, so that its path stays short
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where a robot is: meters, and its heading in radians."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place on the floor, meters."""
+
+    x_m: float
+    y_m: float
+
+    def distance_m(self, position: Position) -> float:
+        """Return how far the robot is from here."""
+        return math.hypot(self.x_m - position.x_m, self.y_m - position.y_m)
+
+    def bearing_rad(self, position: Position) -> float:
+        """Return where the robot sees this place: 0 is straight ahead, left is positive, -pi to pi."""
+        return turned(math.atan2(self.y_m - position.y_m, self.x_m - position.x_m) - position.heading_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How a robot moves: forward in meters a second, and turning in radians a second, left is positive."""
+
+    forward_m_s: float = 0.0
+    turn_rad_s: float = 0.0
+
+    def wheels_rad_s(self) -> tuple[float, float]:
+        """Return the speeds of the left and the right wheel that give this motion.
+
+        Example:
+            >>> Motion(forward_m_s=0.2).wheels_rad_s()
+            (10.0, 10.0)
+        """
+        side_m_s = self.turn_rad_s * TRACK_M / 2
+        return (self.forward_m_s - side_m_s) / WHEEL_RADIUS_M, (self.forward_m_s + side_m_s) / WHEEL_RADIUS_M
+
+
+STILL = Motion()
+
+
+def turned(angle_rad: float) -> float:
+    """Return the same direction as an angle from -pi to pi."""
+    return math.atan2(math.sin(angle_rad), math.cos(angle_rad))
+
+
+def head_for(position: Position, place: Place, speed_m_s: float) -> Motion:
+    """Return the motion that brings the robot to the place, and to rest there.
+
+    It turns on the spot while the place is far from straight ahead, and slows down before it arrives.
+
+    Args:
+        position: Where the robot is.
+        place: Where it should be.
+        speed_m_s: As fast as this on a straight way, above 0; ``MOST_M_S`` at most.
+    """
+    bearing_rad = place.bearing_rad(position)
+    turn_rad_s = _within(TURN_PER_S * bearing_rad, MOST_RAD_S)
+    if abs(bearing_rad) > TURN_FIRST_RAD:
+        return Motion(0.0, turn_rad_s)
+    fastest_m_s = min(speed_m_s, MOST_M_S, SLOW_PER_S * place.distance_m(position))
+    return Motion(fastest_m_s * math.cos(bearing_rad), turn_rad_s)
+
+
+def turn_to(position: Position, heading_rad: float) -> Motion:
+    """Return the motion on the spot that brings the robot to this heading."""
+    return Motion(0.0, _within(TURN_PER_S * turned(heading_rad - position.heading_rad), MOST_RAD_S))
+
+
+class Maneuver:
+    """A fixed sequence of motions, played from when it is first asked.
+
+    Args:
+        steps: Motions and for how many seconds each.
+    """
+
+    def __init__(self, steps: Sequence[tuple[Motion, float]]) -> None:
+        self._steps = tuple(steps)
+        self._begun_s: float | None = None
+
+    def motion(self, now_s: float) -> Motion | None:
+        """Return the motion for this moment, None when all are over."""
+        if self._begun_s is None:
+            self._begun_s = now_s
+        left_s = now_s - self._begun_s
+        for motion, lasts_s in self._steps:
+            if left_s < lasts_s:
+                return motion
+            left_s -= lasts_s
+        return None
+
+
+def shake_free() -> Maneuver:
+    """Return the maneuver that frees a robot which does not get on.
+
+    Full speed back and forth: what lies on its back is thrown upright by its own tail, and what stands before
+    something gets away from it. measured: rights every landing of a jump in at most one attempt.
+    """
+    return Maneuver([(Motion(-0.35), 0.3), (Motion(0.35), 0.3), (STILL, 0.5)])
+
+
+class Watchdog:
+    """Notices that a robot does not get nearer to where it is going.
+
+    Args:
+        patience_s: So long it may take to get ``STEP_M`` nearer.
+    """
+
+    STEP_M = 0.02  # chosen: half a wheel; tracking from above is better than that
+
+    def __init__(self, patience_s: float) -> None:
+        self._patience_s = patience_s
+        self.rest()
+
+    def rest(self) -> None:
+        """Begin anew: the aim changed, or the robot was not driven for a while."""
+        self._nearest_m, self._since_s = math.inf, math.inf
+
+    def is_stuck(self, distance_m: float, now_s: float) -> bool:
+        """Return True if it has been no nearer for all the patience there is; asked at every decision."""
+        if distance_m <= self._nearest_m - self.STEP_M:
+            self._nearest_m, self._since_s = distance_m, now_s
+        return now_s - self._since_s >= self._patience_s
+
+
+def _within(value: float, most: float) -> float:
+    return max(-most, min(most, value))

@@ -1,0 +1,154 @@
+"""Patrol: drive through way points, round after round.
+
+A Scout does not know where it is. Something else must see it: a camera above the room that tracks robots, as
+laboratories have, or the simulated world in its place. Counting the wheels' turns would not do: whoever takes the robot
+over for a minute leaves it somewhere else.
+
+In mission.xml: an ARC of kind ``drive`` (or more), and the tracker's name as ``localizer``; with a simulated world that
+is the world's name.
+"""
+
+from __future__ import annotations
+
+import math
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.keys import Conversation
+from mission_control.behavior import BehaviorParameters
+from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
+from mission_control.behaviors.motion import MOST_M_S, Place
+from mission_control.behaviors.patrol_route import PatrolRoute, Visit
+from mission_control.messages import BehaviorStatus, WaypointReached
+
+NEAREST_M = 0.02  # chosen: tracking from above and a robot of 11 cm allow no less
+
+
+class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Patrol``.
+
+    Attributes:
+        waypoints: Where to go, in this order: ``x,y`` in meters, separated by blanks, as in ``1,1 3.5,1 3.5,4``.
+        localizer: Component that says where a robot is: its name if it is in the resource pool, else its address.
+        rounds: Success after so many; 0: for ever.
+        speed_m_s: On straight ways, above 0, at most 0.3.
+        reached_within_m: As near as this to a way point counts as reached, at least 0.02.
+        rest_s: So long the robot stays at each way point; what it is not held does not count.
+    """
+
+    waypoints: str
+    localizer: str
+    rounds: int = 0
+    speed_m_s: float = 0.2
+    reached_within_m: float = 0.08
+    rest_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        read_places(self.waypoints)
+        if not self.localizer:
+            raise ValueError("localizer is empty: name the component that sees where robots are")
+        if self.rounds < 0:
+            raise ValueError(f"rounds is {self.rounds}: write how many, or 0 for no end")
+        if not 0 < self.speed_m_s <= MOST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+        if not NEAREST_M <= self.reached_within_m < math.inf:
+            raise ValueError(f"reached_within_m is {self.reached_within_m}: it must be at least {NEAREST_M}")
+        if not 0 <= self.rest_s < math.inf:
+            raise ValueError(f"rest_s is {self.rest_s}: it must be at least 0")
+
+
+class Patrol(Driver[PatrolParameters]):
+    """Publishes ``WaypointReached`` for each way point, in order and once, however often it is suspended on the way."""
+
+    parameters_type = PatrolParameters
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._route = self._plan()
+        self._published = 0
+
+    @property
+    def route(self) -> PatrolRoute:
+        """How far it is; read only."""
+        return self._route
+
+    async def drive_on(self, robot: str) -> None:
+        """Decide ten times a second by where the robot is; see ``Driver.drive_on``."""
+        self._say(robot)
+        while not self._route.is_over:
+            position = await self.locate(self.parameters.localizer, robot)
+            motion = self._route.decide(position, self.clock.now_s())
+            self._publish(robot)
+            await self.move(motion)
+            await self.clock.sleep_s(DECIDE_EVERY_S)
+        await self.held.halt()
+        self.finish(BehaviorStatus.SUCCESS, self._found())
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Keep the record; go on later from wherever the robot is then."""
+        self._route.interrupt()
+        self.report(f"suspended: {reason} by {by}; {self._seen()}")
+
+    def parameters_changed(self) -> None:
+        """Begin a new patrol by the new parameters; way points of the old one stay published."""
+        self._route, self._published = self._plan(), 0
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters, the way points reached, and how often the robot was shaken free."""
+        return {**super().statistics(), "waypoints_reached": self._route.reached, "shaken_free": self._route.freed}
+
+    def _plan(self) -> PatrolRoute:
+        given = self.parameters
+        return PatrolRoute(
+            read_places(given.waypoints),
+            rounds=given.rounds,
+            speed_m_s=given.speed_m_s,
+            reached_within_m=given.reached_within_m,
+            rest_s=given.rest_s,
+        )
+
+    def _publish(self, robot: str) -> None:
+        """Tell each way point reached since the last time."""
+        if self._route.reached == self._published:
+            return
+        for visit in self._route.visits_since(self._published):
+            event = WaypointReached(visit.at_s, robot, visit.number, visit.waypoint)
+            self.bus.publish(self.address, Conversation.EVENTS, event)
+            self.story.note(robot, f"is at way point {visit.waypoint}")
+            self._published = visit.number
+            self.tell_parent(self._found(visit))
+            self._say(robot)
+
+    def _found(self, last: Visit | None = None) -> dict[str, float]:
+        since = {} if last is None else {"last_waypoint": last.waypoint, "last_at_s": last.at_s}
+        return {"waypoints_reached": self._route.reached, **since}
+
+    def _seen(self) -> str:
+        return f"{self._route.reached} way points reached, next is {self._route.next_waypoint}"
+
+    def _say(self, robot: str) -> None:
+        self.report(f"patrols with {robot}: {self._seen()}")
+
+
+def read_places(text: str) -> list[Place]:
+    """Return the places of a text like ``1,1 3.5,1``.
+
+    Raises:
+        ValueError: There is none in it, or one of them is no pair of numbers.
+
+    Example:
+        >>> read_places("1,1 3.5,0.5")
+        [Place(x_m=1.0, y_m=1.0), Place(x_m=3.5, y_m=0.5)]
+    """
+    places = []
+    for pair in text.split():
+        try:
+            x_m, y_m = (float(number) for number in pair.split(","))
+        except ValueError:
+            raise ValueError(f"{pair!r} is no place: write x,y in meters, as in 1,1 3.5,1") from None
+        if not (math.isfinite(x_m) and math.isfinite(y_m)):
+            raise ValueError(f"{pair!r} is no place: write finite numbers")
+        places.append(Place(x_m, y_m))
+    if not places:
+        raise ValueError("there is no place: write x,y in meters for each, as in 1,1 3.5,1")
+    return places
