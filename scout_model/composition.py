@@ -1,7 +1,8 @@
-"""From a world's description to one MuJoCo model of room, furniture, Scouts and targets.
+"""From a world's description to one MuJoCo model of room, furniture, robots and targets.
 
-Names in the model: ``<scout>/<part>`` for the parts of ``scout.xml``; ``<target>`` for a target's
-body, and ``<target>/left_leg`` and ``<target>/right_leg`` for a person's legs.
+Names in the model: ``<robot>/<part>`` for the parts of a robot's own MJCF; ``<target>`` for a target's
+body, and ``<target>/left_leg`` and ``<target>/right_leg`` for a person's legs; ``dark/<name>`` for the
+sites that tell a camera where it is dark.
 """
 
 from __future__ import annotations
@@ -14,8 +15,18 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+from scout_model.carrier import check_stops
+from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
 from scout_model.dimensions import (
+    BLOB_DIAMETER_M,
+    BLOBS_M,
+    BOARD_HEIGHT_M,
+    BOARD_THICKNESS_M,
+    BOARD_WIDTH_M,
+    CARRIER_DECK_M,
+    CARRIER_LENGTH_M,
+    CARRIER_WIDTH_M,
+    DARKNESS,
     PERSON_HEIGHT_M,
     PERSON_HIP_M,
     PIONEER_HEIGHT_M,
@@ -24,11 +35,19 @@ from scout_model.dimensions import (
 )
 from scout_model.errors import InvalidWorld
 from scout_model.radio_link import FIRST_NETWORK_ID, LAST_NETWORK_ID
-from scout_model.targets import SHAPES, part_poses, path_length_m
+from scout_model.robot import robot_class
+from scout_model.room_file import add_room
+from scout_model.targets import CARRIER, SHAPES, part_poses, path_length_m
 
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
+_SHADE_THICKNESS_M = 0.004  # chosen: as much above a mark as that is above its surface
+_TABLE_TOP_M = 0.03  # chosen: a board
+_TABLE_LEG_M = 0.05  # chosen: a Scout sees it and passes beside it
+_FLOOR_LEVEL = 0.45  # as in room.xml
+_AT_A_WALL_M = 0.05  # chosen: what ends so close to a wall darkens it
 _MARKS, _THINGS = 1, 2  # geom groups, see room.xml
+_FURNITURE_SHAPES = ("box", "table")
 
 
 def compose(description: WorldDescription) -> str:
@@ -39,15 +58,28 @@ def compose(description: WorldDescription) -> str:
     """
     check(description)
     spec = mujoco.MjSpec.from_string(_asset("room.xml"))
-    _add_walls(spec, description)
-    _add_marks(spec, description)
+    if description.mjcf:
+        add_room(spec, description.mjcf)
+    else:
+        _add_walls(spec, description)
+        _add_marks(spec, description)
+    dark_places = [*description.dark_places, *_below_tables(description)]
+    for dark in dark_places:
+        _add_dark_place(spec, dark, description)
     for furniture in description.furniture:
-        _add_furniture(spec, furniture)
+        _add_furniture(spec, furniture, dark_places)
+    for ramp in description.ramps:
+        _add_ramp(spec, ramp)
+    for landmark in description.landmarks:
+        _add_landmark(spec, landmark)
     for place in description.scouts:
-        _add_scout(spec, place)
+        _add_robot(spec, place)
     for target in description.targets:
         _add_target(spec, target)
-    spec.compile()
+    try:
+        spec.compile()
+    except ValueError as error:
+        raise InvalidWorld(f"MuJoCo cannot build it: {error}") from error
     return str(spec.to_xml())
 
 
@@ -60,7 +92,14 @@ def check(description: WorldDescription) -> None:
     width_m, depth_m = description.width_m, description.depth_m
     if not (0 < width_m < math.inf and 0 < depth_m < math.inf):
         raise InvalidWorld(f"a room of {width_m} by {depth_m} m")
-    parts: list[Furniture | ScoutPlace | Target] = [*description.furniture, *description.scouts, *description.targets]
+    parts: list[Furniture | ScoutPlace | Target | Ramp | Landmark | DarkPlace] = [
+        *description.furniture,
+        *description.scouts,
+        *description.targets,
+        *description.ramps,
+        *description.landmarks,
+        *description.dark_places,
+    ]
     names = Counter(part.name for part in parts)
     for name, uses in names.items():
         if uses > 1 or not name or "/" in name:
@@ -74,12 +113,35 @@ def check(description: WorldDescription) -> None:
     for place in description.scouts:
         if not (0 < place.x_m < width_m and 0 < place.y_m < depth_m and math.isfinite(place.heading_rad)):
             raise InvalidWorld(f"{place.name} at ({place.x_m}, {place.y_m}) m is not in the room")
+        robot_class(place.kind)
+    for dark in description.dark_places:
+        _check_extents(dark.name, (dark.width_m, dark.depth_m, dark.height_m), dark.x_m, dark.y_m)
     for furniture in description.furniture:
-        sizes_m = (furniture.width_m, furniture.depth_m, furniture.height_m)
-        if not all(0 < size_m < math.inf for size_m in sizes_m) or not _finite(furniture.x_m, furniture.y_m):
-            raise InvalidWorld(f"{furniture.name} has impossible sizes {sizes_m} m")
+        _check_shape(furniture)
+    for ramp in description.ramps:
+        _check_extents(ramp.name, (ramp.length_m, ramp.width_m, ramp.height_m), ramp.x_m, ramp.y_m, ramp.heading_rad)
+    for landmark in description.landmarks:
+        if not _finite(landmark.x_m, landmark.y_m, landmark.heading_rad):
+            raise InvalidWorld(f"{landmark.name} is nowhere")
     for target in description.targets:
         _check_target(target)
+    check_stops(description)
+
+
+def _check_extents(name: str, sizes_m: tuple[float, ...], *place: float) -> None:
+    if not all(0 < size_m < math.inf for size_m in sizes_m) or not _finite(*place):
+        raise InvalidWorld(f"{name} has impossible sizes {sizes_m} m")
+
+
+def _check_shape(furniture: Furniture) -> None:
+    sizes_m = (furniture.width_m, furniture.depth_m, furniture.height_m)
+    _check_extents(furniture.name, sizes_m, furniture.x_m, furniture.y_m)
+    if furniture.shape not in _FURNITURE_SHAPES:
+        raise InvalidWorld(f"{furniture.name}: shape {furniture.shape!r} is none of {', '.join(_FURNITURE_SHAPES)}")
+    if furniture.shape == "table" and (
+        furniture.height_m <= _TABLE_TOP_M or min(furniture.width_m, furniture.depth_m) <= 2 * _TABLE_LEG_M
+    ):
+        raise InvalidWorld(f"{furniture.name} is too small for a table")
 
 
 def _check_target(target: Target) -> None:
@@ -173,23 +235,127 @@ def _add_marks(spec: Any, description: WorldDescription) -> None:
             )
 
 
-def _add_furniture(spec: Any, furniture: Furniture) -> None:
-    _box(
-        spec.worldbody,
-        furniture.name,
-        [furniture.x_m, furniture.y_m, furniture.height_m / 2],
-        [furniture.width_m, furniture.depth_m, furniture.height_m],
-        0.56,
-        _THINGS,
+def _below_tables(description: WorldDescription) -> list[DarkPlace]:
+    return [
+        DarkPlace(table.name, table.x_m, table.y_m, table.width_m, table.depth_m, table.height_m - _TABLE_TOP_M)
+        for table in description.furniture
+        if table.shape == "table"
+    ]
+
+
+def _add_dark_place(spec: Any, dark: DarkPlace, description: WorldDescription) -> None:
+    """Darken floor and walls, and leave a site that tells cameras what else to darken."""
+    world = spec.worldbody
+    size_m = [dark.width_m, dark.depth_m, dark.height_m]
+    world.add_site(
+        name=f"dark/{dark.name}",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=[dark.x_m, dark.y_m, dark.height_m / 2],
+        size=[extent_m / 2 for extent_m in size_m],
+        group=5,
+    )
+    thin_m, level = _SHADE_THICKNESS_M, _FLOOR_LEVEL * DARKNESS
+    _box(world, f"shade/{dark.name}", [dark.x_m, dark.y_m, 0.0], [dark.width_m, dark.depth_m, thin_m], level, _MARKS)
+    if description.mjcf:
+        return
+    middle_m = dark.height_m / 2
+    for side, wall_m, edge_m in (
+        ("west", 0.0, dark.x_m - dark.width_m / 2),
+        ("east", description.width_m, dark.x_m + dark.width_m / 2),
+    ):
+        if abs(wall_m - edge_m) <= _AT_A_WALL_M:
+            size_m = [thin_m, dark.depth_m, dark.height_m]
+            _box(world, f"shade/{dark.name}_{side}", [wall_m, dark.y_m, middle_m], size_m, level, _MARKS)
+    for side, wall_m, edge_m in (
+        ("south", 0.0, dark.y_m - dark.depth_m / 2),
+        ("north", description.depth_m, dark.y_m + dark.depth_m / 2),
+    ):
+        if abs(wall_m - edge_m) <= _AT_A_WALL_M:
+            size_m = [dark.width_m, thin_m, dark.height_m]
+            _box(world, f"shade/{dark.name}_{side}", [dark.x_m, wall_m, middle_m], size_m, level, _MARKS)
+
+
+def _add_furniture(spec: Any, furniture: Furniture, dark_places: list[DarkPlace]) -> None:
+    world, x_m, y_m, height_m = spec.worldbody, furniture.x_m, furniture.y_m, furniture.height_m
+    if furniture.shape == "box":
+        is_dark = any(_is_in(furniture, dark) for dark in dark_places)
+        size_m = [furniture.width_m, furniture.depth_m, height_m]
+        _box(world, furniture.name, [x_m, y_m, height_m / 2], size_m, 0.56 * (DARKNESS if is_dark else 1.0), _THINGS)
+        return
+    under_m = height_m - _TABLE_TOP_M
+    top_m = [furniture.width_m, furniture.depth_m, _TABLE_TOP_M]
+    _box(world, furniture.name, [x_m, y_m, height_m - _TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
+    # Its underside: just below the top and a little smaller, so that it is not seen from the side.
+    inset_m = _TABLE_LEG_M / 2
+    underside_m = [furniture.width_m - inset_m, furniture.depth_m - inset_m, _MARK_THICKNESS_M]
+    _box(world, f"{furniture.name}/underside", [x_m, y_m, under_m - _MARK_THICKNESS_M], underside_m, 0.1, _THINGS)
+    for number, (right, back) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
+        leg_x_m = x_m + right * (furniture.width_m - _TABLE_LEG_M) / 2
+        leg_y_m = y_m + back * (furniture.depth_m - _TABLE_LEG_M) / 2
+        leg_m = [_TABLE_LEG_M, _TABLE_LEG_M, under_m]
+        _box(world, f"{furniture.name}/leg_{number}", [leg_x_m, leg_y_m, under_m / 2], leg_m, 0.3, _THINGS)
+
+
+def _is_in(furniture: Furniture, dark: DarkPlace) -> bool:
+    """Say whether a piece of furniture stands in a dark place with all of its footprint and height."""
+    return (
+        abs(furniture.x_m - dark.x_m) + furniture.width_m / 2 <= dark.width_m / 2
+        and abs(furniture.y_m - dark.y_m) + furniture.depth_m / 2 <= dark.depth_m / 2
+        and furniture.height_m <= dark.height_m
     )
 
 
-def _add_scout(spec: Any, place: ScoutPlace) -> None:
-    half_rad = place.heading_rad / 2
-    frame = spec.worldbody.add_frame(
-        pos=[place.x_m, place.y_m, 0.0], quat=[math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)]
+def _turned(heading_rad: float) -> list[float]:
+    return [math.cos(heading_rad / 2), 0.0, 0.0, math.sin(heading_rad / 2)]
+
+
+def _add_ramp(spec: Any, ramp: Ramp) -> None:
+    """Add a wedge. A tilted board would leave an edge at its foot, and be seen below the floor."""
+    half_m, across_m, height_m = ramp.length_m / 2, ramp.width_m / 2, ramp.height_m
+    corners_m = [
+        (along_m, side_m, up_m)
+        for along_m, up_m in ((-half_m, 0.0), (half_m, 0.0), (half_m, height_m))
+        for side_m in (-across_m, across_m)
+    ]
+    spec.add_mesh(name=ramp.name, uservert=[number for corner_m in corners_m for number in corner_m])
+    spec.worldbody.add_geom(
+        name=ramp.name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=ramp.name,
+        pos=[ramp.x_m, ramp.y_m, 0.0],
+        quat=_turned(ramp.heading_rad),
+        rgba=_grey(0.62),
+        group=_THINGS,
     )
-    spec.attach(mujoco.MjSpec.from_string(_asset("scout.xml")), prefix=f"{place.name}/", frame=frame)
+
+
+def _add_landmark(spec: Any, landmark: Landmark) -> None:
+    body = spec.worldbody.add_body(
+        name=landmark.name, pos=[landmark.x_m, landmark.y_m, 0.0], quat=_turned(landmark.heading_rad)
+    )
+    size_m = [BOARD_THICKNESS_M, BOARD_WIDTH_M, BOARD_HEIGHT_M]
+    _box(body, f"{landmark.name}/board", [-BOARD_THICKNESS_M / 2, 0.0, BOARD_HEIGHT_M / 2], size_m, 0.97, _THINGS)
+    for number, (right_m, up_m) in enumerate(BLOBS_M):
+        body.add_geom(
+            name=f"{landmark.name}/blob_{number}",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[0.0, right_m, up_m],
+            quat=[math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0],
+            size=[BLOB_DIAMETER_M / 2, _MARK_THICKNESS_M / 2, 0.0],
+            rgba=_grey(0.05),
+            group=_MARKS,
+            contype=0,
+            conaffinity=0,
+        )
+
+
+def _add_robot(spec: Any, place: ScoutPlace) -> None:
+    frame = spec.worldbody.add_frame(pos=[place.x_m, place.y_m, 0.0], quat=_turned(place.heading_rad))
+    try:
+        body = mujoco.MjSpec.from_string(robot_class(place.kind).body_mjcf())
+        spec.attach(body, prefix=f"{place.name}/", frame=frame)
+    except ValueError as error:
+        raise InvalidWorld(f"the body of {place.name}, a {place.kind}, cannot be built: {error}") from error
 
 
 def _add_target(spec: Any, target: Target) -> None:
@@ -203,7 +369,27 @@ def _add_target(spec: Any, target: Target) -> None:
         _cylinder(body, f"{target.name}/deck", PIONEER_RADIUS_M * 0.9, 0.20, PIONEER_HEIGHT_M, 0.06, _THINGS)
         _cylinder(body, f"{target.name}/sonars", PIONEER_RADIUS_M * 1.005, 0.14, 0.17, 0.95, _MARKS)
         return
+    if target.shape == CARRIER:
+        _shape_carrier(body, target.name)
+        return
     _shape_person(body, legs, target.name)
+
+
+def _shape_carrier(body: Any, name: str) -> None:
+    length_m, width_m = CARRIER_LENGTH_M, CARRIER_WIDTH_M
+    hull_m, deck_m = [length_m, width_m - 0.10, CARRIER_DECK_M - 0.08], [length_m, width_m, 0.03]
+    _box(body, f"{name}/hull", [0.0, 0.0, 0.05 + hull_m[2] / 2], hull_m, 0.35, _THINGS)
+    _box(body, f"{name}/deck", [0.0, 0.0, CARRIER_DECK_M - deck_m[2] / 2], deck_m, 0.70, _THINGS)
+    for number, (along, across) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
+        body.add_geom(
+            name=f"{name}/wheel_{number}",
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[along * 0.19, across * (width_m / 2 - 0.025), 0.09],
+            quat=[math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0],
+            size=[0.09, 0.025, 0.0],
+            rgba=_grey(0.08),
+            group=_THINGS,
+        )
 
 
 def _shape_person(body: Any, legs: list[Any], name: str) -> None:

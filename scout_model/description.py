@@ -10,7 +10,69 @@ import msgspec
 
 
 class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A box on the floor (table, cupboard).
+    """Something that stands on the floor: a cupboard, a step, a table with a dark place beneath.
+
+    Attributes:
+        name: Unique in the world.
+        x_m: Centre.
+        y_m: Centre.
+        width_m: Along x.
+        depth_m: Along y.
+        height_m: Above the floor.
+        shape: ``box``, or ``table``: a top on four legs, with a dark place beneath it.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    width_m: float
+    depth_m: float
+    height_m: float
+    shape: str = "box"
+
+
+class Ramp(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A smooth slope that begins on the floor and ends at an upright edge.
+
+    Attributes:
+        name: Unique in the world.
+        x_m: Centre of its footprint.
+        y_m: Centre.
+        length_m: Footprint's extent along the way up.
+        width_m: Across.
+        height_m: Of the upper edge.
+        heading_rad: Direction of the way up.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    length_m: float
+    width_m: float
+    height_m: float
+    heading_rad: float = 0.0
+
+
+class Landmark(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A board with the four-blob target, as on a home base; its numbers stand in ``dimensions``.
+
+    Attributes:
+        name: Unique in the world.
+        x_m: Middle of its face.
+        y_m: Middle of its face.
+        heading_rad: Where it faces; who stands there and looks back sees the pattern undistorted.
+    """
+
+    name: str
+    x_m: float
+    y_m: float
+    heading_rad: float = 0.0
+
+
+class DarkPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A box-shaped part of the room with little light.
+
+    Floor and walls at its bounds, furniture in it, and robots while they are in it look dark.
 
     Attributes:
         name: Unique in the world.
@@ -29,8 +91,12 @@ class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     height_m: float
 
 
+SCOUT = "scout_model.scout:Scout"
+"""Class path of the robot of the papers."""
+
+
 class ScoutPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A Scout and where it begins.
+    """A Scout, or a robot of another kind, and where it begins.
 
     Attributes:
         name: Name of the robot.
@@ -38,6 +104,8 @@ class ScoutPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         x_m: Position of its axle's middle.
         y_m: Position.
         heading_rad: Where its camera looks.
+        kind: Class path ``package.module:Class`` of its kind, a ``scout_model.robot.Robot``.
+        carried_by: Target of shape ``carrier`` that brings it and sets it down at this place; empty: it stands there.
     """
 
     name: str
@@ -45,14 +113,18 @@ class ScoutPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     x_m: float
     y_m: float
     heading_rad: float
+    kind: str = SCOUT
+    carried_by: str = ""
 
 
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A body that walks a path again and again; its position is a function of time alone.
 
+    A carrier walks its path once, and back if so told, and stops where it sets down what it carries.
+
     Attributes:
         name: Unique in the world.
-        shape: ``pioneer`` or ``person``.
+        shape: ``pioneer``, ``person`` or ``carrier``.
         path: Way points (x, y) in metres, at least two.
         speed_m_s: Speed along the path.
         begin_s: World time of its first departure.
@@ -76,9 +148,13 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         width_m: Along x.
         depth_m: Along y.
         seed: Of everything random in it.
-        furniture: Boxes.
+        furniture: What stands on the floor.
         scouts: Robots.
         targets: Moving bodies.
+        ramps: Slopes.
+        landmarks: Boards with the four-blob target.
+        dark_places: Where there is little light.
+        mjcf: A room of one's own in place of the walls and their marks, as MJCF text; empty: none.
     """
 
     width_m: float
@@ -87,3 +163,7 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     furniture: list[Furniture] = []
     scouts: list[ScoutPlace] = []
     targets: list[Target] = []
+    ramps: list[Ramp] = []
+    landmarks: list[Landmark] = []
+    dark_places: list[DarkPlace] = []
+    mjcf: str = ""

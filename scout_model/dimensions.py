@@ -53,5 +53,30 @@ PERSON_HIP_WIDTH_M = 0.20  # chosen: between the legs' middles
 PERSON_STRIDE_M = 1.4  # chosen: two steps of an adult
 PERSON_SWING_RAD = math.radians(25.0)  # chosen: hip angle that goes with this stride
 
+# Carrier: the robot that brings Scouts in; IROS 2001, section 5: deployed by a human or another robot
+CARRIER_LENGTH_M = 0.60  # chosen: room for six Scouts side by side in two rows
+CARRIER_WIDTH_M = 0.46  # chosen: passes doors
+CARRIER_DECK_M = 0.30  # chosen: height of the deck the Scouts ride on
+CARRIER_PLACES = 6  # chosen: three rows of two
+SET_DOWN_S = 3.0  # chosen: an arm lifts a Scout off, reaches out and lowers it
+NEAREST_SET_DOWN_M = 0.45  # chosen: from the carrier's path, so that it does not run over what it set down
+FARTHEST_SET_DOWN_M = 1.2  # chosen: reach of its arm
+
+# Landmark; RAM 2002, "Visual Servoing", figure 7: a target of four circles; arrangement and sizes are chosen
+BLOB_DIAMETER_M = 0.04  # chosen: nine pixels at two metres
+BLOB_PITCH_M = 0.06  # chosen: gaps of half a blob between blobs
+BOARD_WIDTH_M = 0.28  # chosen: white around the pattern, a blob's diameter and more to each side
+BOARD_HEIGHT_M = 0.17  # chosen: same, standing on the floor
+BOARD_THICKNESS_M = 0.01  # chosen: cardboard on a frame
+BLOB_PATTERN_HEIGHT_M = 0.075  # chosen: middle of the pattern above the floor; seen from close by, it fills the picture
+BLOBS_M = (
+    (-BLOB_PITCH_M, BLOB_PATTERN_HEIGHT_M + BLOB_PITCH_M / 2),
+    (0.0, BLOB_PATTERN_HEIGHT_M + BLOB_PITCH_M / 2),
+    (BLOB_PITCH_M, BLOB_PATTERN_HEIGHT_M + BLOB_PITCH_M / 2),
+    (0.0, BLOB_PATTERN_HEIGHT_M - BLOB_PITCH_M / 2),
+)
+"""Centers of the blobs, a T: metres to the right as one faces the board, and above the floor."""
+
 # Room
+DARKNESS = 0.25  # chosen: share of the light that reaches a dark place; a picture of one is clearly the darkest
 WALL_HEIGHT_M = 2.5  # chosen: fills the picture from 9 m away at this view and tilt

@@ -30,6 +30,7 @@ _STACKS = 8  # chosen: same
 _FLOOR_REACH_M = 100.0  # chosen: an endless plane ends beyond every room
 _NEAR_M = 0.02  # chosen: as in room.xml
 _SUBPIXEL_BITS = 4  # chosen: edges move smoothly, a sixteenth of a pixel at a time
+_DISC_M = 0.002  # chosen: a mark is a disc on a surface, not a band around a body, if half its length is no more
 _FARTHEST_PX = 1e6  # chosen: OpenCV's fixed-point coordinates hold it
 _ROOM, _MARKS, _THINGS = 0, 1, 2  # geom groups, see room.xml
 _LUMA = np.array([0.299, 0.587, 0.114])  # as OpenCV's RGB to gray
@@ -231,9 +232,17 @@ def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
                 sides = sides[thin : thin + 2]
             return _polyhedron(signs * size, sides)
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            if model.geom_group[geom] == _MARKS and size[1] <= _DISC_M:
+                return _disc(float(size[0]), float(size[1]))
             return _cylinder(float(size[0]), float(size[1]), has_lids=model.geom_group[geom] != _MARKS)
         case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return _sphere(float(size[0]))
+            return _sphere(np.repeat(size[0], 3), 0.0)
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return _sphere(size, 0.0)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return _sphere(np.repeat(size[0], 3), float(size[1]))
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            return _triangles(model, int(model.geom_dataid[geom]))
     raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which nobody taught the painter")
 
 
@@ -241,8 +250,8 @@ def _polyhedron(corners: _Floats, polygons: list[list[int]]) -> _Mesh:
     """Return the mesh; the corners of each polygon run counter-clockwise seen from outside."""
     normals = []
     for polygon in polygons:
-        # Not the first corner: at the poles of a sphere it is doubled.
-        a, b, c = corners[polygon[-1]], corners[polygon[1]], corners[polygon[2]]
+        # The first corner of a sphere's polygon is doubled at the poles.
+        a, b, c = corners[polygon[0 if len(polygon) == 3 else -1]], corners[polygon[1]], corners[polygon[2]]
         normal = np.cross(b - a, c - a)
         normals.append(normal / np.linalg.norm(normal))
     return _Mesh(corners, [np.array(polygon) for polygon in polygons], np.array(normals))
@@ -261,13 +270,29 @@ def _cylinder(radius_m: float, half_length_m: float, *, has_lids: bool) -> _Mesh
     return _polyhedron(corners, polygons)
 
 
-def _sphere(radius_m: float) -> _Mesh:
+def _disc(radius_m: float, half_length_m: float) -> _Mesh:
+    """Return the lid at the end of a flat cylinder: a mark is seen from the side its surface is seen from."""
+    angles = 2 * np.pi * np.arange(_SLICES) / _SLICES
+    ring = [[radius_m * math.cos(angle), radius_m * math.sin(angle), half_length_m] for angle in angles]
+    return _polyhedron(np.array(ring), [list(range(_SLICES))])
+
+
+def _triangles(model: mujoco.MjModel, mesh: int) -> _Mesh:
+    first, faces = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+    corners = model.mesh_vert[first : first + model.mesh_vertnum[mesh]].astype(np.float64)
+    polygons = model.mesh_face[faces : faces + model.mesh_facenum[mesh]]
+    return _polyhedron(corners, polygons.tolist())
+
+
+def _sphere(radii_m: _Floats, half_length_m: float) -> _Mesh:
+    """Return an ellipsoid, or with a length between its halves a capsule along z."""
     n = _SLICES
     latitudes = np.pi * (np.arange(_STACKS + 1) / _STACKS - 0.5)
     angles = 2 * np.pi * np.arange(n) / n
-    corners = radius_m * np.array(
+    corners = radii_m * np.array(
         [[np.cos(up) * np.cos(a), np.cos(up) * np.sin(a), np.sin(up)] for up in latitudes for a in angles]
     )
+    corners[:, 2] += np.sign(corners[:, 2].round(12)) * half_length_m
     polygons = [
         [row * n + i, row * n + (i + 1) % n, (row + 1) * n + (i + 1) % n, (row + 1) * n + i]
         for row in range(_STACKS)

@@ -14,8 +14,9 @@ Source: IROS 2001, section 2: the on-board processors do communications and actu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
+from importlib import resources
 from typing import assert_never
 
 from scout_model.dimensions import (
@@ -196,3 +197,31 @@ class Firmware:
                 return 0.0
             case _:
                 assert_never(self._spring)
+
+
+class Scout(Firmware):
+    """The Scout as a kind of robot: the body of ``scout.xml`` and the firmware's actuation by actuator."""
+
+    @classmethod
+    def body_mjcf(cls) -> str:
+        """Return the body; see ``scout_model.robot.Robot``."""
+        return resources.files("scout_model").joinpath("scout.xml").read_text(encoding="utf-8")
+
+    @property
+    def motors(self) -> float:
+        """How hard its motors are driven, 0 to 1."""
+        return max(abs(self._left_rad_s), abs(self._right_rad_s)) / WHEEL_SPEED_LIMIT_RAD_S
+
+    def controls(self, now_s: float) -> dict[str, float]:
+        """Advance to this time and return what the actuators shall do."""
+        actuation = self.tick(now_s)
+        return {
+            "left_wheel": actuation.left_rad_s,
+            "right_wheel": actuation.right_rad_s,
+            "kick": float(actuation.kick),
+            "winch": actuation.winch_m,
+        }
+
+    def counts(self) -> dict[str, int]:
+        """Return the firmware's statistics by name."""
+        return asdict(self.statistics())

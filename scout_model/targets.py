@@ -9,7 +9,8 @@ from itertools import pairwise
 from scout_model.description import Target
 from scout_model.dimensions import PERSON_HIP_M, PERSON_HIP_WIDTH_M, PERSON_STRIDE_M, PERSON_SWING_RAD
 
-SHAPES = ("pioneer", "person")
+CARRIER = "carrier"
+SHAPES = ("pioneer", "person", CARRIER)
 LEGS = ("left_leg", "right_leg")
 
 
@@ -73,8 +74,12 @@ def where(target: Target, time_s: float) -> TargetPose:
 
 def part_poses(target: Target, time_s: float) -> list[PartPose]:
     """Return the poses of all bodies the target is made of at this world time, always in the same order."""
-    pose = where(target, time_s)
-    parts = [PartPose(target.name, (pose.x_m, pose.y_m, 0.0), _turned(pose.heading_rad, 0.0))]
+    return parts(target, where(target, time_s))
+
+
+def parts(target: Target, pose: TargetPose) -> list[PartPose]:
+    """Return the poses of all bodies the target is made of when it is here, always in the same order."""
+    bodies = [PartPose(target.name, (pose.x_m, pose.y_m, 0.0), _turned(pose.heading_rad, 0.0))]
     if target.shape == "person":
         swing_rad = PERSON_SWING_RAD * math.sin(2 * math.pi * pose.walked_m / PERSON_STRIDE_M)
         for leg, side in zip(LEGS, (1, -1), strict=True):
@@ -84,8 +89,8 @@ def part_poses(target: Target, time_s: float) -> list[PartPose]:
                 pose.y_m + across_m * math.cos(pose.heading_rad),
                 PERSON_HIP_M,
             )
-            parts.append(PartPose(f"{target.name}/{leg}", hip_m, _turned(pose.heading_rad, side * swing_rad)))
-    return parts
+            bodies.append(PartPose(f"{target.name}/{leg}", hip_m, _turned(pose.heading_rad, side * swing_rad)))
+    return bodies
 
 
 def _turned(heading_rad: float, pitch_rad: float) -> tuple[float, float, float, float]:

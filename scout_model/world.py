@@ -1,8 +1,11 @@
-"""The simulated world: a room, Scouts that obey their radio, and targets that walk their paths.
+"""The simulated world: a room, robots that obey their radio, and targets that walk their paths.
 
 It steps physics and nothing else: pictures are drawn by ``scout_model.camera``, elsewhere, from the
 world's MJCF and state.  The same description and the same packets at the same frames give the same
 state, bit for bit, on the same machine.
+
+A robot that stands still is asleep: it costs no time, and its part of the state stays the same, bit
+for bit, until something touches it or its actuators shall do something.
 """
 
 from __future__ import annotations
@@ -14,26 +17,44 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scout_model.carrier import CarriedPose, trips
 from scout_model.composition import compose
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
-from scout_model.errors import UnknownBody
-from scout_model.scout import Firmware, FirmwareStatistics, Spring
-from scout_model.targets import part_poses
+from scout_model.errors import InvalidWorld, UnknownBody
+from scout_model.robot import Robot, robot_class
+from scout_model.scout import FirmwareStatistics, Scout, Spring
+from scout_model.targets import part_poses, parts, where
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """What of MuJoCo's state a picture depends on."""
 
+_FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_BALL = int(mujoco.mjtJoint.mjJNT_BALL)
+_SLIDE, _HINGE = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+_POSITIONS = {_FREE: 7, _BALL: 4, _SLIDE: 1, _HINGE: 1}
+_VELOCITIES = {_FREE: 6, _BALL: 3, _SLIDE: 1, _HINGE: 1}
+
 
 @dataclass(frozen=True, slots=True)
-class _Robot:
-    firmware: Firmware
-    left_wheel: int
-    right_wheel: int
-    kick: int
-    winch: int
-    left_wheel_velocity: int
-    right_wheel_velocity: int
+class _Body:
+    """A robot's program, and where its parts are in MuJoCo's arrays.
+
+    Attributes:
+        kind: Class path, for refusals.
+        program: What runs on board.
+        actuators: Name → index of its control.
+        free: First of the seven numbers of its position.
+        positions: Its part of the positions.
+        velocities: Its part of the velocities.
+    """
+
+    kind: str
+    program: Robot
+    actuators: dict[str, int]
+    free: int
+    positions: slice
+    velocities: slice
 
 
 class World:
@@ -50,8 +71,11 @@ class World:
         self._data = mujoco.MjData(self._model)
         self._frame = 0
         self._step = 0
-        self._robots = {place.name: self._robot(place.name) for place in description.scouts}
+        self._robots = {place.name: self._body(place.name, place.kind) for place in description.scouts}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.scouts}
+        self._trips = trips(description)
+        self._carried = {place.name: self._trips[place.carried_by] for place in description.scouts if place.carried_by}
+        self._rest = self._data.qpos.copy()
         self._targets = {target.name: target for target in description.targets}
         self._mocap = {
             part.body: int(self._model.body(part.body).mocapid[0])
@@ -59,6 +83,7 @@ class World:
             for part in part_poses(target, 0.0)
         }
         self._place_targets()
+        self._hold_carried()
         mujoco.mj_forward(self._model, self._data)
 
     @property
@@ -83,25 +108,22 @@ class World:
         """
         robot = self._by_network_id.get(network_id)
         if robot is not None:
-            robot.firmware.hear(payload, self.time_s)
+            robot.program.hear(payload, self.time_s)
 
     def step_frame(self) -> None:
         """Advance by one frame, a thirtieth of a second."""
         for robot in self._robots.values():
-            actuation = robot.firmware.tick(self.time_s)
-            self._data.ctrl[robot.left_wheel] = actuation.left_rad_s
-            self._data.ctrl[robot.right_wheel] = actuation.right_rad_s
-            self._data.ctrl[robot.kick] = float(actuation.kick)
-            self._data.ctrl[robot.winch] = actuation.winch_m
+            self._drive(robot)
         for _ in range(STEPS_PER_FRAME):
             mujoco.mj_step(self._model, self._data)
             self._step += 1
             self._place_targets()
+            self._hold_carried()
         self._frame += 1
 
     def transmitting(self) -> dict[str, str]:
         """Return robot → video frequency, of the robots whose transmitter is on."""
-        return {name: robot.firmware.frequency for name, robot in self._robots.items() if robot.firmware.frequency}
+        return {name: robot.program.frequency for name, robot in self._robots.items() if robot.program.frequency}
 
     def state(self) -> NDArray[np.float64]:
         """Return all positions in the world as one vector that only a camera of this world can read."""
@@ -140,9 +162,46 @@ class World:
         Raises:
             UnknownBody: No Scout has this name.
         """
-        scout = self._scout(robot)
-        velocities = self._data.qvel
-        return float(velocities[scout.left_wheel_velocity]), float(velocities[scout.right_wheel_velocity])
+        self._scout(robot)
+        left, right = (int(self._model.joint(f"{robot}/{wheel}").dofadr[0]) for wheel in ("left_wheel", "right_wheel"))
+        return float(self._data.qvel[left]), float(self._data.qvel[right])
+
+    def motors(self, robot: str) -> float:
+        """Return how hard a robot's motors are driven, 0 to 1; they disturb its own picture.
+
+        Raises:
+            UnknownBody: No robot has this name.
+        """
+        return self._robot(robot).program.motors
+
+    def is_asleep(self, robot: str) -> bool:
+        """Say whether a robot stands so still that it is frozen until something touches or drives it.
+
+        Raises:
+            UnknownBody: No robot has this name.
+        """
+        self._robot(robot)
+        return bool(self._data.tree_asleep[self._model.body_treeid[self._model.body(f"{robot}/body").id]] >= 0)
+
+    def is_upright(self, robot: str) -> bool:
+        """Say whether a robot's upper side is above its lower one.
+
+        Raises:
+            UnknownBody: No robot has this name.
+        """
+        self._robot(robot)
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, self._quaternion(robot))
+        return bool(rotation[8] > 0)
+
+    def is_carried(self, robot: str) -> bool:
+        """Say whether a carrier still holds a robot.
+
+        Raises:
+            UnknownBody: No robot has this name.
+        """
+        self._robot(robot)
+        return robot in self._carried
 
     def spring(self, robot: str) -> Spring:
         """Return where a Scout's spring foot is in its jump.
@@ -150,7 +209,7 @@ class World:
         Raises:
             UnknownBody: No Scout has this name.
         """
-        return self._scout(robot).firmware.spring
+        return self._scout(robot).spring
 
     def firmware_statistics(self, robot: str) -> FirmwareStatistics:
         """Return what a Scout's firmware counted.
@@ -158,29 +217,59 @@ class World:
         Raises:
             UnknownBody: No Scout has this name.
         """
-        return self._scout(robot).firmware.statistics()
+        return self._scout(robot).statistics()
 
-    def _scout(self, name: str) -> _Robot:
+    def _robot(self, name: str) -> _Body:
         robot = self._robots.get(name)
         if robot is None:
-            raise UnknownBody(f"no Scout named {name!r}")
+            raise UnknownBody(f"no robot named {name!r}")
         return robot
 
-    def _robot(self, name: str) -> _Robot:
-        model = self._model
-        return _Robot(
-            firmware=Firmware(),
-            left_wheel=model.actuator(f"{name}/left_wheel").id,
-            right_wheel=model.actuator(f"{name}/right_wheel").id,
-            kick=model.actuator(f"{name}/kick").id,
-            winch=model.actuator(f"{name}/winch").id,
-            left_wheel_velocity=int(model.joint(f"{name}/left_wheel").dofadr[0]),
-            right_wheel_velocity=int(model.joint(f"{name}/right_wheel").dofadr[0]),
+    def _scout(self, name: str) -> Scout:
+        program = self._robots[name].program if name in self._robots else None
+        if not isinstance(program, Scout):
+            raise UnknownBody(f"no Scout named {name!r}")
+        return program
+
+    def _body(self, name: str, kind: str) -> _Body:
+        model, prefix = self._model, f"{name}/"
+        names = {actuator: model.actuator(actuator).name for actuator in range(model.nu)}
+        free = model.joint(f"{name}/free")
+        joints = model.jnt_bodyid
+        own = [
+            joint
+            for joint in range(model.njnt)
+            if model.body_rootid[joints[joint]] == model.body_rootid[joints[free.id]]
+        ]
+        last = own[-1]
+        last_position = int(model.jnt_qposadr[last]) + _POSITIONS[int(model.jnt_type[last])]
+        last_velocity = int(model.jnt_dofadr[last]) + _VELOCITIES[int(model.jnt_type[last])]
+        return _Body(
+            kind=kind,
+            program=robot_class(kind)(),
+            actuators={full.removeprefix(prefix): number for number, full in names.items() if full.startswith(prefix)},
+            free=int(free.qposadr[0]),
+            positions=slice(int(free.qposadr[0]), last_position),
+            velocities=slice(int(free.dofadr[0]), last_velocity),
         )
 
+    def _drive(self, robot: _Body) -> None:
+        """Hand the actuators what the robot's program says; wake its body if that is anything."""
+        controls, data = robot.program.controls(self.time_s), self._data
+        for actuator, control in controls.items():
+            number = robot.actuators.get(actuator)
+            if number is None:
+                raise InvalidWorld(f"{robot.kind} drives {actuator!r}, which its body has not")
+            data.ctrl[number] = control
+        if any(controls.values()):
+            # Controls do not wake a sleeping body, but any bit in its velocity does: the zero that has one.
+            first = robot.velocities.start
+            if data.qvel[first] == 0.0:
+                data.qvel[first] = -0.0
+
     def _free_joint(self, robot: str) -> NDArray[np.float64]:
-        joint = int(self._model.joint(f"{robot}/free").qposadr[0])
-        position: NDArray[np.float64] = self._data.qpos[joint : joint + 7]
+        free = self._robots[robot].free
+        position: NDArray[np.float64] = self._data.qpos[free : free + 7]
         return position
 
     def _quaternion(self, body: str) -> NDArray[np.float64]:
@@ -192,8 +281,25 @@ class World:
     def _place_targets(self) -> None:
         time_s = self._step * STEP_S
         positions, quaternions = self._data.mocap_pos, self._data.mocap_quat
-        for target in self._targets.values():
-            for part in part_poses(target, time_s):
+        for name, target in self._targets.items():
+            trip = self._trips.get(name)
+            for part in parts(target, where(target, time_s) if trip is None else trip.pose(time_s)):
                 mocap = self._mocap[part.body]
                 positions[mocap] = part.position_m
                 quaternions[mocap] = part.quaternion
+
+    def _hold_carried(self) -> None:
+        time_s = self._step * STEP_S
+        for name in list(self._carried):
+            held, body = self._carried[name].held(name, time_s), self._robots[name]
+            self._data.qpos[body.positions] = self._rest[body.positions]
+            self._data.qvel[body.velocities] = 0.0
+            if held is None:
+                del self._carried[name]
+            else:
+                self._data.qpos[body.free : body.free + 7] = _free_position(held)
+
+
+def _free_position(held: CarriedPose) -> list[float]:
+    half_rad = held.heading_rad / 2
+    return [held.x_m, held.y_m, held.z_m, math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)]

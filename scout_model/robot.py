@@ -1,0 +1,71 @@
+"""What a kind of robot is to the simulated world: one MJCF file and one class.
+
+The class says which body the robot has, hears its packets, and drives its actuators. A mission names
+it by its class path, so a new kind needs no change in this package.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Mapping
+from typing import Protocol, runtime_checkable
+
+from scout_model.errors import InvalidWorld
+
+_PARTS = ("body_mjcf", "frequency", "motors", "hear", "controls", "counts")
+_CLASS_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
+
+
+@runtime_checkable
+class Robot(Protocol):
+    """A robot's on-board program, made without arguments; time only grows from call to call."""
+
+    @classmethod
+    def body_mjcf(cls) -> str:
+        """Return the body as MJCF, without ``<option>`` and ``<visual>``.
+
+        Its root is a body ``body`` with a free joint ``free``; the origin is what the mission file places, on the
+        floor.  A camera ``camera``, if there is one, is what its transmitter sends.  Actuators have names.
+        """
+
+    @property
+    def frequency(self) -> str:
+        """Where its transmitter sends, empty while it is off."""
+
+    @property
+    def motors(self) -> float:
+        """How hard its motors are driven, 0 to 1; they disturb its own picture."""
+
+    def hear(self, payload: bytes, now_s: float) -> None:
+        """Obey one packet; ignore and count it if it is malformed."""
+
+    def controls(self, now_s: float) -> Mapping[str, float]:
+        """Advance to this time; return actuator → what it shall do. All zero means that the robot may stand still."""
+
+    def counts(self) -> Mapping[str, int]:
+        """Return what it counted since it was switched on, by name."""
+
+
+def robot_class(kind: str) -> type[Robot]:
+    """Return the class of a kind of robot.
+
+    Args:
+        kind: Class path ``package.module:Class``.
+
+    Raises:
+        InvalidWorld: There is no such class, or it is no kind of robot.
+    """
+    if not _CLASS_PATH.fullmatch(kind):
+        raise InvalidWorld(f"{kind!r} is no class path; write package.module:Class")
+    module, _, name = kind.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise InvalidWorld(f"there is no kind of robot {kind}: {error}") from error
+    lacking = [
+        part for part in ("body_mjcf", "frequency", "motors", "hear", "controls", "counts") if not hasattr(found, part)
+    ]
+    if not isinstance(found, type) or lacking:
+        raise InvalidWorld(f"{kind} is no kind of robot: it lacks {', '.join(lacking) or 'a class'}")
+    return found

@@ -1,0 +1,56 @@
+"""A room of the user's own, from one MJCF file.
+
+What stands in it takes the place of walls and marks; a plane in it takes the place of the floor, a light
+in it that of the sun.  How fast and how exactly the world steps is not the room's business: ``<option>``
+and the like are passed over.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+
+from scout_model.errors import InvalidWorld
+
+_SHOWN = {
+    mujoco.mjtGeom.mjGEOM_PLANE,
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    mujoco.mjtGeom.mjGEOM_CYLINDER,
+    mujoco.mjtGeom.mjGEOM_BOX,
+    mujoco.mjtGeom.mjGEOM_MESH,
+}
+_ROOM, _THINGS = 0, 2  # geom groups, see room.xml
+
+
+def add_room(spec: Any, mjcf: str) -> None:
+    """Add the user's room to a world that has only a floor and a sun.
+
+    Args:
+        spec: MuJoCo's specification of the world.
+        mjcf: The room; every file it needs must stand in it.
+
+    Raises:
+        InvalidWorld: MuJoCo cannot read it, or it has shapes that no camera draws.
+    """
+    try:
+        room = mujoco.MjSpec.from_string(mjcf)
+    except ValueError as error:
+        raise InvalidWorld(f"MuJoCo cannot read the room's MJCF: {error}") from error
+    for mesh in (*room.meshes, *room.textures, *room.hfields, *room.skins):
+        if getattr(mesh, "file", ""):
+            raise InvalidWorld(f"the room's MJCF needs the file {mesh.file!r}; write what is in it into the MJCF")
+    for geom in room.geoms:
+        if geom.type not in _SHOWN:
+            raise InvalidWorld(f"no camera draws the room's geom {geom.name!r}; use boxes, cylinders or meshes")
+        # What a file does not say is in MuJoCo's group 0, which is painted behind everything.
+        if geom.group == _ROOM and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
+            geom.group = _THINGS
+    if any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in room.geoms):
+        spec.delete(spec.geom("floor"))
+    if room.lights:
+        spec.delete(spec.light("sun"))
+    room.option, room.visual, room.stat = spec.option, spec.visual, spec.stat
+    spec.attach(room, prefix="", frame=spec.worldbody.add_frame())
