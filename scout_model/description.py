@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import msgspec
 
+from scout_model.air import AirDescription
+
 
 class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Something that stands on the floor: a cupboard, a step, a table with a dark place beneath.
@@ -151,6 +153,7 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         furniture: What stands on the floor.
         scouts: Robots.
         targets: Moving bodies.
+        air: Between them and the base.
         ramps: Slopes.
         landmarks: Boards with the four-blob target.
         dark_places: Where there is little light.
@@ -163,6 +166,7 @@ class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     furniture: list[Furniture] = []
     scouts: list[ScoutPlace] = []
     targets: list[Target] = []
+    air: AirDescription = AirDescription()
     ramps: list[Ramp] = []
     landmarks: list[Landmark] = []
     dark_places: list[DarkPlace] = []

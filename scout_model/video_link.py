@@ -1,94 +1,343 @@
-"""The analog video link: what a receiver tuned to a frequency gets.
+"""The analog video link: what a receiver tuned to a frequency gets, and the framegrabber behind it hands over.
 
 IROS 2001, section 2: only one robot can transmit on a frequency at a time; signals of several
-interfere with each other and become useless.  Without a transmitter there is snow.
+interfere with each other and become useless.  Without a transmitter there is snow.  RAM 2002, "Visual
+Servoing" and "Surveillance": motors tear lines, multipath makes ghosts, weak signals leave partial images.
+
+Rule: what becomes of a frame depends on the receiver's seed, frequency and air, on the frame's number
+and signals, and on what was received since the receiver was tuned; nothing else.  Each effect has
+random numbers of its own, so that switching one off changes no other.
 """
 
 from __future__ import annotations
 
-import zlib
+import functools
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, replace
+from enum import IntEnum, StrEnum
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.dimensions import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
+from scout_model.air import REFERENCE_M, AirDescription, Fading, counted_distance_m, fade_level, key_of, snr_db
+from scout_model.dimensions import FRAMES_PER_S, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 
-Level = TypeVar("Level", np.uint8, np.int16)
+Picture = NDArray[np.uint8]
 
-NOISE_LEVELS = 5.0  # chosen: standard deviation in grey levels, 34 dB below white, a good analog link
+SETTLING_S = 0.3  # SCHEDULING, "The experiment": until a receiver has locked to the picture
+SNOW_LEVELS = 70.0  # chosen: standard deviation in grey levels; black and white specks all over
+FAINTEST_LEVELS = 0.1  # chosen: a weaker grain is rounded away
+WEAK_DB = 16.0  # chosen: below, contrast fades towards gray
+TEARS = 5.0  # chosen: lines in a frame while both motors run at full speed
+STRAY_TEARS = 0.01  # chosen: lines in a frame while they stand still, from other people's switches
+GHOST = 0.08  # chosen: power of the echoes makes them this strong on average, of the picture
+GHOST_SEEN = 0.2  # chosen: a fainter one is no reason to call a frame unclean
+GHOST_SHIFT_PX = 9  # chosen: 1.5 microseconds later, an echo from 250 m more of way, or one inside the receiver
+PARTIAL = 0.01  # chosen: share of frames the framegrabber leaves incomplete while the signal is good
+PARTIAL_IN_FADE = 0.5  # chosen: RAM 2002 blames partial images on signals that are "bad enough"
+
 _BANK_MARGIN_PX = 128  # chosen: 16 384 different windows into the noise, drawn once instead of every frame
 _GARBAGE_SHIFT_PX = 60  # chosen: rows tear by up to a fifth of the picture's width
+_SLIP_PX = (2.0, 10.0)  # chosen: how far a row slips past the one above, at the edge and in the depth of a fade
+_LONG_AGO = -1_000_000
+
+
+class FrameKind(StrEnum):
+    """What is worst about a frame, from nothing to everything."""
+
+    CLEAN = "clean"
+    GHOST = "ghost"
+    TORN = "torn"
+    FADED = "faded"
+    PARTIAL = "partial"
+    SETTLING = "settling"
+    GARBAGE = "garbage"
+    SNOW = "snow"
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """What one robot sends.
+
+    Attributes:
+        picture: Of its camera: grey levels 0 to 255, shape (240, 320), row 0 on top. It is only read.
+        robot: Its name.
+        distance_m: From the receiver's antenna, above 0.
+        motors: How fast its wheels turn, 0 to 1 of their limit, both on average.
+        on_since_frame: First frame in which its transmitter was on at this frequency.
+    """
+
+    picture: Picture
+    robot: str = ""
+    distance_m: float = REFERENCE_M
+    motors: float = 0.0
+    on_since_frame: int = _LONG_AGO
 
 
 @dataclass(frozen=True, slots=True)
 class Reception:
-    """One frame as it leaves the receiver.
+    """One frame as it leaves the framegrabber.
 
     Attributes:
         picture: Grey levels 0 to 255, shape (240, 320), row 0 on top.
         transmitters: How many robots sent on the frequency; the picture means something only if it is 1.
+        kind: What is worst about it.
     """
 
-    picture: NDArray[np.uint8]
+    picture: Picture
     transmitters: int
+    kind: FrameKind
+
+
+class _Effect(IntEnum):
+    """Which random numbers."""
+
+    WINDOW = 0
+    TEARS = 1
+    SLIP = 2
+    PARTIAL = 3
+    GARBAGE = 4
+    SETTLING = 5
+    FADING = 6
+    ECHO = 7
 
 
 class Receiver:
-    """A video receiver tuned to one frequency; the same seed, frequency and frame give the same noise.
+    """A video receiver tuned to one frequency, with its framegrabber.
 
     Args:
         seed: Of the world.
         frequency: Name of the frequency.
+        air: Which effects there are, and how strong.
     """
 
-    def __init__(self, seed: int, frequency: str) -> None:
-        self._key = (abs(seed), zlib.crc32(frequency.encode()))
-        rng = np.random.default_rng(self._key)
-        shape = (PICTURE_HEIGHT_PX + _BANK_MARGIN_PX, PICTURE_WIDTH_PX + _BANK_MARGIN_PX)
-        # A video amplifier has less bandwidth than the picture has columns: noise is smeared along its rows.
-        smeared = np.asarray(cv2.GaussianBlur(rng.standard_normal(shape, np.float32), (5, 1), 0), np.float32)
-        grain = smeared / smeared.std()
-        self._noise: NDArray[np.int16] = np.rint(NOISE_LEVELS * grain).astype(np.int16)
-        self._snow: NDArray[np.uint8] = np.clip(128 + 70 * grain, 0, 255).astype(np.uint8)
+    def __init__(self, seed: int, frequency: str, air: AirDescription | None = None) -> None:
+        self._air = AirDescription() if air is None else air
+        self._key = (abs(seed), key_of(frequency))
+        self._fading: dict[str, Fading] = {}
+        self._echoes: dict[str, Fading] = {}
+        self._settling_frames = round(SETTLING_S * FRAMES_PER_S * self._air.settling)
+        self._tuned_frame: int | None = None
+        self._last: Picture | None = None
 
-    def receive(self, pictures: Sequence[NDArray[np.uint8]], frame: int) -> Reception:
+    def tune(self) -> None:
+        """Forget what was received; the picture settles anew from the next frame on."""
+        self._tuned_frame = self._last = None
+
+    def receive(self, signals: Sequence[Signal], frame: int) -> Reception:
         """Return what comes out of the receiver.
 
         Args:
-            pictures: One from each robot that transmits on the frequency; shape (240, 320).
-            frame: Number of the frame, 0 or more.
+            signals: One from each robot that transmits on the frequency.
+            frame: Number of the frame, 0 or more, larger than at the call before.
+
+        Raises:
+            ValueError: A picture has another shape than (240, 320) or is not of bytes; a distance is not above 0;
+                motors are not within 0 to 1; the frame is negative.
         """
-        rng = np.random.default_rng((*self._key, frame))
-        match len(pictures):
-            case 0:
-                picture = _window(self._snow, rng).copy()
-            case 1:
-                picture = _add(pictures[0], _window(self._noise, rng))
+        if frame < 0:
+            raise ValueError(f"frame {frame} is negative")
+        for signal in signals:
+            _check(signal)
+        if self._tuned_frame is None:
+            self._tuned_frame = frame
+        if not signals:
+            reception = Reception(self._snow(frame), 0, FrameKind.SNOW)
+        elif len(signals) == 1 or self._air.interference == 0:
+            nearest = min(signals, key=lambda signal: signal.distance_m)
+            reception = replace(self._receive_one(nearest, frame, self._tuned_frame), transmitters=len(signals))
+        else:
+            reception = Reception(self._garbage(signals, frame), len(signals), FrameKind.GARBAGE)
+        self._last = reception.picture.copy()  # who gets the picture may paint on it
+        return reception
+
+    def _receive_one(self, signal: Signal, frame: int, tuned_frame: int) -> Reception:
+        air = self._air
+        away_m = counted_distance_m(signal.distance_m, air.weak_signal)
+        strength_db = snr_db(away_m)
+        picture, kind = signal.picture, FrameKind.CLEAN
+        ghost = self._ghost(signal.robot, frame)
+        if ghost > 0:
+            picture = _with_ghost(picture, ghost)
+            kind = FrameKind.GHOST if ghost >= GHOST_SEEN else kind
+        if strength_db < WEAK_DB and air.weak_signal > 0:
+            contrast = max(0.0, strength_db / WEAK_DB)
+            picture = np.asarray(cv2.convertScaleAbs(picture, None, contrast, 128.0 * (1.0 - contrast)), np.uint8)
+        power, depth = self._fade(signal.robot, away_m, frame)
+        picture = self._with_noise(picture, strength_db + 10 * math.log10(power), frame)
+        tears = air.noise * air.tears * (STRAY_TEARS + TEARS * signal.motors)
+        if tears > 0:
+            rng = self._random(_Effect.TEARS, frame)
+            if count := int(rng.poisson(tears)):
+                picture, kind = _with_tears(picture, count, rng), FrameKind.TORN
+        if depth > 0:
+            picture, kind = _slipping(picture, depth, self._random(_Effect.SLIP, frame)), FrameKind.FADED
+        partial = air.noise * air.partial_frames * (PARTIAL_IN_FADE if depth > 0 else PARTIAL)
+        if partial > 0:
+            rng = self._random(_Effect.PARTIAL, frame)
+            if rng.random() < partial:
+                picture, kind = self._partial(picture, frame, rng), FrameKind.PARTIAL
+        settled_frames = frame - max(tuned_frame, signal.on_since_frame)
+        if 0 <= settled_frames < self._settling_frames:
+            unlocked = 1.0 - settled_frames / self._settling_frames
+            picture, kind = _rolling(picture, unlocked, self._random(_Effect.SETTLING, frame)), FrameKind.SETTLING
+        if picture is signal.picture:
+            picture = picture.copy()
+        return Reception(picture, 1, kind)
+
+    def _random(self, effect: _Effect, frame: int) -> np.random.Generator:
+        return np.random.default_rng((*self._key, frame, effect))
+
+    def _fade(self, robot: str, away_m: float, frame: int) -> tuple[float, float]:
+        """Return the signal's power, as a part of its mean, and how deep the frame is in a fade, 0 to 1."""
+        level = self._air.noise * self._air.fades * fade_level(away_m)
+        if level == 0:
+            return 1.0, 0.0
+        power = max(1e-6, self._course(self._fading, robot, _Effect.FADING).power(frame / FRAMES_PER_S))
+        return power, max(0.0, 1.0 - power / level)
+
+    def _ghost(self, robot: str, frame: int) -> float:
+        strength = GHOST * self._air.noise * self._air.ghosts
+        if strength == 0:
+            return 0.0
+        power = self._course(self._echoes, robot, _Effect.ECHO).power(frame / FRAMES_PER_S)
+        return strength * math.sqrt(power)
+
+    def _course(self, courses: dict[str, Fading], robot: str, effect: _Effect) -> Fading:
+        course = courses.get(robot)
+        if course is None:
+            course = courses[robot] = Fading((*self._key, key_of(robot), effect))
+        return course
+
+    def _with_noise(self, picture: Picture, strength_db: float, frame: int) -> Picture:
+        levels = self._air.noise * self._air.white_noise * 255.0 / 10 ** (strength_db / 20)
+        if levels < FAINTEST_LEVELS:
+            return picture
+        return _add(picture, _window(min(levels, SNOW_LEVELS), self._random(_Effect.WINDOW, frame)))
+
+    def _snow(self, frame: int) -> Picture:
+        gray = np.full((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), 128, np.uint8)
+        if self._air.snow == 0:
+            return gray
+        return _add(gray, _window(SNOW_LEVELS * self._air.snow, self._random(_Effect.WINDOW, frame)))
+
+    def _partial(self, picture: Picture, frame: int, rng: np.random.Generator) -> Picture:
+        """Return the picture whose lower rows are an older one's, black, or noise."""
+        first_row = int(rng.integers(8, PICTURE_HEIGHT_PX - 8))
+        partial = picture.copy()
+        match int(rng.integers(3)):
+            case 0 if self._last is not None:
+                partial[first_row:] = self._last[first_row:]
+            case 0 | 1:
+                partial[first_row:] = 0
             case _:
-                picture = _add(_interfere(pictures, rng), _window(self._snow, rng).astype(np.int16) // 2 - 64)
-        return Reception(picture, len(pictures))
+                gray = np.full_like(picture, 128)
+                partial[first_row:] = _add(gray, _window(SNOW_LEVELS, self._random(_Effect.WINDOW, frame)))[first_row:]
+        return partial
+
+    def _garbage(self, signals: Sequence[Signal], frame: int) -> Picture:
+        """Return a picture whose rows come from any of the transmitters, each torn sideways."""
+        rng = self._random(_Effect.GARBAGE, frame)
+        nearest = min(signals, key=lambda signal: signal.distance_m)
+        sources = rng.integers(0, len(signals), PICTURE_HEIGHT_PX)
+        shifts_px = rng.integers(0, _GARBAGE_SHIFT_PX + 1, PICTURE_HEIGHT_PX)
+        spoiled = rng.random(PICTURE_HEIGHT_PX) < self._air.interference
+        # Row by row from pictures that begin again at their right edge: faster than one index for all pixels.
+        endless = [_endless(signal.picture) for signal in signals]
+        mixed = nearest.picture.copy()
+        for row in np.flatnonzero(spoiled).tolist():
+            shift_px = int(shifts_px[row])
+            mixed[row] = endless[sources[row]][row, shift_px : shift_px + PICTURE_WIDTH_PX]
+        return _add(mixed, _window(SNOW_LEVELS / 2 * self._air.interference, self._random(_Effect.WINDOW, frame)))
 
 
-def _window(bank: NDArray[Level], rng: np.random.Generator) -> NDArray[Level]:
+def _check(signal: Signal) -> None:
+    picture = signal.picture
+    if picture.shape != (PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX) or picture.dtype != np.uint8:
+        raise ValueError(f"a picture of shape {picture.shape} of {picture.dtype}, not (240, 320) of uint8")
+    if not signal.distance_m > 0 or not math.isfinite(signal.distance_m):
+        raise ValueError(f"distance_m must be above 0 and finite, not {signal.distance_m}")
+    if not 0 <= signal.motors <= 1:
+        raise ValueError(f"motors must be within 0 to 1, not {signal.motors}")
+
+
+@functools.cache
+def _grain() -> NDArray[np.float32]:
+    """Return noise of standard deviation 1, larger than a picture; the same in every run."""
+    shape = (PICTURE_HEIGHT_PX + _BANK_MARGIN_PX, PICTURE_WIDTH_PX + _BANK_MARGIN_PX)
+    white = np.random.default_rng(0).standard_normal(shape, np.float32)
+    # A video amplifier has less bandwidth than the picture has columns: noise is smeared along its rows.
+    smeared = np.asarray(cv2.GaussianBlur(white, (5, 1), 0), np.float32)
+    return smeared / smeared.std()
+
+
+@functools.lru_cache(64)
+def _bank(level_db: int) -> NDArray[np.int16]:
+    return np.rint(10 ** (level_db / 20) * _grain()).astype(np.int16)
+
+
+def _window(levels: float, rng: np.random.Generator) -> NDArray[np.int16]:
+    """Return noise of about this standard deviation, in steps of 1 dB: few banks serve all strengths."""
+    bank = _bank(round(20 * math.log10(max(levels, FAINTEST_LEVELS))))
     top, left = rng.integers(0, _BANK_MARGIN_PX, 2)
     return bank[top : top + PICTURE_HEIGHT_PX, left : left + PICTURE_WIDTH_PX]
 
 
-def _add(picture: NDArray[np.uint8], noise: NDArray[np.int16]) -> NDArray[np.uint8]:
+def _add(picture: Picture, noise: NDArray[np.int16]) -> Picture:
     return np.asarray(cv2.add(picture, noise, dtype=cv2.CV_8U), np.uint8)
 
 
-def _interfere(pictures: Sequence[NDArray[np.uint8]], rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Return a picture whose rows come from any of the transmitters, each torn sideways."""
-    sources = rng.integers(0, len(pictures), PICTURE_HEIGHT_PX)
-    shifts_px = rng.integers(0, _GARBAGE_SHIFT_PX + 1, PICTURE_HEIGHT_PX)
-    # Row by row from pictures that begin again at their right edge: five times faster than one index for all pixels.
-    endless = [np.concatenate([picture, picture[:, :_GARBAGE_SHIFT_PX]], axis=1) for picture in pictures]
-    mixed = np.empty((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), np.uint8)
-    for row, (source, shift_px) in enumerate(zip(sources.tolist(), shifts_px.tolist(), strict=True)):
-        mixed[row] = endless[source][row, shift_px : shift_px + PICTURE_WIDTH_PX]
-    return mixed
+def _with_ghost(picture: Picture, strength: float) -> Picture:
+    """Return the picture and its echo, together as bright as before."""
+    ghosted = picture.copy()
+    share = strength / (1.0 + strength)
+    ghosted[:, GHOST_SHIFT_PX:] = cv2.addWeighted(
+        picture[:, GHOST_SHIFT_PX:], 1.0 - share, picture[:, :-GHOST_SHIFT_PX], share, 0.0
+    )
+    return ghosted
+
+
+def _with_tears(picture: Picture, count: int, rng: np.random.Generator) -> Picture:
+    """Return the picture with so many horizontal lines, 1 to 3 rows high: bright or dark, or the rows torn sideways."""
+    torn = picture.copy()
+    for _ in range(count):
+        top, height = int(rng.integers(PICTURE_HEIGHT_PX)), int(rng.integers(1, 4))
+        begin, length = int(rng.integers(PICTURE_WIDTH_PX)), int(rng.integers(40, PICTURE_WIDTH_PX))
+        rows = slice(top, top + height)
+        match int(rng.integers(4)):
+            case 0:
+                torn[rows, begin : begin + length] = 255
+            case 1:
+                torn[rows, begin : begin + length] = 0
+            case _:
+                torn[rows] = np.roll(torn[rows], begin, axis=1)
+    return torn
+
+
+def _slipping(picture: Picture, depth: float, rng: np.random.Generator) -> Picture:
+    """Return the picture without line synchronization: each row slips past the one above."""
+    step_px = _SLIP_PX[0] + (_SLIP_PX[1] - _SLIP_PX[0]) * depth
+    return _shifted(picture, np.cumsum(rng.normal(0.0, step_px, PICTURE_HEIGHT_PX)))
+
+
+def _rolling(picture: Picture, unlocked: float, rng: np.random.Generator) -> Picture:
+    """Return the picture on its way to stand still: rolled up and slanted, the less the more it has settled."""
+    slant_px = rng.normal(0.0, 200.0) * unlocked * np.linspace(0.0, 1.0, PICTURE_HEIGHT_PX)
+    slanted = _shifted(picture, slant_px + rng.normal(0.0, 1.0 + 4.0 * unlocked, PICTURE_HEIGHT_PX))
+    return np.roll(slanted, int(rng.integers(PICTURE_HEIGHT_PX) * unlocked), axis=0)
+
+
+def _shifted(picture: Picture, shifts_px: NDArray[np.float64]) -> Picture:
+    """Return the picture with each row turned to the right by its own shift."""
+    endless = np.concatenate([picture, picture], axis=1)
+    shifted = np.empty_like(picture)
+    lefts = np.mod(-np.rint(shifts_px), PICTURE_WIDTH_PX).astype(int).tolist()
+    for row, left in enumerate(lefts):
+        shifted[row] = endless[row, left : left + PICTURE_WIDTH_PX]
+    return shifted
+
+
+def _endless(picture: Picture) -> Picture:
+    return np.concatenate([picture, picture[:, :_GARBAGE_SHIFT_PX]], axis=1)
