@@ -22,8 +22,8 @@ from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent, StoppedMeanwhile
 from backbone.wire import Envelope, Message
 from resource_pool.simulation.audit import Audit
-from resource_pool.simulation.shape import MISSION
 
+HOST = "host"  # chosen: everybody is on one
 FALLEN_AWAY_S = 0.3  # chosen: a creator's first back-off is of this order
 STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when it withdraws
 
@@ -90,8 +90,11 @@ class PlayedHosts:
         """Return True when the component of this name is ready, False if it has ended for good before."""
         life, watching = self._lives[name], self._watching[name]
         waiting = asyncio.create_task(life.ready.wait(), name=f"readiness of {name}")
-        await asyncio.wait({waiting, watching}, return_when=asyncio.FIRST_COMPLETED)
-        waiting.cancel()
+        try:
+            await asyncio.wait({waiting, watching}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            waiting.cancel()
+            await asyncio.wait({waiting})
         return life.ready.is_set()
 
     def knows(self, name: str) -> bool:
@@ -159,9 +162,17 @@ class PlayedHosts:
     async def _live(self, life: _Life) -> None:
         """Live one life of the component to its end."""
         role = life.role
-        launch = Launch(MISSION, role.subsystem, role.name, role.kind, "", "host", "", 0.0, 1.0, dict(role.parameters))
+        launch = Launch(
+            self._network.mission, role.subsystem, role.name, role.kind, "", HOST, "", 0.0, 1.0, dict(role.parameters)
+        )
         bus = self._network.join(launch.address, self._clock)
-        component = life.component = role.component(launch, bus, self._clock)
+        try:
+            component = role.component(launch, bus, self._clock)
+        except BackboneError as refusal:
+            await bus.close()
+            self._audit.note(role.name, "gives up", error=f"{type(refusal).__name__}: {refusal}")
+            return
+        life.component = component
         self._audit.note(role.name, "begins")
         watching = bus.watch_alive(launch.address, lambda _, alive: life.ready.set() if alive else life.ready.clear())
         life.task = asyncio.create_task(component.run(), name=f"life of {role.name}")
@@ -210,7 +221,7 @@ class PlayedPlacer(Component[NoParameters]):
                 role = Role(self._components[kind], Subsystem.RESOURCE_POOL, name, kind, parameters, is_rc)
                 if not await self._hosts.start(role):
                     raise StoppedMeanwhile(f"{name} ended before it was ready", name=name)
-                return Started(f"{Subsystem.RESOURCE_POOL}/{name}", "host", 0, [])
+                return Started(f"{Subsystem.RESOURCE_POOL}/{name}", HOST, 0, [])
             case StopComponent(name=name, reason=reason):
                 return Ended(name, await self._hosts.stop(component_of(name), reason))
             case _:
