@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from backbone.rc_manager.master_schedule import CONNECTED, MasterSchedule
+from backbone.rc_manager.entries import CONNECTED
 from backbone.rc_manager.messages import (
     CapacityExceeded,
     MissingRuntime,
@@ -21,11 +21,12 @@ from backbone.rc_manager.messages import (
     Usage,
 )
 from backbone.rc_manager.radio_admission import admissible, remedy, stream, utilization
+from backbone.rc_manager.table import Table
 
 Wish = Mapping[str, RcUse]
 
 
-def choose(table: MasterSchedule, request: SchedulingRequest) -> tuple[str, ...]:
+def choose(table: Table, request: SchedulingRequest) -> tuple[str, ...]:
     """Return the set of RCs this request should wait for.
 
     What it already waits for or holds stays. Otherwise RCs that did not fail come first, then those
@@ -51,7 +52,7 @@ def choose(table: MasterSchedule, request: SchedulingRequest) -> tuple[str, ...]
     raise _overload(table, request.arc, known[0], overloads[0] or "")
 
 
-def _reluctance(table: MasterSchedule, arc: str, wish: Wish) -> tuple[bool, int, int, int]:
+def _reluctance(table: Table, arc: str, wish: Wish) -> tuple[bool, int, int, int]:
     """Return the key of a choice: smaller is better; equal ones are taken in the request's order."""
     present = table.arcs.get(arc)
     rcs = [table.rcs[rc] for rc in wish]
@@ -67,7 +68,7 @@ def _reluctance(table: MasterSchedule, arc: str, wish: Wish) -> tuple[bool, int,
     )
 
 
-def _overloaded_alone(table: MasterSchedule, wish: Wish) -> str | None:
+def _overloaded_alone(table: Table, wish: Wish) -> str | None:
     """Return an RC that could not serve the wish even if nobody else were there; None: all could."""
     for name, use in wish.items():
         streams = sorted((stream(usage) for usage in use.streams), key=lambda one: one.period_us)
@@ -76,7 +77,7 @@ def _overloaded_alone(table: MasterSchedule, wish: Wish) -> str | None:
     return None
 
 
-def _overload(table: MasterSchedule, arc: str, wish: Wish, rc: str) -> CapacityExceeded:
+def _overload(table: Table, arc: str, wish: Wish, rc: str) -> CapacityExceeded:
     demanded = _share(wish[rc].streams)
     capacity = table.rcs[rc].capacity
     used = sum(_share(other.uses[rc].streams) for other in table.rcs[rc].holders if other.state in CONNECTED)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from backbone.naming import component_of
-from backbone.rc_manager.master_schedule import ArcEntry
+from backbone.rc_manager.entries import ArcEntry
 from backbone.rc_manager.messages import Attributes, PathNode, RequestAttributes, UnknownRequest
 from backbone.rc_manager.priority import CONSOLE
 

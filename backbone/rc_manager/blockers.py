@@ -12,8 +12,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Collection, Iterator, Sequence
 
-from backbone.rc_manager.master_schedule import CONNECTED, HOLDING, INSTANT_S, ArcEntry, MasterSchedule, Slot, meeting
+from backbone.rc_manager.entries import CONNECTED, HOLDING, INSTANT_S, ArcEntry
+from backbone.rc_manager.master_schedule import MasterSchedule
 from backbone.rc_manager.messages import RequestState
+from backbone.rc_manager.plan import Slot, meeting
 from backbone.rc_manager.priority import higher, rank
 
 FEWEST_OF = 24  # chosen: each costs one more plan; more than these are named as they are

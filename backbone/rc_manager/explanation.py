@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from backbone.naming import component_of
 from backbone.rc_manager.blockers import altogether, direct
+from backbone.rc_manager.entries import INSTANT_S, ArcEntry, RcEntry
 from backbone.rc_manager.foresight import Foresight
-from backbone.rc_manager.master_schedule import INSTANT_S, ArcEntry, MasterSchedule, RcEntry, Slot
+from backbone.rc_manager.master_schedule import MasterSchedule
 from backbone.rc_manager.messages import (
     LEASE_S,
     Holder,
@@ -25,6 +26,7 @@ from backbone.rc_manager.messages import (
     UnknownRequest,
     Why,
 )
+from backbone.rc_manager.plan import Slot
 from backbone.rc_manager.priority import higher
 
 UNKNOWN_S = -1.0

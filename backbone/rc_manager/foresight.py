@@ -12,8 +12,10 @@ import math
 from collections.abc import Sequence
 
 from backbone.rc_manager.above import Above
-from backbone.rc_manager.master_schedule import INSTANT_S, ArcEntry, MasterSchedule, Slot
+from backbone.rc_manager.entries import INSTANT_S, ArcEntry
+from backbone.rc_manager.master_schedule import MasterSchedule
 from backbone.rc_manager.messages import RequestState
+from backbone.rc_manager.plan import Slot
 from backbone.rc_manager.priority import higher
 
 ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it

@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import assert_never, get_args
 
 import msgspec
@@ -60,16 +61,9 @@ from backbone.rc_manager.decisions import (
     Woken,
 )
 from backbone.rc_manager.discipline import Discipline
+from backbone.rc_manager.entries import CONNECTED, Afterwards, ArcEntry, RcEntry
 from backbone.rc_manager.explanation import Explanation
-from backbone.rc_manager.master_schedule import (
-    CONNECTED,
-    EXACT_UP_TO,
-    Afterwards,
-    ArcEntry,
-    MasterSchedule,
-    RcEntry,
-    Turn,
-)
+from backbone.rc_manager.master_schedule import MasterSchedule
 from backbone.rc_manager.messages import (
     Attributes,
     Lease,
@@ -82,10 +76,13 @@ from backbone.rc_manager.messages import (
     UnknownRequest,
     Why,
 )
+from backbone.rc_manager.plan import Turn
 from backbone.rc_manager.priority import CONSOLE, PriorityTree, carried, higher
 from backbone.rc_manager.radio_admission import Analysis
+from backbone.rc_manager.table import EXACT_UP_TO
 
 RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
+NOT_EXPECTED_S = -1.0
 ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
 STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken invariant
 
@@ -179,6 +176,7 @@ class ScheduleManager:
         while turn := self._table.due(self._now_s):
             self._give(turn)
             self._age()
+        self._tell_when_again()
         self._set_alarm(rang=isinstance(event, Woken))
         return self._told
 
@@ -267,9 +265,18 @@ class ScheduleManager:
         deadline_s = self._grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self._swap_out(arc, why, by)
         arc.afterwards = afterwards
-        slot = self._table.slot_of(arc, self._now_s) if afterwards is Afterwards.WAIT else None
-        expected_s = slot.start_s + arc.settle_s if slot is not None and slot.start_s < math.inf else -1.0
-        self._tell(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, expected_s))
+        self._tell(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, NOT_EXPECTED_S))
+
+    def _tell_when_again(self) -> None:
+        """Complete what is told to those who lose their RCs by when they can expect them back."""
+        for place, told in enumerate(self._told):
+            if not isinstance(told, RevokeArc):
+                continue
+            arc = self._table.arcs.get(told.arc)
+            if arc is not None and arc.queued:
+                start_s = self._table.start_s(arc, self._now_s)
+                if start_s < math.inf:
+                    self._told[place] = replace(told, expected_s=start_s + arc.settle_s)
 
     def _swap_out(self, arc: ArcEntry, why: str, by: str) -> None:
         self._record(trace.revoke(self._now_s, arc.name, why, by), _because(why, by))
