@@ -1,8 +1,13 @@
-"""The Scouts' cameras: pictures of a world, from its MJCF and its state.
+"""The robots' cameras: pictures of a world, from its MJCF and its state.
 
 Two backends draw the same scene: ``gl`` renders with MuJoCo's classic OpenGL renderer, ``paint``
 needs no OpenGL (``scout_model.painter``).  Draw where a picture is wanted, not where physics runs:
 a state vector of a few hundred bytes is enough.
+
+A picture that was drawn before is not drawn again.  It is known by the poses of its camera and of
+everything that moves in the camera's view, so a robot elsewhere does not matter.  States are rounded
+before anything is drawn from them: what a picture shows depends on the rounded state alone, not on
+which of the states that round to it came first.
 
 For ``gl``, ``scout_model.gl_probe.prepare`` must have run in this process before anything imported
 mujoco, this module included.  A camera belongs to the thread that made it.
@@ -10,7 +15,9 @@ mujoco, this module included.  A camera belongs to the thread that made it.
 
 from __future__ import annotations
 
+import math
 import os
+from collections import OrderedDict
 from types import TracebackType
 from typing import Literal, Protocol
 
@@ -19,10 +26,17 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.dimensions import PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
+from scout_model.dimensions import DARKNESS, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
 from scout_model.painter import Painter
 from scout_model.world import STATE
+
+MEMO_PICTURES = 256  # chosen: 20 MB; the scenes that a standing robot sees while nothing or little moves
+
+_STATE_DECIMALS = 5  # chosen: a hundredth of a millimetre, a fiftieth of a pixel at the nearest
+_MARGIN_M = 0.002  # chosen: a line is drawn up to a pixel wider than it is
+_SEEN_GROUPS = 2  # the greatest geom group that is seen, see room.xml
+_DARK = "dark/"  # begins the names of the sites that are dark
 
 
 class _Drawing(Protocol):
@@ -56,17 +70,18 @@ class _GlDrawing:
 
 
 class Camera:
-    """The cameras of all Scouts of one world, showing it as built until the first ``show``.
+    """The cameras of all robots of one world, showing it as built until the first ``show``.
 
     Args:
         mjcf: ``World.mjcf``.
         backend: ``gl`` or ``paint``.
+        memo_pictures: How many of the last different pictures are kept, 77 kB each; 0: each is drawn anew.
 
     Raises:
         RenderingUnavailable: ``gl``, but this process has no OpenGL.
     """
 
-    def __init__(self, mjcf: str, backend: Literal["gl", "paint"]) -> None:
+    def __init__(self, mjcf: str, backend: Literal["gl", "paint"], memo_pictures: int = MEMO_PICTURES) -> None:
         self._model = mujoco.MjModel.from_xml_string(mjcf)
         self._data = mujoco.MjData(self._model)
         self._cameras = {
@@ -80,7 +95,15 @@ class Camera:
                 self._drawing = Painter(self._model)
             case _:
                 raise ValueError(f"no backend {backend!r}; there are 'gl' and 'paint'")
-        self._place()
+        self._movers = _Movers(self._model)
+        self._shade = _Shade(self._model)
+        self._memo: OrderedDict[bytes, NDArray[np.uint8]] = OrderedDict()
+        self._memo_pictures = memo_pictures
+        self._drawn = 0
+        self._length = mujoco.mj_stateSize(self._model, STATE)
+        state = np.empty(self._length)
+        mujoco.mj_getState(self._model, self._data, state, STATE)
+        self.show(state)
 
     def __enter__(self) -> Camera:
         return self
@@ -89,6 +112,11 @@ class Camera:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    @property
+    def drawn(self) -> int:
+        """How many pictures were drawn, not found in the memo."""
+        return self._drawn
 
     def show(self, state: NDArray[np.float64]) -> None:
         """Let the following pictures show the world in this state.
@@ -99,27 +127,110 @@ class Camera:
         Raises:
             StateMismatch: It has not the length of this world's states.
         """
-        length = mujoco.mj_stateSize(self._model, STATE)
-        if state.shape != (length,):
-            raise StateMismatch(f"a state of shape {state.shape}, this world's have {length} numbers")
-        mujoco.mj_setState(self._model, self._data, state, STATE)
-        self._place()
+        if state.shape != (self._length,):
+            raise StateMismatch(f"a state of shape {state.shape}, this world's have {self._length} numbers")
+        # Adding zero makes the negative zero, whose bits differ, an ordinary one.
+        rounded = np.round(state, _STATE_DECIMALS) + 0.0
+        mujoco.mj_setState(self._model, self._data, rounded, STATE)
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        self._shade.fall(self._data)
 
     def picture(self, robot: str) -> NDArray[np.uint8]:
-        """Return what this Scout's camera sees: grey levels 0 to 255, shape (240, 320), row 0 on top.
+        """Return what this robot's camera sees: grey levels 0 to 255, shape (240, 320), row 0 on top; not writable.
 
         Raises:
-            UnknownBody: No Scout has this name.
+            UnknownBody: No robot with a camera has this name.
         """
         camera = self._cameras.get(robot)
         if camera is None:
-            raise UnknownBody(f"no Scout named {robot!r}")
-        return self._drawing.draw(self._data, camera)
+            raise UnknownBody(f"no robot named {robot!r} has a camera")
+        seen = self._movers.seen(self._data, camera, self._shade.is_dark)
+        picture = self._memo.get(seen)
+        if picture is not None:
+            self._memo.move_to_end(seen)
+            return picture
+        picture = self._drawing.draw(self._data, camera)
+        picture.flags.writeable = False
+        self._drawn += 1
+        self._memo[seen] = picture
+        while len(self._memo) > self._memo_pictures:
+            self._memo.popitem(last=False)
+        return picture
 
     def close(self) -> None:
         """Free the graphics context; may be called again."""
         self._drawing.close()
 
-    def _place(self) -> None:
-        mujoco.mj_kinematics(self._model, self._data)
-        mujoco.mj_camlight(self._model, self._data)
+
+class _Movers:
+    """The bodies that move and are seen, each in the ball that holds what is seen of it."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        seen = model.geom_group <= _SEEN_GROUPS
+        moves = (model.body_weldid != 0) | (model.body_mocapid[model.body_rootid] >= 0)
+        geoms = [np.flatnonzero(seen & moves[model.geom_bodyid] & (model.geom_bodyid == n)) for n in range(model.nbody)]
+        self._bodies = np.array([body for body in range(model.nbody) if len(geoms[body])], np.intp)
+        self._roots = model.body_rootid[self._bodies]
+        self._middles_m = np.array([model.geom_pos[geoms[body]].mean(axis=0) for body in self._bodies]).reshape(-1, 3)
+        self._radii_m = np.array(
+            [
+                (np.linalg.norm(model.geom_pos[geoms[body]] - middle_m, axis=1) + model.geom_rbound[geoms[body]]).max()
+                for body, middle_m in zip(self._bodies, self._middles_m, strict=True)
+            ]
+        )
+        down_rad = np.radians(model.cam_fovy) / 2
+        self._down_rad = down_rad
+        self._across_rad = np.arctan(np.tan(down_rad) * PICTURE_WIDTH_PX / PICTURE_HEIGHT_PX)
+
+    def seen(self, data: mujoco.MjData, camera: int, is_dark: NDArray[np.bool_]) -> bytes:
+        """Return bytes that are the same exactly if this camera and what moves in its view are where they were."""
+        bodies, eye_m, axes = self._bodies, data.cam_xpos[camera], data.cam_xmat[camera].reshape(3, 3)
+        middles_m = np.einsum("nij,nj->ni", data.xmat[bodies].reshape(-1, 3, 3), self._middles_m) + data.xpos[bodies]
+        right, up, back = ((middles_m - eye_m) @ axes).T
+        reach_m = self._radii_m + _MARGIN_M
+        across_rad, down_rad = float(self._across_rad[camera]), float(self._down_rad[camera])
+        in_view = (
+            (back < reach_m)
+            & (np.abs(right) * math.cos(across_rad) + back * math.sin(across_rad) < reach_m)
+            & (np.abs(up) * math.cos(down_rad) + back * math.sin(down_rad) < reach_m)
+        )
+        shown = bodies[in_view]
+        return b"".join(
+            (
+                camera.to_bytes(4, "little"),
+                eye_m.tobytes(),
+                axes.tobytes(),
+                shown.tobytes(),
+                data.xpos[shown].tobytes(),
+                data.xquat[shown].tobytes(),
+                is_dark[self._roots[in_view]].tobytes(),
+            )
+        )
+
+
+class _Shade:
+    """Darkens what moves while it is in a dark place; the room's own shade is in its MJCF."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._colors = model.geom_rgba.copy()
+        self._roots = np.unique(model.body_rootid[(model.body_weldid != 0) | (model.body_mocapid >= 0)])
+        self._root_of_geom = model.body_rootid[model.geom_bodyid]
+        sites = [site for site in range(model.nsite) if model.site(site).name.startswith(_DARK)]
+        self._low_m = model.site_pos[sites] - model.site_size[sites]
+        self._high_m = model.site_pos[sites] + model.site_size[sites]
+        self.is_dark = np.zeros(model.nbody, np.bool_)
+
+    def fall(self, data: mujoco.MjData) -> None:
+        """Let robots and targets look as dark as the place is where they are."""
+        if not len(self._low_m):
+            return
+        middles_m = data.xpos[self._roots][:, np.newaxis]
+        is_dark = ((self._low_m <= middles_m) & (middles_m <= self._high_m)).all(axis=2).any(axis=1)
+        if np.array_equal(is_dark, self.is_dark[self._roots]):
+            return
+        self.is_dark[self._roots] = is_dark
+        colors = self._colors.copy()
+        colors[self.is_dark[self._root_of_geom], :3] *= DARKNESS
+        self._model.geom_rgba[:] = colors

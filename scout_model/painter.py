@@ -55,7 +55,6 @@ class Painter:
         self._geoms = np.array(geoms)
         self._groups = model.geom_group[self._geoms]
         self._bodies = model.body_rootid[model.geom_bodyid[self._geoms]]
-        self._levels: _Floats = 255 * model.geom_rgba[self._geoms, :3] @ _LUMA
         self._corners = np.concatenate([mesh.corners for mesh in meshes])
         self._geom_of_corner = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
         self._normals = np.concatenate([mesh.normals for mesh in meshes])
@@ -77,7 +76,9 @@ class Painter:
         normals = np.einsum("nij,nj->ni", rotations[self._geom_of_polygon], self._normals)
         eye_m = data.cam_xpos[camera]
         view = _View(eye_m, data.cam_xmat[camera].reshape(3, 3), float(self._model.cam_fovy[camera]), corners)
-        levels = np.clip(self._levels[self._geom_of_polygon] * self._brightness(data, normals), 0, 255)
+        # From the model at each picture: what is in a dark place gets darker.
+        colors = 255 * self._model.geom_rgba[self._geoms, :3] @ _LUMA
+        levels = np.clip(colors[self._geom_of_polygon] * self._brightness(data, normals), 0, 255)
         is_seen = np.einsum("ni,ni->n", normals, eye_m - corners[self._a_corner]) > 0
         canvas = np.zeros((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), np.uint8)
 
