@@ -12,6 +12,7 @@ from backbone.mission.checks import check
 from backbone.mission.document import Element, parse, read_bytes
 from backbone.mission.model import ArcWish, Behavior, Component, CoreService, Host, MissionDescription
 from backbone.mission.report import Fault, MissionInvalid, Report
+from backbone.mission.room_files import room_text
 from backbone.mission.schema import apply_schema, schema_text
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, Tables, parameters, section
 from backbone.naming import Subsystem
@@ -52,7 +53,7 @@ def _describe(root: Element, source: str) -> MissionDescription:
         core=tuple(_core(root, list(tables.hosts))),
         types=tuple(_component_type(component_type) for component_type in section(root, "types")),
         resources=tuple(_resource(resource, tables) for resource in section(root, "resources")),
-        components=() if tables.world is None else (_world(tables.world, tables),),
+        components=() if tables.world is None else (_world(tables.world, tables, source),),
         behaviors=tuple(_behavior(behavior) for behavior in section(root, "behaviors")),
         source=source,
     )
@@ -100,17 +101,17 @@ def _resource(resource: Element, tables: Tables) -> Resource:
     )
 
 
-def _world(world: Element, tables: Tables) -> Component:
+def _world(world: Element, tables: Tables, source: str) -> Component:
     return Component(
         type=world.text("type"),
         name=world.text("name"),
         host=world.text("host"),
-        parameters={**parameters(world), WORLD: _world_content(world, tables)},
+        parameters={**parameters(world), WORLD: _world_content(world, tables, source)},
         process=world.text("process"),
     )
 
 
-def _world_content(world: Element, tables: Tables) -> dict[str, Any]:
+def _world_content(world: Element, tables: Tables, source: str) -> dict[str, Any]:
     """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
     room = world.first("room")
     if room is None:
@@ -128,6 +129,7 @@ def _world_content(world: Element, tables: Tables) -> dict[str, Any]:
                 "width_m": _number(box, "width-m"),
                 "depth_m": _number(box, "depth-m"),
                 "height_m": _number(box, "height-m"),
+                "shape": box.text("shape"),
             }
             for box in world.all("furniture")
         ],
@@ -138,6 +140,8 @@ def _world_content(world: Element, tables: Tables) -> dict[str, Any]:
                 "x_m": _number(scout, "x-m"),
                 "y_m": _number(scout, "y-m"),
                 "heading_rad": math.radians(_number(scout, "heading-deg")),
+                "kind": scout.text("class"),
+                "carried_by": scout.text("carried-by"),
             }
             for scout in world.all("scout")
         ],
@@ -153,6 +157,39 @@ def _world_content(world: Element, tables: Tables) -> dict[str, Any]:
             }
             for target in world.all("target")
         ],
+        "ramps": [
+            {
+                "name": ramp.text("name"),
+                "x_m": _number(ramp, "x-m"),
+                "y_m": _number(ramp, "y-m"),
+                "length_m": _number(ramp, "length-m"),
+                "width_m": _number(ramp, "width-m"),
+                "height_m": _number(ramp, "height-m"),
+                "heading_rad": math.radians(_number(ramp, "heading-deg")),
+            }
+            for ramp in world.all("ramp")
+        ],
+        "landmarks": [
+            {
+                "name": landmark.text("name"),
+                "x_m": _number(landmark, "x-m"),
+                "y_m": _number(landmark, "y-m"),
+                "heading_rad": math.radians(_number(landmark, "heading-deg")),
+            }
+            for landmark in world.all("landmark")
+        ],
+        "dark_places": [
+            {
+                "name": dark.text("name"),
+                "x_m": _number(dark, "x-m"),
+                "y_m": _number(dark, "y-m"),
+                "width_m": _number(dark, "width-m"),
+                "depth_m": _number(dark, "depth-m"),
+                "height_m": _number(dark, "height-m"),
+            }
+            for dark in world.all("dark")
+        ],
+        "mjcf": room_text(source, room.text("mjcf")) if room.text("mjcf") else "",
     }
 
 

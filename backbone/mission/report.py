@@ -68,6 +68,11 @@ class Report:
         self._faults: list[Fault] = []
         self._hints_left = HINTS_AT_MOST
 
+    @property
+    def file(self) -> str:
+        """The file, as it was named to the reader."""
+        return self._file
+
     def fault(self, place: Place, message: str, remedy: str) -> None:
         """Add a fault."""
         self._faults.append(Fault(self._file, place.line, place.column, message, remedy.rstrip(".")))

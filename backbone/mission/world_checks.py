@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import re
+from itertools import pairwise
+
+from backbone.mission.class_paths import class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told
+from backbone.mission.room_files import check_room_file
 from backbone.mission.tables import (
     NETWORK_ID,
     SIMULATED,
@@ -16,6 +22,11 @@ from backbone.mission.tables import (
 )
 from backbone.naming import Subsystem, is_legal
 
+BODIES = ("furniture", "ramp", "landmark", "dark", "scout", "target")
+_CLASS_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")  # what else it may be, the schema refuses
+CARRIER = "carrier"  # the shape of a target that brings robots in
+NEAREST_SET_DOWN_M, FARTHEST_SET_DOWN_M = 0.45, 1.2  # as scout_model.dimensions has them; a test compares
+CARRIER_PLACES = 6  # same
 PAIRS_AT_MOST = 1_000_000  # chosen: half a second; a thousand robots among a thousand tables
 
 
@@ -27,16 +38,22 @@ def check_world(tables: Tables, report: Report) -> None:
     _check_type(world, tables, report)
     check_host(world, tables, report)
     check_parameters(world, (WORLD,), report)
-    bodies = [child for child in world.children if child.tag in ("furniture", "scout", "target")]
+    bodies = [child for child in world.children if child.tag in BODIES]
     check_unique(bodies, "name", "body", report)
     _check_robots(world, tables, report)
+    _check_classes(world, report)
     room = world.first("room")
+    if room is not None:
+        check_room_file(room, report)
     width_m, depth_m = (None, None) if room is None else (room.number("width-m"), room.number("depth-m"))
     if width_m is not None and depth_m is not None and width_m > 0 and depth_m > 0:
         for body in bodies:
             for place in body.all("point") if body.tag == "target" else [body]:
                 _check_inside(place, body, width_m, depth_m, report)
-    _check_not_in_boxes(world.all("scout"), world.all("furniture"), report)
+    boxes = [box for box in world.all("furniture") if box.text("shape") != "table"]
+    _check_not_in_boxes(world.all("scout"), boxes, report)
+    _check_not_in_ramps(world.all("scout"), world.all("ramp"), report)
+    _check_carried(world, report)
     for target in world.all("target"):
         _check_path(target, report)
 
@@ -91,7 +108,7 @@ def _check_robots(world: Element, tables: Tables, report: Report) -> None:
 def _check_inside(place: Element, body: Element, width_m: float, depth_m: float, report: Report) -> None:
     for along, attribute, extent, room_m in (("x", "x-m", "width-m", width_m), ("y", "y-m", "depth-m", depth_m)):
         middle_m = place.number(attribute)
-        half_m = (place.number(extent) or 0.0) / 2 if place.tag == "furniture" else 0.0
+        half_m = (place.number(extent) or 0.0) / 2 if place.tag in ("furniture", "dark") else 0.0
         if middle_m is None or half_m <= middle_m <= room_m - half_m:
             continue
         reach = f"from {middle_m - half_m:g} to {middle_m + half_m:g}" if half_m else f"at {middle_m:g}"
@@ -115,6 +132,25 @@ def _check_not_in_boxes(scouts: list[Element], boxes: list[Element], report: Rep
                 )
 
 
+def _check_not_in_ramps(scouts: list[Element], ramps: list[Element], report: Report) -> None:
+    if len(scouts) * len(ramps) > PAIRS_AT_MOST:
+        return
+    for ramp in ramps:
+        heading_rad = math.radians(ramp.number("heading-deg") or 0.0)
+        x_m, y_m = ramp.number("x-m"), ramp.number("y-m")
+        for scout in scouts:
+            scout_x_m, scout_y_m = scout.number("x-m"), scout.number("y-m")
+            if x_m is None or y_m is None or scout_x_m is None or scout_y_m is None:
+                continue
+            east_m, north_m = scout_x_m - x_m, scout_y_m - y_m
+            along_m = east_m * math.cos(heading_rad) + north_m * math.sin(heading_rad)
+            across_m = north_m * math.cos(heading_rad) - east_m * math.sin(heading_rad)
+            if _is_within(along_m, 0.0, ramp.number("length-m")) and _is_within(across_m, 0.0, ramp.number("width-m")):
+                report.fault(
+                    scout.place, f"scout {scout.text('name')} stands inside {ramp.text('name')}", "Move one of them"
+                )
+
+
 def _is_within(point_m: float | None, middle_m: float | None, extent_m: float | None) -> bool:
     """Say whether a point is between the ends of an extent; never where one of them is missing."""
     if point_m is None or middle_m is None or extent_m is None:
@@ -130,3 +166,55 @@ def _check_path(target: Element, report: Report) -> None:
             f"all way points of {target.text('name')} are the same",
             "Give it a way to go, or make it furniture",
         )
+
+
+def _check_classes(world: Element, report: Report) -> None:
+    for scout in world.all("scout"):
+        class_path = scout.text("class")
+        wrong = class_path_fault(class_path) if _CLASS_PATH.fullmatch(class_path) else None
+        if wrong is not None:
+            message, there = wrong
+            report.fault(
+                scout.place_of("class"),
+                f"{class_path}: {message}{report.hint(class_path.rpartition(':')[2], there)}",
+                "Write the class of the robot's body as package.module:Class, importable on this machine",
+            )
+
+
+def _check_carried(world: Element, report: Report) -> None:
+    """Report robots whose carrier there is not, has no place left for them, or cannot reach where they belong."""
+    carriers = {target.text("name"): target for target in world.all("target") if target.text("shape") == CARRIER}
+    aboard = dict.fromkeys(carriers, 0)
+    for scout in world.all("scout"):
+        carrier = scout.text("carried-by")
+        if not carrier or not is_known(scout, "carried-by", "carrier", carriers, report) or carrier not in carriers:
+            continue
+        aboard[carrier] += 1
+        if aboard[carrier] == CARRIER_PLACES + 1:
+            report.fault(
+                scout.place_of("carried-by"), f"{carrier} has {CARRIER_PLACES} places", "Give it to another carrier"
+            )
+        distance_m = _distance_to_path_m(scout, carriers[carrier])
+        if distance_m is not None and not NEAREST_SET_DOWN_M <= distance_m <= FARTHEST_SET_DOWN_M:
+            report.fault(
+                scout.place_of("carried-by"),
+                f"{carrier} passes {scout.text('name')}'s place {distance_m:.2f} m away",
+                f"Its arm reaches from {NEAREST_SET_DOWN_M} to {FARTHEST_SET_DOWN_M} m beside its path",
+            )
+
+
+def _distance_to_path_m(scout: Element, target: Element) -> float | None:
+    """Return how far a robot's place is from a target's path; None where a number is missing."""
+    x_m, y_m = scout.number("x-m"), scout.number("y-m")
+    points = [(point.number("x-m"), point.number("y-m")) for point in target.all("point")]
+    if x_m is None or y_m is None or len(points) < 2:
+        return None
+    nearest_m = math.inf
+    for (ax, ay), (bx, by) in pairwise(points):
+        if ax is None or ay is None or bx is None or by is None:
+            return None
+        squared = (bx - ax) ** 2 + (by - ay) ** 2
+        share = 0.0 if squared == 0 else ((x_m - ax) * (bx - ax) + (y_m - ay) * (by - ay)) / squared
+        share = min(1.0, max(0.0, share))
+        nearest_m = min(nearest_m, math.dist((x_m, y_m), (ax + share * (bx - ax), ay + share * (by - ay))))
+    return nearest_m
