@@ -13,6 +13,7 @@ from __future__ import annotations
 from backbone.errors import Refusal
 from backbone.rc_manager.messages import Usage
 from backbone.wire import Message
+from scout_model.description import AirDescription
 
 
 # ---------------------------------------------------------------------- decision process → ARC
@@ -356,6 +357,8 @@ class RadioPacket(Message, frozen=True):
         payload: Bytes of the robot's protocol.
         arc: For the audit: who held robot and radio.
         epoch: For the audit: the robot's epoch under which the payload was made.
+        number: Of the packet among those of its radio since it was opened.
+        air_time_s: How long its bits take.
     """
 
     radio: str
@@ -363,6 +366,8 @@ class RadioPacket(Message, frozen=True):
     payload: bytes
     arc: str = ""
     epoch: int = 0
+    number: int = 0
+    air_time_s: float = 0.0
 
 
 class AskWorld(Message, frozen=True):
@@ -370,15 +375,21 @@ class AskWorld(Message, frozen=True):
 
 
 class WorldModel(Message, frozen=True):
-    """Answer to ``AskWorld``: enough to draw the same pictures elsewhere.
+    """Answer to ``AskWorld``: enough to draw the same pictures elsewhere, and to receive them.
 
     Attributes:
         mjcf: The compiled world's XML.
         robots: Robot name → network id.
+        seed: Of everything random in the world.
+        air: Between robots and base.
+        antenna_m: Where the base's antenna stands: x, y, z.
     """
 
     mjcf: str
     robots: dict[str, int]
+    seed: int = 0
+    air: AirDescription = AirDescription()
+    antenna_m: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
 
 class AskPose(Message, frozen=True):
@@ -405,12 +416,16 @@ class WorldState(Message, frozen=True):
         at_s: Mission time it shows.
         state: float64 vector, little endian; meaning is the model's alone.
         transmitting: Robot → video frequency its transmitter is on at.
+        on_since: Robot that transmits → first frame in which it did on this frequency.
+        motors: Robot that transmits → how fast its wheels turn, 0 to 1 of their limit; one that is missing stands.
     """
 
     frame: int
     at_s: float
     state: bytes
     transmitting: dict[str, str]
+    on_since: dict[str, int] = {}
+    motors: dict[str, float] = {}
 
 
 class ClockTick(Message, frozen=True):

@@ -25,9 +25,11 @@ from resource_pool.messages import (
     WorldModel,
     WorldState,
 )
+from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S
 from scout_model.errors import UnknownBody
+from scout_model.radio_air import RadioAir, Sent
 from scout_model.world import World
 
 
@@ -52,7 +54,12 @@ class SimulatedWorld(Component[WorldParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._world = World(self.parameters.world)
+        described = self.parameters.world
+        self._world = World(described)
+        self._antenna_m = antenna_m(described.air, described.width_m, described.depth_m)
+        self._air = RadioAir(described.seed, described.air)
+        self._robots = {scout.network_id: scout.name for scout in described.scouts}
+        self._on_since: dict[str, tuple[str, int]] = {}
         self._epochs: dict[int, int] = {}
         self._packets = self._stale = self._late_frames = 0
         self._jammed_frames = 0
@@ -70,6 +77,8 @@ class SimulatedWorld(Component[WorldParameters]):
             due_s = first_s + frame / FRAMES_PER_S
             self._late_frames += self.clock.now_s() > due_s + 1.0 / FRAMES_PER_S
             await self.clock.sleep_until_s(due_s)
+            for packet in self._air.arrived(due_s):
+                self._world.hear(packet.network_id, packet.payload)
             self._world.step_frame()
             self._publish(frame, due_s)
 
@@ -78,7 +87,8 @@ class SimulatedWorld(Component[WorldParameters]):
         match asked.body:
             case AskWorld():
                 robots = {scout.name: scout.network_id for scout in self.parameters.world.scouts}
-                return WorldModel(self._world.mjcf, robots)
+                described = self.parameters.world
+                return WorldModel(self._world.mjcf, robots, described.seed, described.air, self._antenna_m)
             case AskPose(body=body):
                 try:
                     x_m, y_m, heading_rad = self._world.pose(body)
@@ -89,8 +99,13 @@ class SimulatedWorld(Component[WorldParameters]):
 
     def statistics(self) -> dict[str, float]:
         """Count packets, and what must never be: packets of an epoch that is over, frames with a jammed frequency."""
+        lost, delivered = self._air.lost, self._air.delivered
         return {
             "packets": self._packets,
+            "packets_lost": sum(lost.values()),
+            "packets_for_nobody": self._air.for_nobody,
+            **{f"packets_lost_{name}": lost.get(network_id, 0) for network_id, name in self._robots.items()},
+            **{f"packets_delivered_{name}": delivered.get(network_id, 0) for network_id, name in self._robots.items()},
             "stale_packets": self._stale,
             "jammed_frames": self._jammed_frames,
             "late_frames": self._late_frames,
@@ -104,12 +119,23 @@ class SimulatedWorld(Component[WorldParameters]):
             self._stale += 1
             self.story.note(packet.arc, f"sent robot {packet.network_id} a packet of the past epoch {packet.epoch}")
         self._epochs[packet.network_id] = max(packet.epoch, self._epochs.get(packet.network_id, 0))
-        self._world.hear(packet.network_id, packet.payload)
+        robot = self._robots.get(packet.network_id)
+        away_m = None if robot is None else distance_m(self._world.position_m(robot), self._antenna_m)
+        sent = Sent(
+            packet.radio, packet.number, packet.network_id, packet.payload, self.clock.now_s(), packet.air_time_s
+        )
+        self._air.send(sent, away_m)
 
     def _publish(self, frame: int, at_s: float) -> None:
         transmitting = self._world.transmitting()
         if len(set(transmitting.values())) < len(transmitting):
             self._jammed_frames += 1
-        state = WorldState(frame, at_s, self._world.state().tobytes(), transmitting)
+        self._on_since = {
+            robot: since if (since := self._on_since.get(robot, ("", 0)))[0] == frequency else (frequency, frame)
+            for robot, frequency in transmitting.items()
+        }
+        on_since = {robot: since for robot, (_, since) in self._on_since.items()}
+        motors = {robot: motors for robot in transmitting if (motors := round(self._world.motors(robot), 2))}
+        state = WorldState(frame, at_s, self._world.state().tobytes(), transmitting, on_since, motors)
         self.bus.publish(self.address, Conversation.TELEMETRY, state)
         self.bus.publish(self.address, Conversation.CLOCK, ClockTick(frame, at_s, self.clock.rate))

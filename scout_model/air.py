@@ -1,4 +1,4 @@
-"""The air between the robots and the base: what a mission says of it, and how a signal gets through.
+"""The air between the robots and the base: how a signal gets through.
 
 Pure functions of distance, time and seed; ``scout_model.video_link`` and ``scout_model.radio_air``
 make pictures and packets of them.
@@ -8,8 +8,8 @@ Sources of the models:
 * Path loss: log-distance, as fitted indoors (Rappaport, "Wireless Communications", section 4.9).
 * Fading: Rayleigh's, by Clarke's and Jakes's sum of waves from all directions (Jakes, "Microwave Mobile
   Communications", chapter 1): share of time below a level, and how long it stays there.
-* Which kinds of noise there are: RAM 2002, "Visual Servoing" and "Surveillance" (motors, multipath, weak signal;
-  horizontal lines, white noise, partial images with whole wrong rows).
+* Which kinds of noise there are: RAM 2002, "Visual Servoing" and "Distributed Surveillance Task" (motors, multipath,
+  weak signal; horizontal lines, white noise, partial images with whole wrong rows).
 """
 
 from __future__ import annotations
@@ -17,23 +17,19 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Sequence
-from typing import Annotated
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-Scale = Annotated[float, msgspec.Meta(ge=0, le=10)]
-Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
-Offset = Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
+from scout_model.description import AirDescription
 
 SNR_AT_1_M_DB = 46.0  # chosen: a good analog picture near the antenna
 LOSS_DB_PER_DECADE = 22.0  # chosen: a little more than the 20 of free space, an open room
 REFERENCE_M = 4.0  # chosen: from the middle of the papers' rooms, about 9 x 6 m, to where their Scouts stood
 NEAREST_M = 0.1  # chosen: nearer, the formula of the far field means nothing
 
-FADED_SHARE = 0.25  # SCHEDULING, "The experiment": three quarters of the papers' frames are clean
-FADE_S = 0.15  # same place: how long the picture stays bad, on average
+FADED_SHARE = 0.25  # chosen: with the next it explains the fifth of motions RAM 2002 missed without other load
+FADE_S = 0.15  # chosen: same; how long a fade lasts on average where this share of time is faded
 WAVES = 48  # chosen: enough that a run's share of fades is Rayleigh's within a few per cent
 
 RADIO_SNR_AT_1_M_DB = 46.0  # chosen: as the video's; packets then reach across any room, but not across a street
@@ -41,56 +37,6 @@ LIGHT_M_PER_S = 299_792_458.0
 
 _DEPTH = -math.log(1.0 - FADED_SHARE)  # power, of the mean, below which Rayleigh's fading is for this share of time
 _DOPPLER_HZ = (math.exp(_DEPTH) - 1.0) / (math.sqrt(2 * math.pi * _DEPTH) * FADE_S)  # Jakes: duration of a fade
-
-
-class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the air does to packets and pictures. The default is mild: a good day in the papers' room.
-
-    Scales go from 0, off, over 1, as the papers tell, to 10; ``noise`` multiplies the five next to it.
-
-    Attributes:
-        noise: Of all five kinds of noise in a picture.
-        white_noise: Grain of the receiver, stronger with distance.
-        tears: Horizontal lines, few by themselves, many while the robot's motors run.
-        ghosts: Echoes of the picture a little to its right, from multipath.
-        fades: Moments in which multipath leaves too little signal to keep the rows in place.
-        partial_frames: Pictures whose lower rows the framegrabber did not get: black, noise, or those of an older one.
-        weak_signal: How much distance counts; 0: every robot is received as from ``REFERENCE_M``.
-        settling: Of ``SETTLING_S``, for which the picture rolls after transmitter or receiver were switched to a
-            frequency.
-        interference: Share of the rows that two transmitters on one frequency spoil; the rest is the nearer one's.
-        snow: Contrast of the noise on a frequency nobody uses; 0: gray.
-        radio_loss: Share of command packets lost wherever the robot is, besides those lost by distance.
-        radio_delay_s: From a packet's end on the air to the robot's having read it.
-        antenna_x_m: Of the base's one antenna for packets and pictures; None: the middle of the room.
-        antenna_y_m: Same.
-        antenna_z_m: Above the floor.
-    """
-
-    noise: Scale = 0.25
-    white_noise: Scale = 1.0
-    tears: Scale = 1.0
-    ghosts: Scale = 1.0
-    fades: Scale = 1.0
-    partial_frames: Scale = 1.0
-    weak_signal: Scale = 1.0
-    settling: Scale = 1.0
-    interference: Share = 1.0
-    snow: Share = 1.0
-    radio_loss: Share = 0.0
-    radio_delay_s: Share = 0.002
-    antenna_x_m: Offset | None = None
-    antenna_y_m: Offset | None = None
-    antenna_z_m: Annotated[float, msgspec.Meta(ge=0, le=100)] = 1.0
-
-
-AS_THE_PAPERS = AirDescription(noise=1.0)
-"""Three quarters of the frames from ``REFERENCE_M`` are clean, the others come in bursts of 0.15 s on average."""
-
-CLEAN_AIR = AirDescription(
-    noise=0.0, weak_signal=0.0, settling=0.0, interference=0.0, snow=0.0, radio_loss=0.0, radio_delay_s=0.0
-)
-"""Every picture arrives as it was sent, every packet at once."""
 
 
 def distance_m(position_m: Sequence[float], antenna_m: Sequence[float]) -> float:
@@ -118,7 +64,7 @@ def counted_distance_m(away_m: float, weak_signal: float) -> float:
         >>> counted_distance_m(9.0, weak_signal=1.0), counted_distance_m(9.0, weak_signal=0.0)
         (9.0, 4.0)
     """
-    return REFERENCE_M * float(away_m / REFERENCE_M) ** weak_signal
+    return REFERENCE_M * math.pow(away_m / REFERENCE_M, weak_signal)
 
 
 def snr_db(away_m: float) -> float:
@@ -131,7 +77,7 @@ def fade_level(away_m: float) -> float:
 
     It grows as the mean shrinks with distance: at ``REFERENCE_M`` power is below it for ``FADED_SHARE`` of the time.
     """
-    return _DEPTH * (away_m / REFERENCE_M) ** (LOSS_DB_PER_DECADE / 10)
+    return _DEPTH * math.pow(away_m / REFERENCE_M, LOSS_DB_PER_DECADE / 10)
 
 
 def packet_loss(away_m: float, bits: int) -> float:

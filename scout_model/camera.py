@@ -158,6 +158,18 @@ class Camera:
             self._memo.popitem(last=False)
         return picture
 
+    def position_m(self, robot: str) -> tuple[float, float, float]:
+        """Return where this robot's camera is, x, y and z in metres.
+
+        Raises:
+            UnknownBody: No robot with a camera has this name.
+        """
+        camera = self._cameras.get(robot)
+        if camera is None:
+            raise UnknownBody(f"no robot named {robot!r} has a camera")
+        x_m, y_m, z_m = self._data.cam_xpos[camera]
+        return float(x_m), float(y_m), float(z_m)
+
     def close(self) -> None:
         """Free the graphics context; may be called again."""
         self._drawing.close()

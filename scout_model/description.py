@@ -6,9 +6,13 @@ Headings: 0 looks along +x, counter-clockwise is positive.
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
 
-from scout_model.air import AirDescription
+Scale = Annotated[float, msgspec.Meta(ge=0, le=10)]
+Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
+Offset = Annotated[float, msgspec.Meta(ge=-1000, le=1000)]
 
 
 class Furniture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -141,6 +145,56 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     begin_s: float = 0.0
     rest_s: float = 0.0
     there_and_back: bool = True
+
+
+class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the air does to packets and pictures. The default is mild: a good day in the papers' room.
+
+    Scales go from 0, off, over 1, as the papers tell, to 10; ``noise`` multiplies the five next to it.
+
+    Attributes:
+        noise: Of all five kinds of noise in a picture.
+        white_noise: Grain of the receiver, stronger with distance.
+        tears: Horizontal lines, few by themselves, many while the robot's motors run.
+        ghosts: Echoes of the picture a little to its right, from multipath.
+        fades: Moments in which multipath leaves too little signal to keep the rows in place.
+        partial_frames: Pictures whose lower rows the framegrabber did not get: black, noise, or those of an older one.
+        weak_signal: How much distance counts; 0: every robot is received as from ``scout_model.air.REFERENCE_M``.
+        settling: How long the picture rolls after transmitter or receiver were switched to a
+            frequency.
+        interference: Share of the rows that two transmitters on one frequency spoil; the rest is the nearer one's.
+        snow: Contrast of the noise on a frequency nobody uses; 0: gray.
+        radio_loss: Share of command packets lost wherever the robot is, besides those lost by distance.
+        radio_delay_s: From a packet's end on the air to the robot's having read it.
+        antenna_x_m: Of the base's one antenna for packets and pictures; None: the middle of the room.
+        antenna_y_m: Same.
+        antenna_z_m: Above the floor.
+    """
+
+    noise: Scale = 0.25
+    white_noise: Scale = 1.0
+    tears: Scale = 1.0
+    ghosts: Scale = 1.0
+    fades: Scale = 1.0
+    partial_frames: Scale = 1.0
+    weak_signal: Scale = 1.0
+    settling: Scale = 1.0
+    interference: Share = 1.0
+    snow: Share = 1.0
+    radio_loss: Share = 0.0
+    radio_delay_s: Share = 0.002
+    antenna_x_m: Offset | None = None
+    antenna_y_m: Offset | None = None
+    antenna_z_m: Annotated[float, msgspec.Meta(ge=0, le=100)] = 1.0
+
+
+AS_THE_PAPERS = AirDescription(noise=1.0)
+"""Three quarters of the frames from ``REFERENCE_M`` are clean, the others come in bursts of 0.15 s on average."""
+
+CLEAN_AIR = AirDescription(
+    noise=0.0, weak_signal=0.0, settling=0.0, interference=0.0, snow=0.0, radio_loss=0.0, radio_delay_s=0.0
+)
+"""Every picture arrives as it was sent, every packet at once."""
 
 
 class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -18,6 +18,8 @@ from dataclasses import dataclass
 from scout_model.errors import MalformedPacket
 
 MAX_FREQUENCY_NAME_BYTES = 15  # chosen: a transmitter-on packet then has 16 bytes
+HEAD_BYTES = 3  # chosen: network id and a check sum of two bytes
+BITS_PER_BYTE = 10  # chosen: serial, with a start and a stop bit
 FIRST_NETWORK_ID = 1
 LAST_NETWORK_ID = 254  # chosen: one byte, without all zeros and all ones
 
@@ -60,6 +62,16 @@ class Safe:
 
 
 Packet = Drive | Halt | Jump | TransmitterOn | TransmitterOff | Safe
+
+
+def packet_bits(payload: bytes) -> int:
+    """Return how many bits a packet with this payload has on the air, its head included.
+
+    Example:
+        >>> packet_bits(encode_halt())
+        40
+    """
+    return (HEAD_BYTES + len(payload)) * BITS_PER_BYTE
 
 
 def encode_drive(left_rad_s: float, right_rad_s: float) -> bytes:

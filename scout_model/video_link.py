@@ -2,7 +2,8 @@
 
 IROS 2001, section 2: only one robot can transmit on a frequency at a time; signals of several
 interfere with each other and become useless.  Without a transmitter there is snow.  RAM 2002, "Visual
-Servoing" and "Surveillance": motors tear lines, multipath makes ghosts, weak signals leave partial images.
+Servoing" and "Distributed Surveillance Task": motors tear lines, multipath makes ghosts, weak signals
+leave partial images.
 
 Rule: what becomes of a frame depends on the receiver's seed, frequency and air, on the frame's number
 and signals, and on what was received since the receiver was tuned; nothing else.  Each effect has
@@ -21,12 +22,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scout_model.air import REFERENCE_M, AirDescription, Fading, counted_distance_m, fade_level, key_of, snr_db
+from scout_model.air import REFERENCE_M, Fading, counted_distance_m, fade_level, key_of, snr_db
+from scout_model.description import AirDescription
 from scout_model.dimensions import FRAMES_PER_S, PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX
 
 Picture = NDArray[np.uint8]
 
-SETTLING_S = 0.3  # SCHEDULING, "The experiment": until a receiver has locked to the picture
+SETTLING_S = 0.3  # chosen: nine frames until receiver and framegrabber have locked to a picture
 SNOW_LEVELS = 70.0  # chosen: standard deviation in grey levels; black and white specks all over
 FAINTEST_LEVELS = 0.1  # chosen: a weaker grain is rounded away
 WEAK_DB = 16.0  # chosen: below, contrast fades towards gray
@@ -270,12 +272,12 @@ def _grain() -> NDArray[np.float32]:
     white = np.random.default_rng(0).standard_normal(shape, np.float32)
     # A video amplifier has less bandwidth than the picture has columns: noise is smeared along its rows.
     smeared = np.asarray(cv2.GaussianBlur(white, (5, 1), 0), np.float32)
-    return smeared / smeared.std()
+    return np.asarray(smeared / smeared.std(), np.float32)
 
 
 @functools.lru_cache(64)
 def _bank(level_db: int) -> NDArray[np.int16]:
-    return np.rint(10 ** (level_db / 20) * _grain()).astype(np.int16)
+    return np.asarray(np.rint(math.pow(10, level_db / 20) * _grain()), np.int16)
 
 
 def _window(levels: float, rng: np.random.Generator) -> NDArray[np.int16]:

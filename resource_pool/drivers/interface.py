@@ -106,6 +106,7 @@ class Picture:
         height_px: Rows.
         transmitters: How many transmitters were heard on the frequency; -1 where the hardware cannot tell.
         robot: The one that was heard, if exactly one and the hardware can tell; else empty.
+        kind: What is worst about the picture, where that is known, for counts only: ``clean``, ``torn``, …; else empty.
     """
 
     captured_s: float
@@ -114,6 +115,7 @@ class Picture:
     height_px: int
     transmitters: int = -1
     robot: str = ""
+    kind: str = ""
 
 
 class FramegrabberDriver(Protocol):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated
 
 import msgspec
@@ -16,8 +17,6 @@ from scout_model import radio_link
 from scout_model.errors import MalformedPacket
 from scout_model.scout import clip_wheel_speed
 
-HEAD_BYTES = 3  # chosen: network id and a check sum of two bytes
-BITS_PER_BYTE = 10  # chosen: serial, with a start and a stop bit
 WORLD_START_S = 20.0  # chosen: the world compiles its model before it answers
 
 
@@ -58,6 +57,7 @@ class SimulatedRadio:
     def __init__(self, site: DriverSite) -> None:
         self._site, self._world = site, world_of(site)
         self._bits_per_s = site.options(RadioOptions).bits_per_s
+        self._numbers = itertools.count()
 
     def adjust(self, site: DriverSite) -> None:
         """Send at the new rate from the next packet on."""
@@ -68,9 +68,18 @@ class SimulatedRadio:
 
     async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> float | None:
         """Put the packet on the air; nobody acknowledges it, as on the air. Return how long its bytes take."""
-        packet = RadioPacket(self._site.resource, network_id, payload, arc, robot_epoch)
+        air_time_s = radio_link.packet_bits(payload) / self._bits_per_s
+        packet = RadioPacket(
+            self._site.resource,
+            network_id,
+            payload,
+            arc,
+            robot_epoch,
+            number=next(self._numbers),
+            air_time_s=air_time_s,
+        )
         self._site.bus.publish(self._world, Conversation.COMMAND, packet)
-        return (HEAD_BYTES + len(payload)) * BITS_PER_BYTE / self._bits_per_s
+        return air_time_s
 
     async def close(self) -> None:
         """Nothing is held."""

@@ -13,6 +13,7 @@ import importlib
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import msgspec
@@ -23,10 +24,9 @@ from backbone.keys import Conversation
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import meet_world, world_of
-from resource_pool.messages import WorldState
+from resource_pool.messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe
 
-RECEIVER_SEED = 1  # chosen: the noise of a run repeats
 EARLY_S = 1 / 120  # chosen: a quarter of a frame; the times of frames are rounded, and no frame is left out for that
 
 
@@ -53,7 +53,7 @@ class SimulatedFramegrabber:
         self._world: Subscription | None = None
         self._frequency = ""
         self._deliver: Callable[[Picture], None] | None = None
-        self._is_drawing = False
+        self._is_drawing = self._is_new = False
         self._taking: set[asyncio.Task[None]] = set()
         self._next_s = -math.inf
         self._pause_s = 1.0 / site.parameters.frame_rate_hz
@@ -70,7 +70,7 @@ class SimulatedFramegrabber:
         choosing = run(None, _choose, self._site.parameters.camera)
         world = await meet_world(self._site)
         support, backend = await choosing
-        self._studio = await run(self._thread, _Studio, world.mjcf, support, backend)
+        self._studio = await run(self._thread, _Studio, world, support, backend)
         if support is not None and support.missing_packages:
             self._site.tell(support.summary)
         self._world = self._site.bus.subscribe(
@@ -79,7 +79,7 @@ class SimulatedFramegrabber:
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
         """Receive this frequency from now on; see ``FramegrabberDriver.tune``."""
-        self._frequency, self._deliver, self._next_s = frequency, deliver, -math.inf
+        self._frequency, self._deliver, self._next_s, self._is_new = frequency, deliver, -math.inf, True
 
     def stop(self) -> None:
         """Hand nothing over any more; see ``FramegrabberDriver.stop``."""
@@ -104,7 +104,9 @@ class SimulatedFramegrabber:
         in_time = state.at_s < self._next_s + self._pause_s
         self._next_s = (self._next_s if in_time else state.at_s) + self._pause_s
         self._is_drawing = True
-        taking = asyncio.create_task(self._take(state, self._frequency, self._deliver), name="take picture")
+        tuned = _Tuned(self._frequency, self._deliver, self._is_new)
+        self._is_new = False
+        taking = asyncio.create_task(self._take(state, tuned), name="take picture")
         self._taking.add(taking)
         taking.add_done_callback(self._taken)
 
@@ -113,40 +115,71 @@ class SimulatedFramegrabber:
         if not taking.cancelled() and (bug := taking.exception()) is not None:
             self._site.fail(bug)
 
-    async def _take(self, state: WorldState, frequency: str, deliver: Callable[[Picture], None]) -> None:
+    async def _take(self, state: WorldState, tuned: _Tuned) -> None:
         assert self._studio is not None  # noqa: S101  open before the first state can arrive
         run = asyncio.get_running_loop().run_in_executor
         try:
-            picture = await run(self._thread, self._studio.take, state, frequency)
+            picture = await run(self._thread, self._studio.take, state, tuned.frequency, tuned.is_new)
         finally:
             self._is_drawing = False
         await self._site.clock.sleep_until_s(state.at_s + self._delay_s)
-        if self._deliver is deliver:
-            deliver(picture)
+        if self._deliver is tuned.deliver:
+            tuned.deliver(picture)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tuned:
+    """For whom a picture is; the first after the tuning is of a receiver that has yet to lock."""
+
+    frequency: str
+    deliver: Callable[[Picture], None]
+    is_new: bool
 
 
 class _Studio:
     """Cameras of all robots and one receiver a frequency; lives in the drawing thread."""
 
-    def __init__(self, mjcf: str, support: GlSupport | None, backend: str) -> None:
+    def __init__(self, world: WorldModel, support: GlSupport | None, backend: str) -> None:
         prepare(support.backend if support is not None and backend == "gl" else "none")
-        self._camera = importlib.import_module("scout_model.camera").Camera(mjcf, backend)
-        self._receiver_class = importlib.import_module("scout_model.video_link").Receiver
+        self._camera = importlib.import_module("scout_model.camera").Camera(world.mjcf, backend)
+        self._video_link = importlib.import_module("scout_model.video_link")
+        self._distance_m = importlib.import_module("scout_model.air").distance_m
+        self._world = world
         self._receivers: dict[str, Any] = {}
 
-    def take(self, state: WorldState, frequency: str) -> Picture:
+    def take(self, state: WorldState, frequency: str, is_new: bool) -> Picture:
         """Return what the receiver of this frequency gives for this state of the world."""
         receiver = self._receivers.get(frequency)
         if receiver is None:
-            receiver = self._receivers[frequency] = self._receiver_class(RECEIVER_SEED, frequency)
+            receiver = self._video_link.Receiver(self._world.seed, frequency, self._world.air)
+            self._receivers[frequency] = receiver
+        if is_new:
+            receiver.tune()
         heard = sorted(robot for robot, on in state.transmitting.items() if on == frequency)
         if heard:
             self._camera.show(np.frombuffer(state.state, np.float64))
-        reception = receiver.receive([self._camera.picture(robot) for robot in heard], state.frame)
+        reception = receiver.receive([self._signal(robot, state) for robot in heard], state.frame)
         pixels = np.ascontiguousarray(reception.picture)
         height_px, width_px = pixels.shape
         robot = heard[0] if len(heard) == 1 else ""
-        return Picture(state.at_s, pixels.reshape(-1).data, width_px, height_px, reception.transmitters, robot)
+        return Picture(
+            state.at_s,
+            pixels.reshape(-1).data,
+            width_px,
+            height_px,
+            reception.transmitters,
+            robot,
+            reception.kind.value,
+        )
+
+    def _signal(self, robot: str, state: WorldState) -> Any:
+        return self._video_link.Signal(
+            self._camera.picture(robot),
+            robot,
+            self._distance_m(self._camera.position_m(robot), self._world.antenna_m),
+            min(1.0, state.motors.get(robot, 0.0)),
+            state.on_since.get(robot, 0),
+        )
 
     def close(self) -> None:
         self._camera.close()

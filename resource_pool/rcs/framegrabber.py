@@ -9,6 +9,7 @@ Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
@@ -57,6 +58,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         super().__init__(launch, bus, clock)
         self._driver: FramegrabberDriver = self.make_driver()
         self._delivered = self._garbled = self._silent = self._foreign = 0
+        self._kinds: Counter[str] = Counter()
 
     async def connect(self) -> None:
         """Open the device, so that the first grant is as quick as the others."""
@@ -88,18 +90,24 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         return Applied(self.name, hold.epoch, self.clock.now_s(), "tune")
 
     def statistics(self) -> dict[str, float]:
-        """Count pictures delivered, and those dropped because nobody, several or another robot was heard."""
+        """Count pictures delivered, and those dropped because nobody, several or another robot was heard.
+
+        Where the hardware knows what is wrong with its pictures, count those of each kind too, delivered or dropped.
+        """
         return {
             **super().statistics(),
             "frames_delivered": self._delivered,
             "frames_garbled": self._garbled,
             "frames_silent": self._silent,
             "frames_foreign": self._foreign,
+            **{f"frames_{kind}": float(count) for kind, count in sorted(self._kinds.items())},
         }
 
     def _deliver(self, hold: Hold, expected: str, picture: Picture, numbers: Iterator[int]) -> None:
         if not self.holds.has(hold.arc, hold.epoch):
             return  # a driver may still be busy with it when it is told to stop
+        if picture.kind:
+            self._kinds[picture.kind] += 1
         if picture.transmitters == 0:
             self._silent += 1
             return
