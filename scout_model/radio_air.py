@@ -1,0 +1,106 @@
+"""The command radio's air: which packets reach their robots, and when.
+
+A packet arrives whole or not at all.  It is lost with a probability that grows with its length and the
+robot's distance.  Whether it is depends on seed, radio and the packet's number alone, so a packet more
+or less on one radio changes the fate of none on another.
+
+IROS 2001, section 2: each robot has a network id of its own, which lets one radio serve many.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from scout_model.air import LIGHT_M_PER_S, counted_distance_m, key_of, packet_loss
+from scout_model.description import AirDescription
+from scout_model.radio_link import packet_bits
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A packet as it leaves a radio.
+
+    Attributes:
+        radio: Name of the radio.
+        number: Of the packet among those of its radio, 0 or more.
+        network_id: Robot it is for.
+        payload: As ``scout_model.radio_link`` encodes it.
+        begun_s: When its first bit was sent.
+        air_time_s: How long its bits take, 0 or more.
+    """
+
+    radio: str
+    number: int
+    network_id: int
+    payload: bytes
+    begun_s: float
+    air_time_s: float
+
+
+class RadioAir:
+    """Packets between the base's antenna and the robots.
+
+    Args:
+        seed: Of the world.
+        air: How packets are delayed and lost.
+    """
+
+    def __init__(self, seed: int, air: AirDescription) -> None:
+        self._seed, self._air = abs(seed), air
+        self._flying: list[tuple[float, int, Sent]] = []
+        self._order = itertools.count()
+        self._delivered: Counter[int] = Counter()
+        self._lost: Counter[int] = Counter()
+        self._for_nobody = 0
+
+    @property
+    def delivered(self) -> Mapping[int, int]:
+        """Network id → packets that arrived."""
+        return MappingProxyType(self._delivered)
+
+    @property
+    def lost(self) -> Mapping[int, int]:
+        """Network id → packets that will never arrive."""
+        return MappingProxyType(self._lost)
+
+    @property
+    def for_nobody(self) -> int:
+        """Packets to ids no robot has."""
+        return self._for_nobody
+
+    def send(self, sent: Sent, away_m: float | None) -> None:
+        """Put a packet on the air.
+
+        Args:
+            sent: The packet.
+            away_m: How far from the antenna its robot is, above 0; None: no robot has the id.
+        """
+        if away_m is None:
+            self._for_nobody += 1
+        elif self._is_lost(sent, away_m):
+            self._lost[sent.network_id] += 1
+        else:
+            at_s = sent.begun_s + sent.air_time_s + away_m / LIGHT_M_PER_S + self._air.radio_delay_s
+            heapq.heappush(self._flying, (at_s, next(self._order), sent))
+
+    def arrived(self, now_s: float) -> list[Sent]:
+        """Return the packets that have arrived by now and were not returned before, in the order of arrival."""
+        arrived = []
+        while self._flying and self._flying[0][0] <= now_s:
+            _, _, sent = heapq.heappop(self._flying)
+            self._delivered[sent.network_id] += 1
+            arrived.append(sent)
+        return arrived
+
+    def _is_lost(self, sent: Sent, away_m: float) -> bool:
+        by_distance = packet_loss(counted_distance_m(away_m, self._air.weak_signal), packet_bits(sent.payload))
+        lost = 1.0 - (1.0 - by_distance) * (1.0 - self._air.radio_loss)
+        dice = np.random.default_rng((self._seed, key_of(sent.radio), sent.number))
+        return bool(dice.random() < lost)
