@@ -137,6 +137,14 @@ class Behavior(Component[B], Generic[B]):
         What: subscribe to others' events, set up state. Not: wait for the ARC or for children.
         """
 
+    def need(self) -> ArcNeed | None:
+        """Say which ARC to claim.
+
+        When: once, after ``start``. What: by default what the tree says; a behavior that knows better which run
+        times are of use to it returns the same need with those. Not: ask for another kind of ARC.
+        """
+        return self.parameters.arc
+
     async def resumed(self, rcs: Mapping[str, str]) -> None:
         """Go on.
 
@@ -256,7 +264,7 @@ class Behavior(Component[B], Generic[B]):
         if self._parent is not None:
             self._begin(self._end_with(self._parent), "parent")
         await self.start()
-        need = self.parameters.arc
+        need = self.need()
         if need is not None and not self.status.is_final:
             self.arc = ArcClient(self.bus, arc_name(self.bus, need.kind), self, self.not_now)
             self.arc.frames(self._saw)

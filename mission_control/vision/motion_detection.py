@@ -117,6 +117,11 @@ class MotionDetector:
         self._fast_frames_left = FAST_FRAMES
         self._votes.clear()
 
+    @property
+    def has_glimpsed(self) -> bool:
+        """Whether any of the last ``VOTERS`` pictures since the swap had a region, certain or not."""
+        return any(self._votes)
+
     def look(self, frame: NDArray[np.uint8]) -> Blob | None:
         """Return where something moves, or None.
 

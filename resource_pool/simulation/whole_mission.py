@@ -183,7 +183,8 @@ async def mission_in_one_process(
             raise
         raise MissionFell(fell) from error
     finally:
-        hardware = [part.name for part in (*description.resources, *description.components)]
+        hardware = [resource.name for resource in description.resources]
+        hardware += [component.name for component in description.components]
         await asyncio.gather(*(hosts.stop(name, "the mission ends") for name in hardware if hosts.knows(name)))
         await hosts.stop_all()
         await bus.close()
