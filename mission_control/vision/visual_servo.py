@@ -5,12 +5,18 @@ Source: RAM 2002, "Visual Servoing".
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 from mission_control.vision.landmark import Picture
-from mission_control.vision.servo_law import Command, Stage
-from mission_control.vision.skeleton_tracking import Track
+from mission_control.vision.pose_filter import PoseFilter
+from mission_control.vision.servo_law import STOP_M, Approach, Command, Stage
+from mission_control.vision.skeleton_tracking import TargetTracker, Track
 from mission_control.vision.target_pose import SCOUT_CAMERA, CameraModel, TargetPose
+
+LATENCY_S = 0.1  # chosen: from a frame's capture until its command turns the wheels, on one machine
+NEAREST_STOP_M, FARTHEST_STOP_M = 0.40, 1.2  # measured: nearer the T leaves the picture, further the line is unsure
+LONGEST_GAP_S = 0.5  # chosen: the robots' own watchdog has stopped the wheels by then
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +27,7 @@ class Step:
         command: What the robot shall do now.
         stage: Of the approach.
         track: What the tracker said.
-        pose: Where the robot stands, None as long as nobody knows.
+        pose: Where the robot stands, None as long as the target is not in sight.
     """
 
     command: Command
@@ -36,13 +42,45 @@ class VisualServo:
     Args:
         camera: Of the robot.
         stop_m: Distance of the place from the board, along the zero-angle line.
+        latency_s: From a frame's capture until its command turns the wheels.
 
     Raises:
         ValueError: From ``stop_m`` away the landmark does not fit into the picture, or is too small.
     """
 
-    def __init__(self, camera: CameraModel = SCOUT_CAMERA, stop_m: float = 0.45) -> None:
-        raise NotImplementedError
+    def __init__(
+        self, camera: CameraModel = SCOUT_CAMERA, stop_m: float = STOP_M, latency_s: float = LATENCY_S
+    ) -> None:
+        if not NEAREST_STOP_M <= stop_m <= FARTHEST_STOP_M:
+            raise ValueError(f"stop {NEAREST_STOP_M} to {FARTHEST_STOP_M} m before the board, not {stop_m} m")
+        if not 0 <= latency_s < LONGEST_GAP_S:
+            raise ValueError(f"a latency of {latency_s} s is not within 0 to {LONGEST_GAP_S} s")
+        self._tracker = TargetTracker()
+        self._filter = PoseFilter(camera)
+        self._approach = Approach(stop_m)
+        self._latency_s = latency_s
+        self._sent: deque[tuple[float, Command]] = deque()
+        self._now_s = 0.0
+
+    @property
+    def stage(self) -> Stage:
+        """Of the approach."""
+        return self._approach.stage
+
+    @property
+    def approaches(self) -> int:
+        """How often the robot came near the board."""
+        return self._approach.approaches
+
+    @property
+    def searched_rad(self) -> float:
+        """How far the robot turned since it last saw the target; a full turn and more means it is not there."""
+        return self._approach.searched_rad
+
+    @property
+    def tracker(self) -> TargetTracker:
+        """For a look at its models."""
+        return self._tracker
 
     def see(self, frame: Picture, elapsed_s: float) -> Step:
         """Return what to do after this picture.
@@ -54,8 +92,34 @@ class VisualServo:
         Raises:
             ValueError: It is no grey picture, or time runs backwards.
         """
-        raise NotImplementedError
+        if elapsed_s < 0:
+            raise ValueError(f"a picture comes {-elapsed_s} s before the one before it")
+        self._dead_reckon(elapsed_s)
+        track = self._tracker.look(frame)
+        pose = None if track.sighting is None else self._filter.saw(track.sighting)
+        command = self._approach.step(track.phase, pose, min(elapsed_s, LONGEST_GAP_S))
+        self._sent.append((self._now_s + self._latency_s, command))
+        return Step(command, self._approach.stage, track, pose)
 
     def resumed(self) -> None:
-        """Begin again with acquisition, the robot standing still; what is known of the approach is kept."""
-        raise NotImplementedError
+        """Begin again with acquisition, the robot standing still; how often it approached is kept."""
+        self._tracker.forget()
+        self._filter.forget()
+        self._approach.resumed()
+        self._sent.clear()
+
+    def _dead_reckon(self, elapsed_s: float) -> None:
+        """Move the pose by what the wheels did between the two pictures."""
+        begin_s, self._now_s = self._now_s, self._now_s + elapsed_s
+        forward_m = turn_rad = 0.0
+        while self._sent:
+            since_s, command = self._sent[0]
+            until_s = min(self._now_s, self._sent[1][0]) if len(self._sent) > 1 else self._now_s
+            lasted_s = max(0.0, until_s - max(begin_s, since_s))
+            forward_m += command.forward_m_s * lasted_s
+            turn_rad += command.turn_rad_s * lasted_s
+            if len(self._sent) > 1 and self._sent[1][0] <= self._now_s:
+                self._sent.popleft()
+            else:
+                break
+        self._filter.moved(forward_m, turn_rad)

@@ -1,0 +1,63 @@
+"""The robot's place from many pictures: odometry in between, and both sides of the line until one fits.
+
+Source: the extended Kalman filter as in Thrun, Burgard and Fox, "Probabilistic Robotics", section 3.3,
+iterated, with one hypothesis for each side of the zero-angle line (same book, section 7.5).
+"""
+
+from __future__ import annotations
+
+from mission_control.vision.landmark import Sighting
+from mission_control.vision.target_pose import (
+    PIXEL_ERROR_PX,
+    SCOUT_CAMERA,
+    CameraModel,
+    TargetPose,
+    estimate_poses,
+    refine_pose,
+)
+
+FORGETTING = 0.97  # chosen: one second of pictures decides between the two sides
+REFUTED_PX = 1.0  # chosen: four times a disc's error; the pose explains what is seen no longer
+WORSE = 12.0  # chosen: in squared pixel errors; the other side is then given up
+
+
+class PoseFilter:
+    """Where the robot stands, by all sightings so far.
+
+    Args:
+        camera: Of the robot.
+    """
+
+    def __init__(self, camera: CameraModel = SCOUT_CAMERA) -> None:
+        self._camera = camera
+        self._hypotheses: list[tuple[TargetPose, float]] = []
+
+    def forget(self) -> None:
+        """Know nothing: somebody else may have moved the robot."""
+        self._hypotheses = []
+
+    def moved(self, forward_m: float, turn_rad: float) -> None:
+        """Take in that the robot drove an arc, counter-clockwise is positive."""
+        self._hypotheses = [(pose.moved(forward_m, turn_rad), badness) for pose, badness in self._hypotheses]
+
+    def saw(self, sighting: Sighting) -> TargetPose | None:
+        """Take in a sighting and return the likeliest pose, None if no place on the floor explains it."""
+        kept = []
+        for before, badness in self._hypotheses:
+            pose = refine_pose(sighting, before, self._camera)
+            if pose is not None and pose.residual_px < REFUTED_PX:
+                kept.append((pose, FORGETTING * badness + _squared(pose)))
+        if not kept:
+            kept = [(pose, _squared(pose)) for pose in estimate_poses(sighting, self._camera)]
+        kept.sort(key=lambda hypothesis: hypothesis[1])
+        if len(kept) == 2:
+            (best, badness), (other, worse) = kept
+            if worse > badness + WORSE or (abs(best.left_m - other.left_m) < 0.01):
+                kept = kept[:1]
+        self._hypotheses = kept
+        return kept[0][0] if kept else None
+
+
+def _squared(pose: TargetPose) -> float:
+    """Return the sum of the eight squared errors, in units of a disc's usual one."""
+    return 8 * (pose.residual_px / PIXEL_ERROR_PX) ** 2

@@ -1,0 +1,238 @@
+"""The two models of a seen landmark: the subimage of the target, and its skeleton of 17 pixels.
+
+The skeleton has the middle of each disc and the points half a pitch above, left, right and below it,
+which lie on the white around it.  That makes 4 + 16 points; a point between two neighbours belongs to
+both discs and counts once, and in a T three pairs are neighbours: 17.
+
+One rule holds in acquisition, tracking and search: a pixel agrees if it is on its model's side of the
+middle between black and white, one outside the picture agrees with nothing, and 70 % must agree.
+
+Source: RAM 2002, "Visual Servoing" and figure 7.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from mission_control.vision.landmark import Disc, Floats, Picture, Sighting
+
+SKELETON_PIXELS = 17  # RAM 2002, "Visual Servoing": the skeleton for a four-blob target
+LEAST_MATCH = 0.70  # RAM 2002, "Visual Servoing": below it, back to acquisition
+LEAST_CONTRAST = 55.0  # measured: grey levels between gaps and discs; with less, shades of a floor pass
+LEAST_DISCS = 3  # chosen: 13 of the 17 pixels are white, and so is every wall
+_REFRESH = 0.5  # chosen: share of the new picture in the model; one noisy picture does not replace it
+_MARGIN_PITCHES = 0.75  # chosen: how much white around the discs belongs to the subimage
+
+_DISCS = len(Disc)
+_SIDES = ((0, -1), (0, 1), (-1, 0), (1, 0))  # top, bottom, left, right: half pitches to the right and down
+_LATTICE = {Disc.LEFT: (-2, 0), Disc.MIDDLE: (0, 0), Disc.RIGHT: (2, 0), Disc.STEM: (0, 2)}
+
+
+def _gaps() -> list[tuple[Disc, int, int]]:
+    """Return the white points: a disc, and half pitches to the right of it and below it."""
+    by_place = {
+        (_LATTICE[disc][0] + right, _LATTICE[disc][1] + down): (disc, right, down)
+        for disc in Disc
+        for right, down in _SIDES
+    }
+    return list(by_place.values())
+
+
+_GAPS = _gaps()
+_GAP_DISCS = np.array([disc for disc, _, _ in _GAPS])
+_IS_GAP = np.array([False] * _DISCS + [True] * len(_GAPS))
+_GAP_STEPS: Floats = np.array([[right / 2, down / 2] for _, right, down in _GAPS])
+
+
+def is_match(share: float) -> bool:
+    """Return whether so much of the target agrees that it is the target.
+
+    Example:
+        >>> is_match(12 / 17), is_match(11 / 17)
+        (True, False)
+    """
+    return share >= LEAST_MATCH
+
+
+def skeleton_px(blobs_px: Floats) -> NDArray[np.intp]:
+    """Return the pixels of the skeleton of discs at these places.
+
+    Args:
+        blobs_px: As ``Sighting.blobs_px``.
+
+    Returns:
+        Column and row, shape (17, 2), the four discs first; they may lie outside the picture.
+    """
+    across = (blobs_px[Disc.RIGHT] - blobs_px[Disc.LEFT]) / 2
+    down = blobs_px[Disc.STEM] - blobs_px[Disc.MIDDLE]
+    gaps = blobs_px[_GAP_DISCS] + _GAP_STEPS @ np.stack([across, down])
+    pixels: NDArray[np.intp] = np.rint(np.concatenate([blobs_px, gaps])).astype(np.intp)
+    return pixels
+
+
+def levels_at(frame: Picture, pixels: NDArray[np.intp]) -> tuple[NDArray[np.int16], NDArray[np.bool_]]:
+    """Return the grey levels at these pixels and which of them lie in the picture; 0 where they do not."""
+    height, width = frame.shape
+    columns, rows = pixels[:, 0], pixels[:, 1]
+    is_inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    levels = frame[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.int16)
+    levels[~is_inside] = 0
+    return levels, is_inside
+
+
+def contrast(levels: NDArray[np.int16]) -> float:
+    """Return how much brighter the skeleton's gaps are than its discs, in grey levels.
+
+    Args:
+        levels: Of the skeleton, shape (17,).
+    """
+    return float(levels[_DISCS:].mean() - levels[:_DISCS].mean())
+
+
+def landmark_match(frame: Picture, blobs_px: Floats) -> float:
+    """Return which share of the skeleton is black on a disc and white in a gap if the discs are here.
+
+    Returns:
+        0 to 1; 0 if it is no landmark at all, see ``TargetModel.match``.
+    """
+    levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
+    middle = float(levels[:_DISCS].mean() + levels[_DISCS:].mean()) / 2
+    return _share(levels, is_inside, middle, _IS_GAP)
+
+
+def _share(
+    levels: NDArray[np.int16], is_inside: NDArray[np.bool_], middle: float, is_bright: NDArray[np.bool_]
+) -> float:
+    agrees = ((levels > middle) == is_bright) & is_inside
+    if int(agrees[:_DISCS].sum()) < LEAST_DISCS or contrast(levels) < LEAST_CONTRAST:
+        return 0.0
+    return float(agrees.sum()) / SKELETON_PIXELS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TargetModel:
+    """The target as it was last seen.
+
+    Attributes:
+        blobs_px: Middles of its discs, as ``Sighting.blobs_px``.
+        levels: Grey levels of the skeleton, shape (17,).
+        subimage: The part of the picture that holds it.
+        corner_px: Column and row of the subimage's upper left pixel.
+    """
+
+    blobs_px: Floats
+    levels: NDArray[np.int16]
+    subimage: Picture
+    corner_px: tuple[int, int]
+
+    @property
+    def middle_level(self) -> float:
+        """Between the target's black and white."""
+        return float(self.levels[:_DISCS].mean() + self.levels[_DISCS:].mean()) / 2
+
+    @classmethod
+    def seen(cls, frame: Picture, blobs_px: Floats) -> TargetModel:
+        """Return the model of a target whose discs are here; pixels outside the picture count as black."""
+        levels, _ = levels_at(frame, skeleton_px(blobs_px))
+        return cls(blobs_px, levels, *_cut(frame, blobs_px))
+
+    def updated(self, frame: Picture, blobs_px: Floats) -> TargetModel:
+        """Return the model after the target was found here: new places, levels half way to the new ones."""
+        levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
+        blended = np.where(is_inside, (1 - _REFRESH) * self.levels + _REFRESH * levels, self.levels)
+        return TargetModel(blobs_px, np.rint(blended).astype(np.int16), *_cut(frame, blobs_px))
+
+    def match(self, frame: Picture, blobs_px: Floats) -> float:
+        """Return which share of the skeleton agrees if the discs are here, 0 if it is no landmark at all.
+
+        It is none if fewer than ``LEAST_DISCS`` discs are dark or gaps and discs differ by less than
+        ``LEAST_CONTRAST``.
+        """
+        levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
+        return _share(levels, is_inside, self.middle_level, self.levels > self.middle_level)
+
+    def subimage_match(self, frame: Picture) -> tuple[float, tuple[int, int]]:
+        """Return where in the picture the subimage fits best, and which share of its pixels agrees there.
+
+        Returns:
+            The share, 0 to 1, and the shift from where the target was last seen: columns, rows.
+        """
+        height, width = self.subimage.shape
+        if height > frame.shape[0] or width > frame.shape[1]:
+            return 0.0, (0, 0)
+        scores = cv2.matchTemplate(frame, self.subimage, cv2.TM_CCOEFF_NORMED)
+        column, row = cv2.minMaxLoc(scores)[3]
+        middle = self.middle_level
+        there = frame[row : row + height, column : column + width]
+        agrees = (there > middle) == (self.subimage > middle)
+        return float(agrees.mean()), (column - self.corner_px[0], row - self.corner_px[1])
+
+
+def plausible(blobs_px: Floats) -> bool:
+    """Return whether four blobs can be the T: a level row, evenly spaced, the stem under its middle.
+
+    A robot on a floor sees the row nearly level and the column upright; from the side the row shrinks.
+    """
+    places: list[tuple[float, float]] = [(float(column), float(row)) for column, row in blobs_px]
+    (left_x, left_y), (middle_x, middle_y), (right_x, right_y), (stem_x, stem_y) = places
+    half_row, down = (right_x - left_x) / 2, stem_y - middle_y
+    if down < 4.0 or not 0.3 * down < half_row < 1.25 * down:
+        return False
+    slack = 0.12 * down + 1.0
+    return (
+        abs(middle_x - (left_x + right_x) / 2) < slack
+        and abs(middle_y - (left_y + right_y) / 2) < slack
+        and abs(stem_x - middle_x) < slack + 0.1 * down
+        and abs(right_y - left_y) < 0.5 * down
+    )
+
+
+def centred(frame: Picture, blobs_px: Floats, middle_level: float) -> Floats:
+    """Return the blobs moved to the centres of what is dark around them.
+
+    Mean shift of dark pixels in a window of one pitch: other than connected regions it does not fall
+    apart when a row is torn.
+
+    Args:
+        frame: The picture.
+        blobs_px: Roughly where the discs are.
+        middle_level: Pixels below it are dark, the more the darker.
+
+    Returns:
+        Places as ``blobs_px``; a blob without a dark pixel in its window stays.
+    """
+    height, width = frame.shape
+    sighting = Sighting(blobs_px, 1.0)
+    half_width = max(2, round(abs(float(sighting.across_px[0])) / 2))
+    half_height = max(2, round(abs(float(sighting.down_px[1])) / 2))
+    level = np.uint8(math.ceil(min(max(middle_level, 0.0), 255.0)))
+    moved = blobs_px.copy()
+    for disc in Disc:
+        column, row = blobs_px[disc].tolist()
+        for _ in range(2):
+            left, top = max(0, round(column) - half_width), max(0, round(row) - half_height)
+            right, bottom = min(width, round(column) + half_width + 1), min(height, round(row) + half_height + 1)
+            if left >= right or top >= bottom:
+                break
+            darkness = level - np.minimum(frame[top:bottom, left:right], level)
+            moments = cv2.moments(darkness)
+            if moments["m00"] <= 0:
+                break
+            column, row = left + moments["m10"] / moments["m00"], top + moments["m01"] / moments["m00"]
+        moved[disc] = column, row
+    return moved
+
+
+def _cut(frame: Picture, blobs_px: Floats) -> tuple[Picture, tuple[int, int]]:
+    """Return a copy of the part of the picture that holds the discs and some white, and its upper left pixel."""
+    sighting = Sighting(blobs_px, 1.0)
+    margin = _MARGIN_PITCHES * np.array([abs(sighting.across_px[0]), abs(sighting.down_px[1])])
+    limits = np.array([frame.shape[1], frame.shape[0]])
+    low = np.clip(np.floor(blobs_px.min(axis=0) - margin), 0, limits - 1).astype(int)
+    high = np.clip(np.ceil(blobs_px.max(axis=0) + margin) + 1, low + 1, limits).astype(int)
+    return frame[low[1] : high[1], low[0] : high[0]].copy(), (int(low[0]), int(low[1]))
