@@ -67,6 +67,30 @@ class Motion:
 STILL = Motion()
 
 
+def read_places(text: str) -> list[Place]:
+    """Return the places of a text like ``1,1 3.5,1``.
+
+    Raises:
+        ValueError: There is none in it, or one of them is no pair of numbers.
+
+    Example:
+        >>> read_places("1,1 3.5,0.5")
+        [Place(x_m=1.0, y_m=1.0), Place(x_m=3.5, y_m=0.5)]
+    """
+    places = []
+    for pair in text.split():
+        try:
+            x_m, y_m = (float(number) for number in pair.split(","))
+        except ValueError:
+            raise ValueError(f"{pair!r} is no place: write x,y in meters, as in 1,1 3.5,1") from None
+        if not (math.isfinite(x_m) and math.isfinite(y_m)):
+            raise ValueError(f"{pair!r} is no place: write finite numbers")
+        places.append(Place(x_m, y_m))
+    if not places:
+        raise ValueError("there is no place: write x,y in meters for each, as in 1,1 3.5,1")
+    return places
+
+
 def turned(angle_rad: float) -> float:
     """Return the same direction as an angle from -pi to pi."""
     return math.atan2(math.sin(angle_rad), math.cos(angle_rad))

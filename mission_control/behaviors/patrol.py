@@ -17,7 +17,7 @@ from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from mission_control.behavior import BehaviorParameters
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
-from mission_control.behaviors.motion import MOST_M_S, Place
+from mission_control.behaviors.motion import MOST_M_S, read_places
 from mission_control.behaviors.patrol_route import PatrolRoute, Visit
 from mission_control.messages import BehaviorStatus, WaypointReached
 
@@ -128,27 +128,3 @@ class Patrol(Driver[PatrolParameters]):
 
     def _say(self, robot: str) -> None:
         self.report(f"patrols with {robot}: {self._seen()}")
-
-
-def read_places(text: str) -> list[Place]:
-    """Return the places of a text like ``1,1 3.5,1``.
-
-    Raises:
-        ValueError: There is none in it, or one of them is no pair of numbers.
-
-    Example:
-        >>> read_places("1,1 3.5,0.5")
-        [Place(x_m=1.0, y_m=1.0), Place(x_m=3.5, y_m=0.5)]
-    """
-    places = []
-    for pair in text.split():
-        try:
-            x_m, y_m = (float(number) for number in pair.split(","))
-        except ValueError:
-            raise ValueError(f"{pair!r} is no place: write x,y in meters, as in 1,1 3.5,1") from None
-        if not (math.isfinite(x_m) and math.isfinite(y_m)):
-            raise ValueError(f"{pair!r} is no place: write finite numbers")
-        places.append(Place(x_m, y_m))
-    if not places:
-        raise ValueError("there is no place: write x,y in meters for each, as in 1,1 3.5,1")
-    return places

@@ -1,0 +1,118 @@
+"""Jump over: bring a robot to the other side of a box, a step or a wall of up to 30 cm.
+
+The way to the obstacle must be free, and somebody must see where the robot is: see ``patrol``.
+
+In mission.xml: an ARC of kind ``drive`` (or more), and the tracker's name as ``localizer``. Give the ARC a maximum run
+time a few seconds above its minimum, and no slice of its equals ends it in the air.
+
+Source: IROS 2001, section 2: the Scout jumps over objects 30 cm in height.
+"""
+
+from __future__ import annotations
+
+import math
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from mission_control.behavior import BehaviorParameters
+from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
+from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, Obstacle, Stage
+from mission_control.behaviors.motion import MOST_M_S, Motion, read_places
+from mission_control.messages import BehaviorStatus
+
+
+class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``JumpOver``.
+
+    Attributes:
+        front: Where to cross the obstacle's near side: ``x,y`` in meters.
+        heading_deg: In which direction: 0 along x, 90 along y.
+        localizer: Component that says where a robot is: its name if it is in the resource pool, else its address.
+        depth_m: How deep the obstacle is in that direction, above 0, at most 0.2.
+        onward_m: So far beyond it the robot drives before it has succeeded.
+        speed_m_s: On straight ways, above 0, at most 0.3.
+        attempts: After so many jumps it fails, at least 1.
+    """
+
+    front: str
+    heading_deg: float
+    localizer: str
+    depth_m: float = 0.1
+    onward_m: float = 0.5
+    speed_m_s: float = 0.2
+    attempts: int = 5
+
+    def __post_init__(self) -> None:
+        if len(read_places(self.front)) != 1:
+            raise ValueError(f"front is {self.front!r}: write one place, x,y in meters")
+        if not math.isfinite(self.heading_deg):
+            raise ValueError(f"heading_deg is {self.heading_deg}: write degrees, 0 along x and 90 along y")
+        if not self.localizer:
+            raise ValueError("localizer is empty: name the component that sees where robots are")
+        if not 0 < self.depth_m <= DEEPEST_M:
+            raise ValueError(f"depth_m is {self.depth_m}: a jump carries over at most {DEEPEST_M} m")
+        if not 0 <= self.onward_m < math.inf:
+            raise ValueError(f"onward_m is {self.onward_m}: it must be at least 0")
+        if not 0 < self.speed_m_s <= MOST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+        if self.attempts < 1:
+            raise ValueError(f"attempts is {self.attempts}: it must be at least 1")
+
+
+class JumpOver(Driver[JumpOverParameters]):
+    """Succeeds when the robot has driven on beyond the obstacle; fails after so many jumps that did not do."""
+
+    parameters_type = JumpOverParameters
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._course = self._plan()
+
+    @property
+    def course(self) -> JumpCourse:
+        """How far it is; read only."""
+        return self._course
+
+    async def drive_on(self, robot: str) -> None:
+        """Decide ten times a second by where the robot is; see ``Driver.drive_on``."""
+        while True:
+            position = await self.locate(self.parameters.localizer, robot)
+            match self._course.decide(position, self.clock.now_s()):
+                case Motion() as motion:
+                    await self.move(motion)
+                case Act.JUMP:
+                    await self.held.jump()
+                    self._course.jumped()
+                    self.story.note(robot, f"jumps, number {self._course.jumps}")
+                case Act.WAIT:
+                    pass
+            self.report(f"{robot} {self._course.stage}, {self._course.jumps} jumps")
+            if self._course.is_final:
+                break
+            await self.clock.sleep_s(DECIDE_EVERY_S)
+        await self.held.halt()
+        is_over = self._course.stage is Stage.OVER
+        self.finish(BehaviorStatus.SUCCESS if is_over else BehaviorStatus.FAILURE, {"jumps": self._course.jumps})
+
+    def not_now(self) -> float:
+        """Ask for the time until the robot has landed; see ``Behavior.not_now``."""
+        return self._course.airborne_s(self.clock.now_s())
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Keep what is known; where the robot is then says how to go on."""
+        self._course.interrupt()
+        self.report(f"suspended: {reason} by {by}; {self._course.jumps} jumps until now")
+
+    def parameters_changed(self) -> None:
+        """Begin anew with the new parameters."""
+        self._course = self._plan()
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters and the jumps."""
+        return {**super().statistics(), "jumps": self._course.jumps}
+
+    def _plan(self) -> JumpCourse:
+        given = self.parameters
+        [front] = read_places(given.front)
+        obstacle = Obstacle(front, math.radians(given.heading_deg), given.depth_m)
+        return JumpCourse(obstacle, attempts=given.attempts, speed_m_s=given.speed_m_s, onward_m=given.onward_m)
