@@ -145,7 +145,7 @@ async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[
 
 async def _watch(mission: str | None, connect: str | None, *, as_json: bool) -> int:
     from backbone.component.component import NoParameters
-    from ui_console.console_model import event_json
+    from ui_console.console_events import event_json
     from ui_console.observer import Observer
 
     launch, clock = await _launch(mission, connect, {})

@@ -1,30 +1,23 @@
-"""A console that only watches: it hears the schedule and what components tell, and claims nothing."""
+"""A console that only watches: it hears what the mission tells, and claims nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import StoryEvent
-from backbone.errors import LinkError
-from backbone.keys import Conversation
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
-from backbone.wire import Envelope
-from ui_console.console_model import ConsoleEvent, LinkTrouble, ScheduleHeard, StoryHeard
-
-REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
+from ui_console.console_events import ConsoleEvent, ScheduleHeard
+from ui_console.feed import ConsoleFeed, FeedEvent
 
 P = TypeVar("P", bound=msgspec.Struct)
 
 
 class Observer(Component[P], Generic[P]):
-    """Tells a face what it hears.
+    """Tells a face what it hears, and lends it the verbs that need no grant.
 
     Args:
         show: Called in the event loop with each event, in order.
@@ -36,31 +29,23 @@ class Observer(Component[P], Generic[P]):
     ) -> None:
         super().__init__(launch, bus, clock)
         self.show, self._watches = show, watches
+        self.feed = ConsoleFeed(bus, clock, self._heard)
+        """What it listens by, and the verbs that need no grant."""
 
     async def connect(self) -> None:
-        """Listen to the schedule, and to what components tell of themselves."""
-        if not self._watches:
-            return
-        self.bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
-        self.bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_story)
+        """Listen to what the mission tells."""
+        if self._watches:
+            self.feed.listen()
 
     async def serve(self) -> None:
-        """Ask for the schedule as it is; later ones are heard."""
-        if not self._watches:
-            return
-        try:
-            schedule = await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            self.show(LinkTrouble(self.clock.now_s(), str(error)))
-            return
-        self.schedule_changed(schedule)
+        """Hear how things are, and then what changes."""
+        if self._watches:
+            await self.feed.run()
 
-    def schedule_changed(self, schedule: Schedule) -> None:
-        """Take note of a schedule."""
-        self.show(ScheduleHeard(self.clock.now_s(), schedule))
+    def schedule_heard(self) -> None:
+        """Take note that there is a new schedule. When: after it was shown."""
 
-    def _heard_schedule(self, envelope: Envelope[Any]) -> None:
-        self.schedule_changed(envelope.body)
-
-    def _heard_story(self, envelope: Envelope[Any]) -> None:
-        self.show(StoryHeard(self.clock.now_s(), envelope.body))
+    def _heard(self, event: FeedEvent) -> None:
+        self.show(event)
+        if isinstance(event, ScheduleHeard):
+            self.schedule_heard()

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from backbone.errors import Refusal, code_of
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import SwappedOut
-from ui_console.console_model import Asked, CommandRefused, ConsoleEvent, PictureSeen, event_json
+from ui_console.console_events import Asked, CommandRefused, ConsoleEvent, PictureSeen, event_json
 from ui_console.driving import GiveBack, Jump
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.teleoperation import Teleoperation

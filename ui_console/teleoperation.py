@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 import types
 from collections.abc import Awaitable, Callable
 from typing import Any, ClassVar
@@ -20,7 +21,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LifeState
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy, Schedule, Why
+from backbone.rc_manager.messages import AskWhy, Why
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_client import (
     ArcClient,
@@ -34,8 +35,7 @@ from resource_pool.arc_client import (
     arc_name,
     claim_parameters,
 )
-from ui_console.console_model import (
-    ROBOT_KIND,
+from ui_console.console_events import (
     Asked,
     CommandApplied,
     CommandRefused,
@@ -48,7 +48,9 @@ from ui_console.console_model import (
     WhyHeard,
 )
 from ui_console.driving import Command, DeadMan, Drive, Halt, Jump
-from ui_console.observer import REPLY_TIME_S, Observer
+from ui_console.feed import REPLY_TIME_S
+from ui_console.observer import Observer
+from ui_console.team_model import ROBOT_KIND
 
 log = logging.getLogger(__name__)
 
@@ -167,6 +169,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Have one command carried out and tell what became of it; return True if it was applied."""
         if self._arc is None:
             return False
+        wanted_s = time.perf_counter()
         try:
             match command:
                 case Drive(left_rad_s, right_rad_s):
@@ -181,7 +184,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         except LinkError as error:
             self.show(LinkTrouble(self.clock.now_s(), str(error)))
             return False
-        self.show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values))
+        took_s = time.perf_counter() - wanted_s
+        self.show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values, took_s))
         return True
 
     def begin_release(self) -> None:
@@ -231,9 +235,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Give the robot back if it was not."""
         await self.give_back("the console ends")
 
-    def schedule_changed(self, schedule: Schedule) -> None:
-        """Take note, and ask why this console waits if it does."""
-        super().schedule_changed(schedule)
+    def schedule_heard(self) -> None:
+        """Ask why this console waits, if it does."""
         if self._keeping is not None and not self.is_held and self._asking_why is None:
             self._asking_why = self.start_task(self._ask_why(), "why")
 

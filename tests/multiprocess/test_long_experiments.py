@@ -40,7 +40,7 @@ from backbone.rc_manager.messages import AskRc, AskSchedule, AskWhy, Holder, RcS
 from backbone.wire import Envelope
 from resource_pool.messages import RadioPacket
 from scout_model import radio_link
-from ui_console.console_model import CommandApplied, ConsoleEvent, Granted, Lost
+from ui_console.console_events import CommandApplied, ConsoleEvent, Granted, Lost
 from ui_console.driving import Drive
 from ui_console.teleoperation import Teleoperation
 

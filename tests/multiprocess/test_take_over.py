@@ -28,7 +28,7 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
 from resource_pool.messages import Applied, AskPose, CommandScout, Drive, Pose
-from ui_console.console_model import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
+from ui_console.console_events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.driving import Drive as DriveKey
 from ui_console.teleoperation import Teleoperation
 

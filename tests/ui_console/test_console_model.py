@@ -1,76 +1,151 @@
 """What screens show follows from what was heard."""
 
+from __future__ import annotations
+
 import json
 
+import msgspec
 import pytest
+from console_scenes import (
+    ASK,
+    COMPONENTS,
+    GRANT,
+    LEASES,
+    SCHEDULE,
+    STOP,
+    TEAM_EVENTS,
+    component,
+    held_model,
+    model,
+    rc,
+    request,
+)
+from hypothesis import given
+from hypothesis import strategies as st
 
-from backbone.component.messages import StoryEvent
-from backbone.rc_manager.messages import Holder, RcView, RequestState, RequestView, Schedule, Why
-from ui_console.console_model import (
-    Asked,
+from backbone.component.messages import LifeState, StoryEvent
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.rc_manager.messages import RequestState, Schedule, Why
+from resource_pool.arc_client import StopState
+from ui_console.console_events import (
+    Attention,
     CommandApplied,
     CommandRefused,
+    ComponentGone,
+    ComponentHeard,
+    ComponentsListed,
     ConsoleEvent,
-    ConsoleModel,
     GivenBack,
     Granted,
+    LeasesHeard,
+    LinkHeard,
     LinkTrouble,
+    LoadHeard,
     Lost,
+    ParametersHeard,
     PictureSeen,
+    ProcessFallen,
+    RadioCounted,
     ScheduleHeard,
+    StopHeard,
     StoryHeard,
     WhyHeard,
     event_json,
 )
+from ui_console.console_model import SILENT_S, STALE_S, ConsoleModel
+from ui_console.team_model import STARVING_S
+from ui_console.views import AlarmKind, ConsoleView, NodeState, Severity, view_json
 
-GRANT = Granted(10.0, {"scout": "scout1", "command_radio": "radio"}, {"scout1": 7, "radio": 3}, 15.0, 9.95, False)
-ASK = Asked(9.95, "scout1", "capture", 100)
+
+def alarm_lines(shown: ConsoleModel, now_s: float = 50.0) -> list[str]:
+    shown.look(now_s)
+    return [alarm.line for alarm in shown.team.alarms.views()]
 
 
-def request(arc: str, owner: str, state: RequestState, until_s: float, expected_s: float) -> RequestView:
-    return RequestView(
-        arc, owner, state, ["scout1"], 5.0, until_s, expected_s, "its turn", [], 5.0, "iros2001:10/watch1:3", 4
+# ---------------------------------------------------------------------- robots and requests
+def test_the_robot_table_says_who_holds_what_since_when_until_when_and_who_waits() -> None:
+    held, free = model(ScheduleHeard(8.0, SCHEDULE)).robots(8.0)
+    assert [(row.number, row.robot) for row in (held, free)] == [(1, "scout1"), (2, "scout2")]
+    assert (held.holder, held.is_console, held.is_mine, held.epoch) == ("watch1", False, False, 6)
+    assert (held.priority, held.since_s, held.until_s) == ("iros2001:10/surveillance:5/watch1:3", 5.0, 10.0)
+    assert [(waiting.who, waiting.start_s) for waiting in held.waiting] == [("console-1", 12.0)]
+    assert (free.holder, free.is_up) == ("", True)
+
+
+def test_a_lease_grows_old_until_it_is_renewed() -> None:
+    shown = model(ScheduleHeard(8.0, SCHEDULE), LeasesHeard(8.0, LEASES))
+    assert (shown.robots(9.5)[0].lease_age_s, shown.robots(9.5)[0].lease_left_s) == (1.5, 0.5)
+    shown.apply(LeasesHeard(9.5, LEASES))
+    assert shown.robots(9.75)[0].lease_age_s == 0.25
+    assert shown.robots(60.0)[0].lease_left_s == 0.0
+
+
+def test_a_robot_that_is_called_missing_is_not_up() -> None:
+    leases = msgspec.structs.replace(LEASES, missing=["scout2"])
+    assert [row.is_up for row in model(ScheduleHeard(8.0, SCHEDULE), LeasesHeard(8.0, leases)).robots(8.0)] == [
+        True,
+        False,
+    ]
+
+
+def test_the_robot_held_is_marked_as_ones_own() -> None:
+    mine, other = held_model().robots(12.0)
+    assert (mine.is_mine, mine.holder, mine.is_console) == (True, "console-1", True)
+    assert mine.video is not None
+    assert not other.is_mine
+
+
+def test_requests_come_running_first_then_by_predicted_start() -> None:
+    late = request("late", "mission_control/late", RequestState.WAITING, expected_s=30.0)
+    never = request("never", "mission_control/never", RequestState.WAITING)
+    schedule = msgspec.structs.replace(SCHEDULE, requests=[never, late, *reversed(SCHEDULE.requests)])
+    rows = model(ScheduleHeard(8.0, schedule)).team.requests()
+    assert [row.arc for row in rows] == ["watch1-capture", "console-1-capture", "late", "never"]
+    assert rows[0].because == "its turn"
+
+
+# ---------------------------------------------------------------------- the behavior tree
+def test_the_tree_puts_children_below_their_parents_with_priority_state_and_feedback() -> None:
+    nodes = model(*TEAM_EVENTS).team.tree()
+    assert [(n.depth, n.name, n.priority, n.parent) for n in nodes] == [
+        (0, "surveillance", 5, ""),
+        (1, "watch1", 3, "surveillance"),
+        (1, "watch2", None, "surveillance"),
+    ]
+    assert (nodes[1].state, nodes[1].feedback, nodes[1].arc) == (
+        NodeState.RUNNING,
+        "holds scout scout1",
+        "watch1-capture",
     )
 
 
-SCHEDULE = Schedule(
-    8.0,
-    [
-        RcView("scout2", "scout", "free", False, 1.0, [], 0, []),
-        RcView(
-            "scout1", "scout", "held", False, 1.0, [Holder("watch1-capture", 6, 5.0, 10.0)], 6, ["console-1-capture"]
-        ),
-        RcView("radio", "command_radio", "held", True, 1.0, [], 0, []),
-    ],
-    [
-        request("watch1-capture", "mission_control/watch1", RequestState.RUNNING, 10.0, -1.0),
-        request("console-1-capture", "ui_console/console-1", RequestState.WAITING, -1.0, 12.0),
-    ],
-    [],
-)
+def test_a_node_that_finished_says_how_and_one_that_is_lost_keeps_its_place() -> None:
+    done = StoryHeard(9.0, StoryEvent(9.0, "mission_control/watch2", "finished: failure", "watch2", ""))
+    nodes = model(*TEAM_EVENTS, done, ComponentGone(9.0, "mission_control/watch1")).team.tree()
+    assert [(n.name, n.state) for n in nodes[1:]] == [("watch1", NodeState.LOST), ("watch2", NodeState.FAILURE)]
 
 
-def model(*events: ConsoleEvent) -> ConsoleModel:
-    made = ConsoleModel("console-1")
-    for event in events:
-        made.apply(event)
-    return made
+def test_a_node_whose_arc_waits_says_why() -> None:
+    waiting = request("watch2-capture", "mission_control/watch2", RequestState.WAITING, priority="watch2:1")
+    schedule = Schedule(9.0, [], [waiting], [])
+    node = model(*TEAM_EVENTS, ScheduleHeard(9.0, schedule)).team.tree()[2]
+    assert (node.state, node.because) == (NodeState.WAITING, "its turn")
 
 
-def test_the_robot_table_says_who_holds_what_since_when_until_when_and_who_waits() -> None:
-    rows = model(ScheduleHeard(8.0, SCHEDULE)).robots()
-    assert [row.robot for row in rows] == ["scout1", "scout2"]
-    held, free = rows
-    assert (held.holder, held.priority, held.since_s, held.until_s) == ("watch1", "iros2001:10/watch1:3", 5.0, 10.0)
-    assert held.waiting == ("console-1",)
-    assert free.holder == ""
+@given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 7)), max_size=20))
+def test_every_behavior_is_in_the_tree_once_whoever_claims_to_have_started_it(parents: list[tuple[int, int]]) -> None:
+    states = {
+        child: component(f"mission_control/b{child}", "x", requester=f"mission_control/b{parent}")
+        for child, parent in parents
+        if child > parent
+    }
+    nodes = model(ComponentsListed(1.0, list(states.values()), True)).team.tree()
+    assert sorted(node.name for node in nodes) == sorted(f"b{child}" for child in states)
+    depths = {node.name: node.depth for node in nodes}
+    assert all(node.depth == depths.get(node.parent, -1) + 1 for node in nodes)
 
 
-def test_the_schedule_shows_running_first_with_what_is_left_and_waiting_with_when() -> None:
-    lines = model(ScheduleHeard(8.0, SCHEDULE)).schedule_lines(8.0)
-    assert lines == ["watch1:  2.0 s left; its turn", "console-1: in  4.0 s; its turn"]
-
-
+# ---------------------------------------------------------------------- this console's own
 def test_the_status_line_follows_a_take_over_from_wish_to_release() -> None:
     shown = model()
     assert shown.status_line(9.0) == "watching; you hold no robot"
@@ -80,28 +155,211 @@ def test_the_status_line_follows_a_take_over_from_wish_to_release() -> None:
     assert shown.status_line(9.97) == "waiting for scout1: watch1 has its minimum run time"
     shown.apply(GRANT)
     assert shown.status_line(11.0) == "you hold scout1 (epoch 7), slice 4 s"
+    shown.apply(StopHeard(11.0, STOP))
+    assert shown.status_line(11.0) == "scout1 is STOPPED by anna: child in the room"
     shown.apply(Lost(12.0, "higher", "console-2", -1.0))
     assert shown.status_line(12.0) == "waiting for scout1: higher by console-2"
+    assert shown.own(12.0).taken_because == "higher by console-2"
     shown.apply(GivenBack(13.0, "released", True))
     assert shown.status_line(13.0) == "watching; you hold no robot"
 
 
-def test_a_picture_says_how_old_it_is() -> None:
-    assert model().video_line(5.0) == "no picture yet"
-    assert model(PictureSeen(5.1, 5.0, "scout1")).video_line(6.5) == "scout1: picture 1.5 s old"
+def test_pictures_tell_their_age_rate_and_latency_and_are_forgotten_with_the_robot() -> None:
+    shown = model(GRANT, *[PictureSeen(10.0 + n / 10, 9.95 + n / 10, "scout1") for n in range(31)])
+    [video] = shown.videos(13.0)
+    assert (round(video.age_s, 3), round(video.rate_hz, 1), round(video.latency_s, 3)) == (0.05, 10.0, 0.05)
+    assert shown.videos(13.0 + STALE_S)[0].is_stale
+    shown.apply(GivenBack(14.0, "released", True))
+    assert shown.videos(14.0) == []
 
 
-def test_alarms_are_told_newest_first_and_repeats_once() -> None:
-    refused = CommandRefused(3.0, "arc.swapped_out", "holds nothing", "wait")
-    shown = model(*[refused] * 20, LinkTrouble(4.0, "nobody"), StoryHeard(5.0, StoryEvent(5.0, "a/b", "fell", "b", "")))
-    assert [line.split("s  ")[1] for line in shown.alarm_lines(10)] == [
-        "b: fell",
-        "no answer: nobody",
-        "refused: holds nothing (wait)",
+def test_a_round_trip_of_commands_is_among_the_links() -> None:
+    shown = model(LinkHeard(1.0, True, 0.002), CommandApplied(1.0, "scout1", 7, "drive", {}, 0.004))
+    assert [(link.name, link.latency_s) for link in shown.links(1.0)] == [("hub", 0.002), ("commands to scout1", 0.004)]
+
+
+# ---------------------------------------------------------------------- alarms
+def test_pictures_that_stay_away_or_grow_old_are_an_alarm_until_they_come_again() -> None:
+    shown = model(GRANT)
+    assert alarm_lines(shown, 10.0 + SILENT_S) == []
+    assert alarm_lines(shown, 10.5 + SILENT_S) == ["no picture of scout1 came within 4 s"]
+    shown.apply(PictureSeen(14.0, 13.9, "scout1"))
+    shown.look(14.0)
+    assert not shown.team.alarms.views()[0].is_active
+    shown.look(14.0 + 2 * STALE_S)
+    assert shown.team.alarms.views()[0].is_active
+    shown.apply(GivenBack(17.0, "released", True))
+    shown.look(17.0)
+    assert not shown.team.alarms.views()[0].is_active
+
+
+def test_a_console_without_a_picture_of_its_own_misses_none() -> None:
+    shown = ConsoleModel("console-1", sees=False)
+    shown.apply(GRANT)
+    shown.look(100.0)
+    assert shown.team.alarms.views() == []
+
+
+def test_a_component_that_is_gone_without_a_word_is_an_alarm_until_it_is_back() -> None:
+    shown = model(*TEAM_EVENTS, ComponentGone(9.0, "resource_pool/scout1"))
+    assert alarm_lines(shown) == ["scout1 (scout) on base is lost"]
+    shown.apply(ComponentHeard(10.0, component("resource_pool/scout1", "scout", since_s=10.0, pid=101)))
+    assert not shown.team.alarms.views()[0].is_active
+
+
+@pytest.mark.parametrize("ends_first", [True, False])
+def test_one_that_left_in_good_order_is_none_in_whichever_order_it_is_heard(ends_first: bool) -> None:
+    leaves: list[ConsoleEvent] = [
+        ComponentHeard(9.0, component("resource_pool/scout1", "scout", state=LifeState.STOPPED, since_s=9.0)),
+        ComponentGone(9.0, "resource_pool/scout1"),
     ]
-    assert shown.alarm_lines(0) == []
+    shown = model(*TEAM_EVENTS, *(leaves if ends_first else reversed(leaves)))
+    assert alarm_lines(shown) == []
+    assert shown.team.component("scout1") is None
 
 
+def test_a_process_that_fell_says_how_and_whether_it_comes_again() -> None:
+    fell = ProcessFell("scout1", "signal 9", 0.05, ["last words"])
+    shown = model(ProcessFallen(3.0, fell))
+    [alarm] = shown.team.alarms.views()
+    assert (alarm.line, alarm.remedy, alarm.subject) == (
+        "scout1 fell: signal 9; again in 0.1 s",
+        "last words",
+        "scout1",
+    )
+
+
+def test_a_request_that_waits_long_without_a_prospect_starves_and_stops_starving_when_it_runs() -> None:
+    starving = request("watch2-capture", "mission_control/watch2", RequestState.WAITING, since_s=5.0)
+    shown = model(ScheduleHeard(6.0, Schedule(6.0, [], [starving], [])))
+    assert alarm_lines(shown, 5.0 + STARVING_S - 1) == []
+    assert alarm_lines(shown, 5.0 + STARVING_S) == ["watch2 waits for 30 s and no end is in sight: its turn"]
+    shown.apply(ScheduleHeard(41.0, Schedule(41.0, [], [], [])))
+    shown.look(41.0)
+    assert not shown.team.alarms.views()[0].is_active
+
+
+def test_packets_late_on_a_radio_are_an_alarm_each_time_there_are_more() -> None:
+    shown = model(RadioCounted(1.0, "radio", {"overruns_a": 0.0}))
+    assert alarm_lines(shown) == []
+    for at_s, overruns in ((2.0, 3.0), (3.0, 3.0), (4.0, 5.0)):
+        shown.apply(RadioCounted(at_s, "radio", {"overruns_a": overruns}))
+    [alarm] = shown.team.alarms.views()
+    assert (alarm.kind, alarm.count, alarm.line) == (
+        AlarmKind.DEADLINE,
+        2,
+        "5 packets of a on radio were late or lost",
+    )
+
+
+@pytest.mark.parametrize(
+    ("events", "kind"),
+    [
+        ([LinkHeard(1.0, False)], AlarmKind.LINK),
+        ([LoadHeard(1.0, HostLoad("base", [], 0.99, 0.5, 2, 9))], AlarmKind.OVERLOAD),
+        ([ScheduleHeard(1.0, Schedule(1.0, [msgspec.structs.replace(rc("s", "scout", []), state="down")], [], []))],
+         AlarmKind.RC_DOWN),
+        ([ComponentHeard(1.0, component("resource_pool/s", "scout", feedback="free, not safe after a"))],
+         AlarmKind.UNSAFE),
+        ([StopHeard(1.0, STOP)], AlarmKind.STOPPED),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_an_alarm_while_it_is_so(events: list[ConsoleEvent], kind: AlarmKind) -> None:
+    shown = model(*events)
+    [alarm] = shown.team.alarms.views()
+    assert (alarm.kind, alarm.is_active) == (kind, True)
+
+
+def test_an_older_word_on_a_stop_changes_nothing() -> None:
+    lifted = StopState("scout1", False, 1, "ben", "", 12.0)
+    shown = model(StopHeard(11.0, STOP), StopHeard(12.0, lifted), StopHeard(12.1, STOP))
+    assert shown.team.stop_of("scout1") is None
+    shown.apply(StopHeard(13.0, StopState("scout1", True, 2, "eve", "", 13.0)))
+    assert shown.team.stop_of("scout1") is not None
+
+
+def test_what_was_refused_is_told_once_and_counted_and_an_operators_stop_is_no_second_alarm() -> None:
+    refused = CommandRefused(3.0, "arc.swapped_out", "holds nothing", "wait")
+    stopped = CommandRefused(3.0, "scout.emergency_stop", "stopped", "lift")
+    shown = model(*[refused] * 20, stopped, LinkTrouble(4.0, "nobody"))
+    assert [(alarm.line, alarm.count) for alarm in shown.team.alarms.views()] == [
+        ("no answer: nobody", 1),
+        ("refused: holds nothing", 20),
+    ]
+
+
+def test_alarms_while_the_operator_was_away_are_marked_until_they_are_seen() -> None:
+    shown = model(Attention(1.0, False), LinkTrouble(2.0, "nobody"), Attention(3.0, True), StopHeard(4.0, STOP))
+    assert [alarm.while_away for alarm in shown.team.alarms.views()] == [False, True]
+    assert shown.acknowledge() == 2
+    [stop] = shown.team.alarms.views()
+    assert (stop.kind, stop.acknowledged_by, stop.while_away) == (AlarmKind.STOPPED, "anna", False)
+
+
+# ---------------------------------------------------------------------- parameters and the log
+def test_a_parameter_that_was_changed_says_what_it_was_and_who_changed_it() -> None:
+    at = "mission_control/watch1"
+    shown = model(ParametersHeard(1.0, at, {"t": 20, "w": 1}), ParametersHeard(2.0, at, {"t": 30, "w": 1}, "t", "anna"))
+    changed, other = shown.team.parameters()
+    assert (changed.value, changed.before, changed.changed_by) == ("30", "20", "anna")
+    assert (other.value, other.changed_by) == ("1", "")
+    assert shown.log()[-1].what == "anna set t to 30"
+
+
+def test_consoles_that_share_a_team_see_the_same_mission_and_hold_robots_of_their_own() -> None:
+    one = model(ScheduleHeard(8.0, SCHEDULE))
+    two = ConsoleModel("console-2", team=one.team)
+    two.apply(GRANT)
+    assert two.robots(8.0)[0].is_mine
+    assert not one.robots(8.0)[0].is_mine
+
+
+# ---------------------------------------------------------------------- all of it
+def test_a_view_is_json_and_comes_back_as_it_was() -> None:
+    view = held_model().view(12.0)
+    assert msgspec.json.decode(view_json(view), type=ConsoleView) == view
+    plain = json.loads(view_json(view))
+    assert plain["robots"][0]["holder"] == "console-1"
+    assert plain["own"]["is_held"] is True
+
+
+EVENTS: list[ConsoleEvent] = [
+    *TEAM_EVENTS,
+    ASK,
+    GRANT,
+    Lost(12.0, "higher", "console-2", -1.0),
+    GivenBack(13.0, "released", False),
+    PictureSeen(11.0, 10.9, "scout1"),
+    CommandApplied(11.0, "scout1", 7, "drive", {"left_rad_s": 4.0}, 0.01),
+    CommandRefused(11.0, "a.b", "no", "later"),
+    Attention(11.0, False),
+    Attention(12.0, True),
+    LinkHeard(12.0, False),
+    StopHeard(12.0, STOP),
+    ComponentGone(12.0, "resource_pool/scout1"),
+    ComponentGone(12.0, "mission_control/watch1"),
+    *[ComponentHeard(12.5, state) for state in COMPONENTS],
+    ProcessFallen(12.0, ProcessFell("scout1", "signal 9", -1.0, [])),
+    LeasesHeard(12.0, msgspec.structs.replace(LEASES, missing=["radio"])),
+]
+
+
+@given(st.lists(st.sampled_from(EVENTS), max_size=60), st.floats(0, 200))
+def test_whatever_is_heard_in_whatever_order_the_view_is_whole_and_consistent(
+    events: list[ConsoleEvent], now_s: float
+) -> None:
+    shown = model(*events)
+    view = shown.view(now_s)
+    assert msgspec.json.decode(view_json(view), type=ConsoleView) == view
+    assert view.own.is_held <= view.own.is_asked or GRANT in events
+    assert sum(robot.is_mine for robot in view.robots) <= 1
+    assert len({alarm.key for alarm in view.alarms}) == len(view.alarms)
+    order = [(bool(alarm.acknowledged_by), list(Severity).index(alarm.severity)) for alarm in view.alarms]
+    assert order == sorted(order)
+    assert all(robot.lease_left_s >= 0 for robot in view.robots if robot.holder)
+
+
+# ---------------------------------------------------------------------- events as JSON lines
 @pytest.mark.parametrize(
     ("event", "word", "fields"),
     [
@@ -112,12 +370,18 @@ def test_alarms_are_told_newest_first_and_repeats_once() -> None:
         (CommandRefused(1.0, "a.b", "no", "ask later"), "refused", {"code": "a.b", "remedy": "ask later"}),
         (GivenBack(1.0, "released", True), "released", {"confirmed": True}),
         (ScheduleHeard(8.0, SCHEDULE), "schedule", {"at_s": 8.0}),
+        (StopHeard(8.0, STOP), "stop", {"at_s": 8.0}),
     ],
 )
 def test_events_are_json_lines_with_their_words(event: ConsoleEvent, word: str, fields: dict[str, object]) -> None:
     line = json.loads(event_json(event))
     assert line["event"] == word
     assert {name: line[name] for name in fields} == fields
+
+
+@pytest.mark.parametrize("event", EVENTS, ids=[type(event).__name__ for event in EVENTS])
+def test_every_event_has_a_word(event: ConsoleEvent) -> None:
+    assert json.loads(event_json(event))["event"]
 
 
 def test_a_schedule_in_json_names_its_fields() -> None:

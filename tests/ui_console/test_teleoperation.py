@@ -18,7 +18,7 @@ from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
-from ui_console.console_model import CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.console_events import CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
 from ui_console.driving import drive_towards
 from ui_console.script import read_script
 from ui_console.scripted import ScriptDriver

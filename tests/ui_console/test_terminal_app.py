@@ -9,7 +9,8 @@ from textual.events import AppBlur
 from textual.widgets import Static
 
 from backbone.rc_manager.messages import Holder, RcView, Schedule
-from ui_console.console_model import Asked, ConsoleModel, Granted, PictureSeen, ScheduleHeard
+from ui_console.console_events import Asked, Granted, PictureSeen, ScheduleHeard
+from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, Video
 

@@ -21,6 +21,7 @@ from textual.widgets import Footer, Static
 
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import Direction, Drive, drive_towards
+from ui_console.terminal.lines import Row, alarm_rows, request_rows, robot_rows, status_text
 from ui_console.terminal.video import fit, row_segments, shrink
 
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
@@ -136,14 +137,12 @@ class ConsoleApp(App[None]):
         """Show what the model says now."""
         if not self.query("#status"):  # the screen is just being taken down
             return
-        model, now_s = self._session.model, self._session.now_s()
-        status = [model.status_line(now_s)]
-        if self._drives:
-            status += [f"speed {self.speed_rad_s:g} rad/s", model.video_line(now_s)]
-        self.query_one("#status", Static).update(Text(" · ".join(status)))
-        self.query_one("#robots", Static).update(_robot_lines(model, now_s))
-        self.query_one("#schedule", Static).update(Text("\n".join(model.schedule_lines(now_s)) or "nobody asks"))
-        self.query_one("#alarms", Static).update(Text("\n".join(model.alarm_lines(ALARMS_SHOWN)) or "none"))
+        now_s = self._session.now_s()
+        view = self._session.model.view(now_s)
+        self.query_one("#status", Static).update(status_text(view, self.speed_rad_s if self._drives else None, ""))
+        self.query_one("#robots", Static).update(_joined(robot_rows(view.robots, now_s)))
+        self.query_one("#schedule", Static).update(_joined(request_rows(view.requests, now_s)) or "nobody asks")
+        self.query_one("#alarms", Static).update(_joined(alarm_rows(view.alarms, now_s)[:ALARMS_SHOWN]) or "none")
         if self._drives:
             self.query_one(Video).look()
 
@@ -182,18 +181,5 @@ class ConsoleApp(App[None]):
             self._session.stop()
 
 
-def _robot_lines(model: ConsoleModel, now_s: float) -> Text:
-    """Return for each robot who holds it and, below, since when, how much longer, and who is next."""
-    lines = Text()
-    for row in model.robots():
-        lines.append(f"{row.robot:10s} ", style="bold")
-        lines.append(f"{row.holder or 'free'}\n", style="green" if row.holder else "dim")
-        facts = [f"for {max(0.0, now_s - row.since_s):.0f} s"] if row.holder else []
-        if row.until_s > now_s:
-            facts.append(f"{row.until_s - now_s:.1f} s left")
-        if row.waiting:
-            facts.append(f"then {', '.join(row.waiting)}")
-        if facts:
-            lines.append(f"  {', '.join(facts)}\n", style="dim")
-    lines.rstrip()
-    return lines
+def _joined(rows: list[Row]) -> Text:
+    return Text("\n").join(row.text for row in rows)

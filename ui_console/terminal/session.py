@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from textual import pilot as textual_pilot
 
 from resource_pool.arc_client import Frame
-from ui_console.console_model import ConsoleEvent, ConsoleModel
+from ui_console.console_events import ConsoleEvent
+from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
 from ui_console.observer import Observer
 from ui_console.teleoperation import Teleoperation

@@ -1,0 +1,369 @@
+"""What a console hears: of its own robot, and of the whole mission; each event also as a line of JSON.
+
+Rules of this file: no bus, no clock, no screen. Times are mission seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from backbone.component.messages import ComponentState, StoryEvent
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.rc_manager.messages import Leases, Schedule, Why
+from resource_pool.arc_client import StopState
+
+
+# ---------------------------------------------------------------------- of its own robot
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A robot was asked for."""
+
+    at_s: float
+    robot: str
+    kind: str
+    priority: int
+
+
+@dataclass(frozen=True, slots=True)
+class Granted:
+    """The RCs are held; told again, with ``again``, after each suspension.
+
+    Attributes:
+        at_s: Mission time.
+        rcs: Kind → name of what is held.
+        epochs: RC → epoch.
+        until_s: The slice lasts at least until then.
+        asked_s: When it was asked for.
+        again: True if it was held before.
+    """
+
+    at_s: float
+    rcs: Mapping[str, str]
+    epochs: Mapping[str, int]
+    until_s: float
+    asked_s: float
+    again: bool
+
+    @property
+    def after_s(self) -> float:
+        """How long the grant took, from the wish on, mission seconds."""
+        return self.at_s - self.asked_s
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The RCs went to somebody else.
+
+    Attributes:
+        at_s: Mission time.
+        reason: Why.
+        by: Because of whom.
+        expected_start_s: Next expected slot; negative: unknown.
+    """
+
+    at_s: float
+    reason: str
+    by: str
+    expected_start_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class CommandApplied:
+    """A robot did what it was told, perhaps clipped.
+
+    Attributes:
+        at_s: When it was applied.
+        rc: The robot.
+        epoch: Of the grant.
+        command: ``drive``, ``halt`` or ``jump``.
+        values: After clipping.
+        took_s: From the wish to the answer, seconds of the machine; negative: not measured.
+    """
+
+    at_s: float
+    rc: str
+    epoch: int
+    command: str
+    values: Mapping[str, float]
+    took_s: float = -1.0
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRefused:
+    """Somebody said no."""
+
+    at_s: float
+    code: str
+    detail: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTrouble:
+    """Somebody did not answer: what was asked may or may not have happened."""
+
+    at_s: float
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class GivenBack:
+    """The robot was given back; ``confirmed`` is False if nobody confirmed it."""
+
+    at_s: float
+    reason: str
+    confirmed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSeen:
+    """A picture arrived."""
+
+    at_s: float
+    captured_s: float
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class WhyHeard:
+    """The RC manager said why this console waits."""
+
+    at_s: float
+    why: Why
+
+
+@dataclass(frozen=True, slots=True)
+class Attention:
+    """The operator touched the console, or turned away from it.
+
+    Attributes:
+        at_s: When.
+        is_there: False: nobody is at the console.
+    """
+
+    at_s: float
+    is_there: bool
+
+
+# ---------------------------------------------------------------------- of the whole mission
+@dataclass(frozen=True, slots=True)
+class ScheduleHeard:
+    """The RC manager's schedule changed."""
+
+    at_s: float
+    schedule: Schedule
+
+
+@dataclass(frozen=True, slots=True)
+class LeasesHeard:
+    """The RC manager renewed what is held.
+
+    Attributes:
+        at_s: When it said so.
+        leases: What is held, for how much longer, and which RCs are missing.
+    """
+
+    at_s: float
+    leases: Leases
+
+
+@dataclass(frozen=True, slots=True)
+class StoryHeard:
+    """A component told what just happened to it."""
+
+    at_s: float
+    story: StoryEvent
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentHeard:
+    """A component said how it is."""
+
+    at_s: float
+    component: ComponentState
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentsListed:
+    """The nameserver said who is there.
+
+    Attributes:
+        at_s: When.
+        components: All of them.
+        is_complete: False while it cannot know yet: absence proves nothing then.
+    """
+
+    at_s: float
+    components: Sequence[ComponentState]
+    is_complete: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentGone:
+    """A component's liveliness token has fallen."""
+
+    at_s: float
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessFallen:
+    """A creator said how a component ended that nobody had ended."""
+
+    at_s: float
+    fell: ProcessFell
+
+
+@dataclass(frozen=True, slots=True)
+class LoadHeard:
+    """A host said how busy it is."""
+
+    at_s: float
+    load: HostLoad
+
+
+@dataclass(frozen=True, slots=True)
+class StopHeard:
+    """A robot was stopped by an operator, or may move again."""
+
+    at_s: float
+    stop: StopState
+
+
+@dataclass(frozen=True, slots=True)
+class RadioCounted:
+    """A radio told its counters.
+
+    Attributes:
+        at_s: When.
+        radio: Its name.
+        values: ``overruns_<arc>``, ``packets_sent`` and others.
+    """
+
+    at_s: float
+    radio: str
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHeard:
+    """This console's link to the hub came or went, or was measured.
+
+    Attributes:
+        at_s: When.
+        is_up: Whether messages pass.
+        latency_s: There and back, seconds of the machine; negative: not measured now.
+    """
+
+    at_s: float
+    is_up: bool
+    latency_s: float = -1.0
+
+
+@dataclass(frozen=True, slots=True)
+class ParametersHeard:
+    """A component told its parameters.
+
+    Attributes:
+        at_s: When.
+        address: Of the component.
+        values: All of them.
+        changed: The one that was changed just before; empty: none.
+        user: Who changed it.
+    """
+
+    at_s: float
+    address: str
+    values: Mapping[str, Any]
+    changed: str = ""
+    user: str = ""
+
+
+OwnEvent = (
+    Asked
+    | Granted
+    | Lost
+    | CommandApplied
+    | CommandRefused
+    | LinkTrouble
+    | GivenBack
+    | PictureSeen
+    | WhyHeard
+    | Attention
+)
+TeamEvent = (
+    ScheduleHeard
+    | LeasesHeard
+    | StoryHeard
+    | ComponentHeard
+    | ComponentsListed
+    | ComponentGone
+    | ProcessFallen
+    | LoadHeard
+    | StopHeard
+    | RadioCounted
+    | LinkHeard
+    | ParametersHeard
+)
+ConsoleEvent = OwnEvent | TeamEvent
+
+_WORDS: dict[type[Any], str] = {
+    Asked: "asked",
+    Lost: "suspended",
+    CommandApplied: "applied",
+    CommandRefused: "refused",
+    LinkTrouble: "no_answer",
+    GivenBack: "released",
+    PictureSeen: "picture",
+    WhyHeard: "why",
+    Attention: "attention",
+    ScheduleHeard: "schedule",
+    LeasesHeard: "leases",
+    StoryHeard: "story",
+    ComponentHeard: "component",
+    ComponentsListed: "components",
+    ComponentGone: "gone",
+    ProcessFallen: "fell",
+    LoadHeard: "load",
+    StopHeard: "stop",
+    RadioCounted: "radio",
+    LinkHeard: "link",
+    ParametersHeard: "parameters",
+}
+
+
+def event_word(event: ConsoleEvent) -> str:
+    """Return the word of an event in JSON output: ``granted``, ``suspended``, ``resumed`` and so on."""
+    if isinstance(event, Granted):
+        return "resumed" if event.again else "granted"
+    return _WORDS[type(event)]
+
+
+def event_json(event: ConsoleEvent) -> bytes:
+    """Return the event as one line of JSON, without its end.
+
+    Example:
+        >>> event_json(Lost(2.0, "higher", "console-1", -1.0))
+        b'{"event":"suspended","at_s":2.0,"reason":"higher","by":"console-1","expected_start_s":-1.0}'
+    """
+    plain: dict[str, Any] = msgspec.to_builtins(_by_name(event))
+    if isinstance(event, Granted):
+        plain["after_s"] = event.after_s
+    return msgspec.json.encode({"event": event_word(event), **plain})
+
+
+def _by_name(value: Any) -> Any:
+    """Return messages, which travel as arrays, as dictionaries of their fields, all the way down."""
+    if isinstance(value, msgspec.Struct):
+        return {name: _by_name(getattr(value, name)) for name in value.__struct_fields__}
+    if hasattr(value, "__dataclass_fields__"):
+        return {name: _by_name(getattr(value, name)) for name in value.__dataclass_fields__}
+    if isinstance(value, list | tuple):
+        return [_by_name(item) for item in value]
+    if isinstance(value, Mapping):
+        return {str(name): _by_name(item) for name, item in value.items()}
+    return value

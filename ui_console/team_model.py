@@ -1,0 +1,504 @@
+"""What is known of the whole mission: robots, behavior tree, schedule, alarms, links. The same for everybody who looks.
+
+Rules of this file: no bus, no clock, no screen. Events go in, views come out; times are mission seconds, and *now* is
+an argument. Several consoles in one process may share one model.
+
+What only time can tell (a request that starves, a radio that is silent) is found by ``look``, which whoever shows the
+model calls before it shows it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import assert_never
+
+import msgspec
+
+from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.creator.messages import HostLoad
+from backbone.naming import Subsystem, component_of
+from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
+from resource_pool.arc_client import StopState
+from ui_console.alarms import AlarmBook
+from ui_console.console_events import (
+    ComponentGone,
+    ComponentHeard,
+    ComponentsListed,
+    LeasesHeard,
+    LinkHeard,
+    LoadHeard,
+    ParametersHeard,
+    ProcessFallen,
+    RadioCounted,
+    ScheduleHeard,
+    StopHeard,
+    StoryHeard,
+    TeamEvent,
+)
+from ui_console.timeline import Timeline
+from ui_console.views import (
+    NONE_S,
+    AlarmKind,
+    ComponentRow,
+    HostView,
+    LinkView,
+    LogRow,
+    NodeState,
+    NodeView,
+    ParameterView,
+    RequestRow,
+    RobotView,
+    StopView,
+    TimelineView,
+    WaitingView,
+)
+
+ROBOT_KIND = "scout"
+LOG_KEPT = 500  # chosen: some minutes of a busy mission; the rest is in the recording
+STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
+OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
+PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
+LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
+_STATE_OF_REQUEST = {
+    RequestState.RUNNING: NodeState.RUNNING,
+    RequestState.REVOKING: NodeState.RUNNING,
+    RequestState.CONNECTING: NodeState.WAITING,
+    RequestState.WAITING: NodeState.WAITING,
+    RequestState.IDLE: NodeState.IDLE,
+}
+
+
+class TeamModel:
+    """All that a console knows of the mission.
+
+    Args:
+        mission: Its name.
+    """
+
+    def __init__(self, mission: str = "") -> None:
+        self.mission = mission
+        self.schedule: Schedule | None = None
+        """As last heard."""
+        self.alarms = AlarmBook()
+        self._timeline = Timeline()
+        self._components: dict[str, ComponentState] = {}
+        self._lost: dict[str, float] = {}
+        self._finished: dict[str, tuple[float, NodeState]] = {}
+        self._arcs: set[str] = set()
+        self._priorities: dict[str, int] = {}
+        self._leases: Leases | None = None
+        self._leases_s = NONE_S
+        self._renewed: dict[tuple[str, str, int], float] = {}
+        self._stops: dict[str, StopState] = {}
+        self._hosts: dict[str, tuple[float, HostLoad]] = {}
+        self._overruns: dict[tuple[str, str], float] = {}
+        self._radios: dict[str, Mapping[str, float]] = {}
+        self._link = LinkHeard(0.0, True)
+        self._parameters: dict[tuple[str, str], ParameterView] = {}
+        self._log: deque[LogRow] = deque(maxlen=LOG_KEPT)
+
+    # ------------------------------------------------------------------ events in
+    def apply(self, event: TeamEvent) -> None:
+        """Take the event in."""
+        match event:
+            case ScheduleHeard(schedule=schedule):
+                self._take_schedule(schedule)
+            case LeasesHeard(at_s=at_s, leases=leases):
+                self._take_leases(leases, at_s)
+            case StoryHeard(story=story):
+                self._take_story(story)
+            case ComponentHeard(at_s=at_s, component=component):
+                self._take_component(component, at_s)
+            case ComponentsListed(at_s=at_s, components=components, is_complete=is_complete):
+                self._take_list({component.address: component for component in components}, at_s, is_complete)
+            case ComponentGone(at_s=at_s, address=address):
+                self._gone(address, at_s)
+            case ProcessFallen(at_s=at_s, fell=fell):
+                again = f"again in {fell.restart_in_s:.1f} s" if fell.restart_in_s >= 0 else "given up"
+                line = f"{fell.name} fell: {fell.how}; {again}"
+                remedy = fell.last_lines[-1] if fell.last_lines else ""
+                self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, remedy, f"fell:{fell.name}")
+                self._note(at_s, fell.name, f"fell: {fell.how}; {again}", "")
+            case LoadHeard(at_s=at_s, load=load):
+                self._take_load(load, at_s)
+            case StopHeard(at_s=at_s, stop=stop):
+                self._take_stop(stop, at_s)
+            case RadioCounted(at_s=at_s, radio=radio, values=values):
+                self._take_counts(radio, values, at_s)
+            case LinkHeard(at_s=at_s, is_up=is_up):
+                if is_up and event.latency_s < 0:
+                    event = LinkHeard(at_s, True, self._link.latency_s)
+                self._link = event
+                self._so(not is_up, AlarmKind.LINK, "hub", "no link to the hub: what is shown is old", at_s)
+            case ParametersHeard():
+                self._take_parameters(event)
+            case _:
+                assert_never(event)
+
+    def look(self, now_s: float) -> None:
+        """Find out what only time can tell."""
+        for request in self.schedule.requests if self.schedule is not None else ():
+            waits_s = now_s - request.since_s
+            starves = request.state is RequestState.WAITING and request.expected_start_s < 0 and waits_s >= STARVING_S
+            who = component_of(request.owner)
+            line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {_because(request)}"
+            self._so(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
+
+    # ------------------------------------------------------------------ views out
+    def robots(self, now_s: float) -> list[RobotView]:
+        """Return the robots, sorted by name; none of them is anybody's own, and none has pictures."""
+        if self.schedule is None:
+            return []
+        requests = {request.arc: request for request in self.schedule.requests}
+        rcs = sorted((rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND), key=lambda rc: rc.rc)
+        return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
+
+    def robot_names(self) -> list[str]:
+        """Return every robot heard of, in the schedule or as a component."""
+        in_schedule = {rc.rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND} if self.schedule else set()
+        registered = {component_of(at) for at, component in self._components.items() if component.type == ROBOT_KIND}
+        return sorted(in_schedule | registered)
+
+    def stop_of(self, robot: str) -> StopState | None:
+        """Return the operator's stop in force on the robot."""
+        stop = self._stops.get(robot)
+        return stop if stop is not None and stop.is_stopped else None
+
+    def stop_view(self, robot: str, now_s: float) -> StopView | None:
+        """Return the same for a screen."""
+        stop = self.stop_of(robot)
+        if stop is None:
+            return None
+        return StopView(stop.number, stop.by, stop.reason, max(0.0, now_s - stop.at_s), stop.is_confirmed)
+
+    def tree(self) -> list[NodeView]:
+        """Return the behavior tree, parents before children, siblings of higher priority first."""
+        requests = {component_of(r.owner): r for r in (self.schedule.requests if self.schedule else [])}
+        priorities = self._priorities
+        nodes = {c.address: c for c in self._components.values() if _is_in(Subsystem.MISSION_CONTROL, c.address)}
+        below: dict[str, list[ComponentState]] = {}
+        for node in nodes.values():
+            below.setdefault(node.requester if node.requester in nodes else "", []).append(node)
+        views: list[NodeView] = []
+        pending = [(root, 0) for root in _siblings(below.get("", []), priorities)]
+        shown: set[str] = set()
+        while pending:
+            node, depth = pending.pop(0)
+            if node.address in shown:
+                continue
+            shown.add(node.address)
+            name = component_of(node.address)
+            views.append(self._node(node, depth, priorities.get(name), requests.get(name)))
+            pending[:0] = [(child, depth + 1) for child in _siblings(below.get(node.address, []), priorities)]
+        return views
+
+    def requests(self) -> list[RequestRow]:
+        """Return the requests, running ones first, then by predicted start."""
+        rows = [_request_row(request) for request in (self.schedule.requests if self.schedule else [])]
+        return sorted(rows, key=_request_order)
+
+    def timeline(self, now_s: float, past_s: float = PAST_S, next_s: float = NEXT_S) -> TimelineView:
+        """Return who had which resource in the past seconds, who has it, and who gets it in the next."""
+        return self._timeline.view(now_s, past_s, next_s)
+
+    def hosts(self, now_s: float) -> list[HostView]:
+        """Return the machines, sorted by name."""
+        return [
+            HostView(host, load.cpu, load.memory, load.cores, load.components, max(0.0, now_s - at_s))
+            for host, (at_s, load) in sorted(self._hosts.items())
+        ]
+
+    def links(self, now_s: float) -> list[LinkView]:
+        """Return the link to the hub, the RC manager's renewals, and the radios."""
+        renewed = f"leases renewed {now_s - self._leases_s:.1f} s ago" if self._leases_s >= 0 else ""
+        views = [LinkView("hub", self._link.is_up, self._link.latency_s, renewed)]
+        for radio, values in sorted(self._radios.items()):
+            sent, late = values.get("packets_sent", 0.0), values.get("overruns", 0.0)
+            worst_ms = 1e3 * values.get("worst_packet_s", 0.0)
+            feedback = f"{sent:.0f} packets sent, {late:.0f} late or lost, slowest {worst_ms:.1f} ms"
+            views.append(LinkView(radio, not self._is_missing(radio), NONE_S, feedback))
+        return views
+
+    def parameters(self) -> list[ParameterView]:
+        """Return the parameters of the components that were asked for theirs, by component and name."""
+        return [view for _, view in sorted(self._parameters.items())]
+
+    def components(self) -> list[ComponentRow]:
+        """Return the components that are there, by address."""
+        return [_component_row(component) for _, component in sorted(self._components.items())]
+
+    def component(self, name: str) -> ComponentState | None:
+        """Return the component of this name, if it is there."""
+        return next((c for at, c in self._components.items() if component_of(at) == name), None)
+
+    def log(self, count: int = LOG_KEPT) -> list[LogRow]:
+        """Return the newest that happened, oldest first."""
+        return list(self._log)[-count:] if count else []
+
+    # ------------------------------------------------------------------ the schedule
+    def _take_schedule(self, schedule: Schedule) -> None:
+        before = {request.arc for request in self.schedule.requests} if self.schedule else set()
+        self.schedule = schedule
+        self._timeline.heard(schedule)
+        now = {request.arc for request in schedule.requests}
+        self._arcs |= now
+        self._priorities |= _priorities(schedule.requests)
+        for arc in before - now:
+            self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
+        for rc in schedule.rcs:
+            self._so(rc.state == "down", AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
+        self._renewed = {
+            (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
+            for rc in schedule.rcs
+            for holder in rc.holders
+        }
+
+    def _take_leases(self, leases: Leases, at_s: float) -> None:
+        self._leases, self._leases_s = leases, at_s
+        for lease in leases.leases:
+            self._renewed[lease.rc, lease.arc, lease.epoch] = at_s
+
+    def _is_missing(self, rc: str) -> bool:
+        return self._leases is not None and rc in self._leases.missing
+
+    def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
+        component = self._components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
+        starts_s = dict(zip(rc.next, rc.next_s, strict=False))
+        waiting = [
+            WaitingView(component_of(requests[arc].owner), arc, starts_s.get(arc, NONE_S))
+            for arc in rc.next
+            if arc in requests
+        ]
+        free = RobotView(
+            robot=rc.rc,
+            number=number,
+            is_up=rc.state != "down" and not self._is_missing(rc.rc),
+            holder="",
+            arc="",
+            is_console=False,
+            is_mine=False,
+            priority="",
+            epoch=0,
+            since_s=NONE_S,
+            until_s=NONE_S,
+            lease_left_s=NONE_S,
+            lease_age_s=NONE_S,
+            because="",
+            waiting=waiting,
+            stop=self.stop_view(rc.rc, now_s),
+            video=None,
+            feedback=component.feedback if component is not None else "",
+        )
+        if not rc.holders:
+            return free
+        holder = rc.holders[0]
+        request = requests.get(holder.arc)
+        renewed_s = self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
+        lease_s = self._leases.lease_s if self._leases is not None else holder.lease_until_s - renewed_s
+        age_s = max(0.0, now_s - renewed_s)
+        return msgspec.structs.replace(
+            free,
+            holder=component_of(request.owner) if request else holder.arc,
+            arc=holder.arc,
+            is_console=request is not None and _is_in(Subsystem.UI_CONSOLE, request.owner),
+            priority=request.priority if request else "",
+            epoch=holder.epoch,
+            since_s=holder.since_s,
+            until_s=request.until_s if request else NONE_S,
+            lease_left_s=max(0.0, lease_s - age_s),
+            lease_age_s=age_s,
+            because=_because(request) if request else "",
+        )
+
+    # ------------------------------------------------------------------ components
+    def _take_component(self, component: ComponentState, at_s: float) -> None:
+        known = self._components.get(component.address)
+        if known is not None and known.pid == component.pid and known.since_s > component.since_s:
+            return
+        name = component_of(component.address)
+        if component.state is LifeState.STOPPED:
+            if self._lost.pop(component.address, None) is not None or known is None:
+                self._components.pop(component.address, None)
+                self.alarms.retract(AlarmKind.LOST, name)  # its last word came after the word that it is gone
+            else:
+                self._components[component.address] = component
+            return
+        if component.state is LifeState.FAILED:
+            self._components[component.address] = component
+            self.alarms.happened(AlarmKind.LOST, name, f"{name} failed: {component.feedback}", at_s)
+            return
+        if known is None or known.pid != component.pid:
+            self._finished.pop(name, None)
+        self._components[component.address] = component
+        self._lost.pop(component.address, None)
+        self.alarms.end(AlarmKind.LOST, name, at_s)
+        is_rc = _is_in(Subsystem.RESOURCE_POOL, component.address)
+        self._so("not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s)
+
+    def _take_list(self, listed: Mapping[str, ComponentState], at_s: float, is_complete: bool) -> None:
+        for component in listed.values():
+            self._take_component(component, at_s)
+        if is_complete:
+            for address in self._components.keys() - listed.keys():
+                self._gone(address, at_s)
+
+    def _gone(self, address: str, at_s: float) -> None:
+        component = self._components.pop(address, None)
+        name = component_of(address)
+        self.alarms.end(AlarmKind.UNSAFE, name, at_s)
+        if component is None or component.state in LEAVING:
+            return
+        self._note(at_s, name, "is lost", "")
+        if name in self._arcs or _is_in(Subsystem.UI_CONSOLE, address):  # nobody restarts these by themselves
+            self.alarms.happened(AlarmKind.LOST, name, f"{name} is lost: it ended without a word", at_s)
+            return
+        self._lost[address] = at_s
+        self.alarms.begin(AlarmKind.LOST, name, f"{name} ({component.type}) on {component.host} is lost", at_s)
+        if _is_in(Subsystem.MISSION_CONTROL, address):
+            self._components[address] = component  # its place in the tree is kept until it is back
+
+    def _take_load(self, load: HostLoad, at_s: float) -> None:
+        self._hosts[load.host] = (at_s, load)
+        line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
+        self._so(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
+
+    def _node(self, node: ComponentState, depth: int, priority: int | None, request: RequestView | None) -> NodeView:
+        name = component_of(node.address)
+        state, since_s = NodeState.RUNNING, node.since_s
+        if node.address in self._lost:
+            state, since_s = NodeState.LOST, self._lost[node.address]
+        elif name in self._finished:
+            since_s, state = self._finished[name]
+        elif node.state is LifeState.CONNECTING:
+            state = NodeState.STARTING
+        elif request is not None:
+            state, since_s = _STATE_OF_REQUEST[request.state], request.since_s
+        return NodeView(
+            name,
+            node.type,
+            component_of(node.requester) if depth else "",
+            depth,
+            priority,
+            state,
+            since_s,
+            node.feedback,
+            request.arc if request is not None else "",
+            _because(request) if request is not None else "",
+        )
+
+    # ------------------------------------------------------------------ what happened
+    def _take_story(self, story: StoryEvent) -> None:
+        self._note(story.at_s, story.subject, story.what, story.where)
+        head, _, status = story.what.partition(": ")
+        if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
+            self._finished[story.subject] = (story.at_s, NodeState(status))
+
+    def _take_stop(self, stop: StopState, at_s: float) -> None:
+        former = self._stops.get(stop.rc)
+        if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
+            return
+        self._stops[stop.rc] = stop
+        unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
+        line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
+        remedy = "Lift the stop when the robot may move."
+        self._so(stop.is_stopped, AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+
+    def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
+        self._radios[radio] = values
+        for name, count in values.items():
+            arc = name.removeprefix("overruns_")
+            if arc == name:
+                continue
+            before = self._overruns.get((radio, arc), 0.0)
+            self._overruns[radio, arc] = count
+            if count > before:
+                line = f"{count:.0f} packets of {arc} on {radio} were late or lost"
+                remedy = "Claim with a longer period, or use another radio."
+                self.alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
+
+    def _take_parameters(self, event: ParametersHeard) -> None:
+        name = component_of(event.address)
+        for parameter, value in event.values.items():
+            key = (name, parameter)
+            shown = msgspec.json.encode(value).decode()
+            former = self._parameters.get(key)
+            if parameter == event.changed:
+                before = former.value if former is not None else ""
+                self._parameters[key] = ParameterView(
+                    name, event.address, parameter, shown, before, event.user, event.at_s
+                )
+                self._note(event.at_s, name, f"{event.user} set {parameter} to {shown}", event.address)
+            elif former is None or former.value != shown:
+                self._parameters[key] = ParameterView(name, event.address, parameter, shown)
+
+    def _note(self, at_s: float, subject: str, what: str, where: str) -> None:
+        self._log.append(LogRow(at_s, subject, what, where))
+
+    def _so(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
+        """Begin or end an alarm of a condition."""
+        if is_so:
+            self.alarms.begin(kind, subject, line, at_s, remedy)
+        else:
+            self.alarms.end(kind, subject, at_s)
+
+
+def _is_in(subsystem: Subsystem, address: str) -> bool:
+    return address.startswith(f"{subsystem}/")
+
+
+def _because(request: RequestView) -> str:
+    return request.because.removeprefix(f"{request.arc} {request.state}: ")
+
+
+def _request_row(request: RequestView) -> RequestRow:
+    return RequestRow(
+        request.arc,
+        component_of(request.owner),
+        _is_in(Subsystem.UI_CONSOLE, request.owner),
+        str(request.state),
+        request.rcs,
+        request.priority,
+        request.since_s,
+        request.until_s,
+        request.expected_start_s,
+        _because(request),
+        request.would_change,
+        request.blockers,
+    )
+
+
+def _request_order(row: RequestRow) -> tuple[bool, bool, float, str]:
+    return row.state != RequestState.RUNNING, row.expected_start_s < 0, row.expected_start_s, row.arc
+
+
+def _component_row(component: ComponentState) -> ComponentRow:
+    return ComponentRow(
+        component_of(component.address),
+        component.address,
+        component.address.partition("/")[0],
+        component.type,
+        component.host,
+        component.pid,
+        str(component.state),
+        component.since_s,
+        component.feedback,
+    )
+
+
+def _priorities(requests: Iterable[RequestView]) -> dict[str, int]:
+    """Return the priorities of all nodes on the paths of these requests."""
+    found: dict[str, int] = {}
+    for request in requests:
+        for step in request.priority.split("/"):
+            name, _, number = step.rpartition(":")
+            if name and number.lstrip("-").isdecimal():
+                found[name] = int(number)
+    return found
+
+
+def _siblings(nodes: list[ComponentState], priorities: Mapping[str, int]) -> list[ComponentState]:
+    def order(node: ComponentState) -> tuple[int, str]:
+        return -priorities.get(component_of(node.address), 0), node.address
+
+    return sorted(nodes, key=order)

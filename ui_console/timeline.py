@@ -1,0 +1,124 @@
+"""Who had which resource, who has it, who comes next: the schedule over time.
+
+Rules of this file: no bus, no clock, no screen. Schedules go in, in the order of their times; a view comes out, and
+*now* is an argument.
+
+* Turns of a resource with one holder at a time never overlap, whatever the order in which things were heard.
+* A turn that was seen stays for ``HISTORY_S`` after its end, then it is forgotten.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from backbone.naming import Subsystem, component_of
+from backbone.rc_manager.messages import RcView, RequestView, Schedule
+from ui_console.views import Certainty, SliceView, TimelineRow, TimelineView
+
+HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds
+TURNS_KEPT = 400  # chosen: bounds the memory of a resource that changes hands twice a second
+
+
+@dataclass(slots=True)
+class _Turn:
+    arc: str
+    who: str
+    is_console: bool
+    epoch: int
+    from_s: float
+    to_s: float  # end of the slice while it runs
+
+
+@dataclass(slots=True)
+class _Row:
+    kind: str
+    is_sharable: bool
+    past: deque[_Turn] = field(default_factory=lambda: deque(maxlen=TURNS_KEPT))
+    now: dict[tuple[str, int], _Turn] = field(default_factory=dict)
+    following: list[_Turn] = field(default_factory=list)
+    free_since_s: float = 0.0
+
+
+class Timeline:
+    """The turns of every resource."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, _Row] = {}
+        self._at_s = 0.0
+
+    def heard(self, schedule: Schedule) -> None:
+        """Take in a schedule; one that is older than the last changes nothing."""
+        if schedule.at_s < self._at_s:
+            return
+        self._at_s = schedule.at_s
+        requests = {request.arc: request for request in schedule.requests}
+        for rc in schedule.rcs:
+            row = self._rows.setdefault(rc.rc, _Row(rc.kind, rc.sharable))
+            row.kind, row.is_sharable = rc.kind, rc.sharable
+            _update(row, rc, requests, schedule.at_s)
+        for name in self._rows.keys() - {rc.rc for rc in schedule.rcs}:
+            del self._rows[name]
+        for row in self._rows.values():
+            while row.past and row.past[0].to_s < schedule.at_s - HISTORY_S:
+                row.past.popleft()
+
+    def view(self, now_s: float, past_s: float, next_s: float) -> TimelineView:
+        """Return the part of it around now.
+
+        Args:
+            now_s: Mission time.
+            past_s: Seconds shown before now.
+            next_s: Seconds shown after now.
+        """
+        from_s, to_s = now_s - past_s, now_s + next_s
+        rows = [
+            TimelineRow(name, row.kind, row.is_sharable, _slices(row, from_s, now_s, to_s))
+            for name, row in sorted(self._rows.items())
+        ]
+        return TimelineView(from_s, now_s, to_s, rows)
+
+
+def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float) -> None:
+    holders = {(holder.arc, holder.epoch): holder for holder in rc.holders}
+    for key in row.now.keys() - holders.keys():
+        turn = row.now.pop(key)
+        since_s = [holder.since_s for holder in rc.holders if not rc.sharable]
+        turn.to_s = max(turn.from_s, min([at_s, *since_s]))
+        row.past.append(turn)
+        row.free_since_s = max(row.free_since_s, turn.to_s)
+    for number, (key, holder) in enumerate(holders.items()):
+        until_s = rc.until_s[number] if number < len(rc.until_s) else -1.0
+        turn = row.now.get(key) or _begun(row, rc, key, holder.since_s, requests, at_s)
+        turn.to_s = until_s
+        row.now[key] = turn
+    row.following = [
+        _turn(arc, requests, 0, start_s, start_s + (requests[arc].minimum_runtime_s if arc in requests else 0.0))
+        for arc, start_s in zip(rc.next, rc.next_s, strict=False)
+        if start_s >= 0
+    ]
+
+
+def _begun(
+    row: _Row, rc: RcView, key: tuple[str, int], since_s: float, requests: dict[str, RequestView], at_s: float
+) -> _Turn:
+    """Return a turn that was not known; it cannot have begun before the last one ended, nor after it was told."""
+    arc, epoch = key
+    earliest_s = 0.0 if rc.sharable else row.free_since_s
+    return _turn(arc, requests, epoch, min(max(since_s, earliest_s), max(at_s, earliest_s)), -1.0)
+
+
+def _turn(arc: str, requests: dict[str, RequestView], epoch: int, from_s: float, to_s: float) -> _Turn:
+    owner = requests[arc].owner if arc in requests else arc
+    return _Turn(arc, component_of(owner), owner.startswith(f"{Subsystem.UI_CONSOLE}/"), epoch, from_s, to_s)
+
+
+def _slices(row: _Row, from_s: float, now_s: float, to_s: float) -> list[SliceView]:
+    past = [_slice(turn, Certainty.PAST, turn.to_s) for turn in row.past if turn.to_s >= from_s]
+    running = [_slice(turn, Certainty.NOW, max(now_s, turn.to_s)) for turn in row.now.values()]
+    following = [_slice(turn, Certainty.NEXT, turn.to_s) for turn in row.following if turn.from_s <= to_s]
+    return sorted([*past, *running, *following], key=lambda one: (one.from_s, one.to_s, one.arc))
+
+
+def _slice(turn: _Turn, certainty: Certainty, to_s: float) -> SliceView:
+    return SliceView(turn.who, turn.arc, turn.epoch, turn.from_s, max(turn.from_s, to_s), certainty, turn.is_console)

@@ -1,0 +1,432 @@
+"""What screens show, as plain values: one struct for each kind of row, JSON-able as it is.
+
+Times ending in ``_s`` are mission seconds; ages, and what is left, are seconds counted from the view's ``now_s``. A
+negative time, age or rest means that there is none. ``view_json`` turns any of them into bytes for a browser.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import msgspec
+
+NONE_S = -1.0
+"""In place of a time, an age or a rest: there is none."""
+
+
+class Severity(StrEnum):
+    """How much an alarm matters, most first."""
+
+    ALARM = "alarm"  # a robot may do what it should not, or nothing any more
+    WARNING = "warning"  # the mission goes on, less well
+    NOTICE = "notice"  # an operator should know
+
+
+class AlarmKind(StrEnum):
+    """What an alarm is about."""
+
+    STOPPED = "stopped"  # an operator stopped a robot
+    LOST = "lost"  # a component is gone that nobody ended
+    UNSAFE = "unsafe"  # an RC did not reach its safe state
+    RC_DOWN = "rc_down"  # the RC manager cannot reach an RC
+    LINK = "link"  # this console has no link to the hub
+    STALE_VIDEO = "stale_video"  # the picture driven by is old
+    STARVING = "starving"  # a request waits long and no end is in sight
+    DEADLINE = "deadline"  # packets on a radio come too late
+    OVERLOAD = "overload"  # a host has no time to spare
+    TAKEN = "taken"  # this console's robot went to somebody else
+    REFUSED = "refused"  # somebody said no to this console
+    NO_ANSWER = "no_answer"  # somebody did not answer this console
+
+
+class WaitingView(msgspec.Struct, frozen=True):
+    """Somebody who wants a resource.
+
+    Attributes:
+        who: Decision process.
+        arc: Its ARC.
+        start_s: Predicted grant.
+    """
+
+    who: str
+    arc: str
+    start_s: float
+
+
+class StopView(msgspec.Struct, frozen=True):
+    """An operator's stop that is in force.
+
+    Attributes:
+        number: To lift it by.
+        by: Who stopped the robot.
+        reason: As given.
+        age_s: For how long.
+        is_confirmed: False if the wheels may still turn for a moment.
+    """
+
+    number: int
+    by: str
+    reason: str
+    age_s: float
+    is_confirmed: bool
+
+
+class VideoView(msgspec.Struct, frozen=True):
+    """Pictures of one robot as they arrive at this console.
+
+    Attributes:
+        robot: The robot.
+        age_s: Since the newest was taken.
+        rate_hz: How many arrived a second lately.
+        latency_s: From capture to here, of the newest.
+        is_stale: True: do not drive by it.
+    """
+
+    robot: str
+    age_s: float
+    rate_hz: float
+    latency_s: float
+    is_stale: bool
+
+
+class RobotView(msgspec.Struct, frozen=True):
+    """One robot.
+
+    Attributes:
+        robot: Its name.
+        number: Its place in the list, from 1; the key that picks it.
+        is_up: False if its RC cannot be reached.
+        holder: Decision process that has it; empty: nobody.
+        arc: The holder's ARC.
+        is_console: True if the holder is a console.
+        is_mine: True if this console has it.
+        priority: The holder's priority path, ``mission:10/surveillance:5/watch-scout1:3``.
+        epoch: Of the grant.
+        since_s: Since when.
+        until_s: End of the slice.
+        lease_left_s: Until the hold ends unless it is renewed.
+        lease_age_s: Since the last renewal was heard.
+        because: Why the holder has it.
+        waiting: Who wants it, the next first.
+        stop: The operator's stop in force; None: it may move.
+        video: Its pictures; None: this console gets none.
+        feedback: What its RC says.
+    """
+
+    robot: str
+    number: int
+    is_up: bool
+    holder: str
+    arc: str
+    is_console: bool
+    is_mine: bool
+    priority: str
+    epoch: int
+    since_s: float
+    until_s: float
+    lease_left_s: float
+    lease_age_s: float
+    because: str
+    waiting: list[WaitingView]
+    stop: StopView | None
+    video: VideoView | None
+    feedback: str
+
+
+class NodeState(StrEnum):
+    """How a node of the behavior tree is."""
+
+    RUNNING = "running"  # holds its ARC, or needs none
+    WAITING = "waiting"  # wants its ARC
+    IDLE = "idle"  # wants no time now
+    SUCCESS = "success"
+    FAILURE = "failure"
+    STARTING = "starting"
+    LOST = "lost"
+
+
+class NodeView(msgspec.Struct, frozen=True):
+    """A node of the behavior tree; they come parents before children, siblings of higher priority first.
+
+    Attributes:
+        name: Of the node and its component.
+        type: Component type.
+        parent: Name of its parent; empty for a root.
+        depth: 0 for a root.
+        priority: Among its siblings, as far as it is known; None: nothing at or below it ever asked for an ARC.
+        state: How it is.
+        since_s: Since when.
+        feedback: What it says it is doing.
+        arc: What it claims; empty: nothing yet.
+        because: Why its ARC waits or runs.
+    """
+
+    name: str
+    type: str
+    parent: str
+    depth: int
+    priority: int | None
+    state: NodeState
+    since_s: float
+    feedback: str
+    arc: str
+    because: str
+
+
+class RequestRow(msgspec.Struct, frozen=True):
+    """One request in the schedule, running ones first.
+
+    Attributes:
+        arc: The ARC.
+        who: Its decision process.
+        is_console: True if that is a console.
+        state: ``running``, ``waiting``, ``idle``, ``connecting`` or ``revoking``.
+        rcs: Its RCs.
+        priority: Its priority path.
+        since_s: Since when it is in that state.
+        until_s: End of its slice.
+        expected_start_s: Predicted grant.
+        because: Why.
+        would_change: What would end this.
+        blockers: ARCs directly in its way.
+    """
+
+    arc: str
+    who: str
+    is_console: bool
+    state: str
+    rcs: list[str]
+    priority: str
+    since_s: float
+    until_s: float
+    expected_start_s: float
+    because: str
+    would_change: str
+    blockers: list[str]
+
+
+class Certainty(StrEnum):
+    """Which part of the timeline a slice is in."""
+
+    PAST = "past"
+    NOW = "now"
+    NEXT = "next"  # predicted
+
+
+class SliceView(msgspec.Struct, frozen=True):
+    """Somebody's turn with a resource.
+
+    Attributes:
+        who: Decision process.
+        arc: Its ARC.
+        epoch: Of the grant; 0 for one that is predicted.
+        from_s: Begin.
+        to_s: End; of a running one the end of its slice, of a predicted one its shortest.
+        certainty: Past, now or next.
+        is_console: True if it is a console's.
+    """
+
+    who: str
+    arc: str
+    epoch: int
+    from_s: float
+    to_s: float
+    certainty: Certainty
+    is_console: bool
+
+
+class TimelineRow(msgspec.Struct, frozen=True):
+    """One resource over time; slices by their begin."""
+
+    rc: str
+    kind: str
+    is_sharable: bool
+    slices: list[SliceView]
+
+
+class TimelineView(msgspec.Struct, frozen=True):
+    """Who had which resource, who has it, who comes next."""
+
+    from_s: float
+    now_s: float
+    to_s: float
+    rows: list[TimelineRow]
+
+
+class AlarmView(msgspec.Struct, frozen=True):
+    """One alarm.
+
+    Attributes:
+        key: What it is acknowledged by.
+        kind: What it is about.
+        severity: How much it matters.
+        subject: Name to ask ``why`` about.
+        line: What happened.
+        remedy: What to do about it; may be empty.
+        first_s: When it happened first.
+        last_s: When it happened last, or since when it has been over.
+        count: How often.
+        is_active: True while it is so; False: it is over, or was an event.
+        acknowledged_by: Who has seen it; empty: nobody.
+        while_away: True if it came while the operator was away and is not acknowledged.
+    """
+
+    key: str
+    kind: AlarmKind
+    severity: Severity
+    subject: str
+    line: str
+    remedy: str
+    first_s: float
+    last_s: float
+    count: int
+    is_active: bool
+    acknowledged_by: str
+    while_away: bool
+
+
+class HostView(msgspec.Struct, frozen=True):
+    """One machine of the mission.
+
+    Attributes:
+        host: Its name.
+        cpu: Busy share of its cores, 0 to 1.
+        memory: Used share, 0 to 1.
+        cores: How many.
+        components: How many run there.
+        age_s: Since it told so.
+    """
+
+    host: str
+    cpu: float
+    memory: float
+    cores: int
+    components: int
+    age_s: float
+
+
+class LinkView(msgspec.Struct, frozen=True):
+    """A way that messages go.
+
+    Attributes:
+        name: ``hub``; ``commands`` to this console's robot; a radio's name.
+        is_up: False if nothing passes.
+        latency_s: There and back.
+        feedback: More about it for people.
+    """
+
+    name: str
+    is_up: bool
+    latency_s: float
+    feedback: str
+
+
+class ParameterView(msgspec.Struct, frozen=True):
+    """One parameter of a component, as last heard.
+
+    Attributes:
+        component: Name of the component.
+        address: Its address.
+        name: Name of the parameter.
+        value: As JSON.
+        before: As JSON, before the change that this console saw; empty: it saw none.
+        changed_by: Who changed it.
+        changed_s: When.
+    """
+
+    component: str
+    address: str
+    name: str
+    value: str
+    before: str = ""
+    changed_by: str = ""
+    changed_s: float = NONE_S
+
+
+class ComponentRow(msgspec.Struct, frozen=True):
+    """One component."""
+
+    name: str
+    address: str
+    subsystem: str
+    type: str
+    host: str
+    pid: int
+    state: str
+    since_s: float
+    feedback: str
+
+
+class LogRow(msgspec.Struct, frozen=True):
+    """One thing that happened.
+
+    Attributes:
+        at_s: When.
+        subject: The name it is about.
+        what: Past tense, one line.
+        where: Address of the component that told it.
+    """
+
+    at_s: float
+    subject: str
+    what: str
+    where: str
+
+
+class OwnView(msgspec.Struct, frozen=True):
+    """What this console wants and has.
+
+    Attributes:
+        console: Its name.
+        user: Who sits at it.
+        robot: Robot wanted or held; empty: any, or none.
+        is_held: True: keys move it.
+        is_asked: True: it is wanted.
+        status: In one line: whether it is held, and if not, why.
+        epoch: Of the grant; 0: none.
+        until_s: End of the slice.
+        taken_because: Why and by whom it was taken, while it is.
+        applied: The last command that was applied, for people.
+        stop: The stop in force on the robot held; None: it may move.
+        away_since_s: Since when the operator is away.
+    """
+
+    console: str
+    user: str
+    robot: str
+    is_held: bool
+    is_asked: bool
+    status: str
+    epoch: int
+    until_s: float
+    taken_because: str
+    applied: str
+    stop: StopView | None
+    away_since_s: float
+
+
+class ConsoleView(msgspec.Struct, frozen=True):
+    """All that a console shows at one moment."""
+
+    mission: str
+    now_s: float
+    own: OwnView
+    robots: list[RobotView]
+    tree: list[NodeView]
+    requests: list[RequestRow]
+    timeline: TimelineView
+    alarms: list[AlarmView]
+    hosts: list[HostView]
+    links: list[LinkView]
+    videos: list[VideoView]
+    parameters: list[ParameterView]
+    components: list[ComponentRow]
+    log: list[LogRow]
+
+
+_encoder = msgspec.json.Encoder()
+
+
+def view_json(view: msgspec.Struct) -> bytes:
+    """Return any view as JSON, fields by their names."""
+    return _encoder.encode(view)
