@@ -110,6 +110,26 @@ class World:
         if robot is not None:
             robot.program.hear(payload, self.time_s)
 
+    def strike(
+        self, robot: str, velocity_m_s: tuple[float, float, float], spin_rad_s: tuple[float, float, float]
+    ) -> None:
+        """Give a robot a blow: its body moves and spins faster by this much from now on.
+
+        Args:
+            robot: Its name; a blow to one that is carried has no effect.
+            velocity_m_s: Added along the room's x, y, z.
+            spin_rad_s: Added about the body's own axes: forward, left, up.
+
+        Raises:
+            UnknownBody: No robot has this name.
+            ValueError: A number is not finite.
+        """
+        blow = (*velocity_m_s, *spin_rad_s)
+        if not all(math.isfinite(part) for part in blow):
+            raise ValueError(f"a blow of {blow}")
+        first = self._robot(robot).velocities.start
+        self._data.qvel[first : first + 6] += blow
+
     def step_frame(self) -> None:
         """Advance by one frame, a thirtieth of a second."""
         for robot in self._robots.values():
