@@ -94,8 +94,7 @@ def _starting_meanwhile(gone: Sequence[ArcEntry], table: MasterSchedule, arc: Ar
 
 def _holders_in_the_way(table: MasterSchedule, arc: ArcEntry, now_s: float) -> list[ArcEntry]:
     """Return the holders of its RCs that it cannot simply displace now."""
-    holders = dict.fromkeys(holder for rc in arc.uses for holder in table.rcs[rc].holders)
-    return [holder for holder in holders if holder is not arc and _stays(table, holder, arc, now_s)]
+    return [holder for holder in table.holders(arc) if _stays(table, holder, arc, now_s)]
 
 
 def _stays(table: MasterSchedule, holder: ArcEntry, arc: ArcEntry, now_s: float) -> bool:

@@ -10,12 +10,11 @@ Source: decision 0011.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
-from backbone.rc_manager.above import Above
 from backbone.rc_manager.entries import INSTANT_S, ArcEntry
 from backbone.rc_manager.messages import RequestState
-from backbone.rc_manager.plan import Hold, Slot, Turn
+from backbone.rc_manager.plan import Turn
 from backbone.rc_manager.priority import higher
 from backbone.rc_manager.table import Table
 
@@ -53,17 +52,15 @@ class FirstInLine:
         self._reserved.clear()  # nothing changes while they are looked at
         while self._candidates:
             arc, _ = self._candidates.popitem()
-            if not (arc.state is RequestState.WAITING and table.could_start(arc, now_s) and table.usable(arc)):
+            holders = table.holders(arc)
+            if not (arc.state is RequestState.WAITING and table.could_start(arc, holders, now_s) and table.usable(arc)):
                 continue
-            if self._takes_from_others(arc, now_s):
+            if self._takes_from_others(arc, now_s) or table.must_let_higher_go_first(arc):
                 continue
-            if table.must_let_higher_go_first(arc):
-                continue
-            others = table.beside(arc)
-            if not table.fits(arc, [h for h in others if h.holds and table.stands_until_s(h, arc, now_s) > now_s]):
+            if not table.fits(arc, [one for one in holders if table.stands_until_s(one, arc, now_s) > now_s]):
                 continue  # one by one they would let it in, but not together
-            in_the_way = table.in_the_way(arc, [], others, now_s)
-            if in_the_way or table.fits(arc, [other for other in others if other.holds]):
+            in_the_way = table.in_the_way(arc, [], holders, now_s)
+            if in_the_way or table.fits(arc, holders):
                 return Turn(arc, in_the_way)
         return None
 
@@ -92,7 +89,7 @@ class FirstInLine:
         """Return the first in order of those queued for the RC; None if nobody is."""
         if rc not in self._firsts:
             queued = [user for user in self._table.users(rc) if user.queued and self._table.usable(user)]
-            self._firsts[rc] = self._table.in_order(queued)[0] if queued else None
+            self._firsts[rc] = self._table.first_in_order(queued) if queued else None
         return self._firsts[rc]
 
     def _reserved_s(self, arc: ArcEntry, now_s: float, behind: tuple[ArcEntry, ...]) -> float:
@@ -105,13 +102,10 @@ class FirstInLine:
         """
         if arc in self._reserved:
             return self._reserved[arc]
-        holders = dict.fromkeys(holder for rc in arc.uses for holder in self._table.rcs[rc].holders)
-        ends = [
-            self._table.stands_until_s(h, arc, now_s)
-            for h in holders
-            if h is not arc and not self._table.fits(arc, [h])
-        ]
-        start_s = max([now_s, *ends])
+        start_s = now_s
+        for holder in self._table.holders(arc):
+            if not self._table.fits(arc, [holder]):
+                start_s = max(start_s, self._table.stands_until_s(holder, arc, now_s))
         if len(behind) > LOOK_AHEAD:
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
@@ -123,53 +117,3 @@ class FirstInLine:
                 start_s = math.inf if higher(first.path, arc.path) else max(start_s, first_s + first.length_s)
         self._reserved[arc] = start_s
         return start_s
-
-    def estimate(self, order: Sequence[ArcEntry], now_s: float) -> list[Slot]:
-        """Return where these will be, given in order, if at each RC one turn after the other is taken.
-
-        What sharers of an RC take of its time is counted by what they send, not stream by stream.
-        """
-        ends_s: dict[str, float] = {}
-        taken_s: dict[str, float] = {}
-        exclusive: dict[str, Above] = {rc: Above() for arc in order for rc in arc.uses}
-        sharers: dict[str, Above] = {rc: Above() for arc in order for rc in arc.shares}
-        slots = []
-        for arc in order:
-            if not self._table.usable(arc):
-                slots.append(Slot(arc, math.inf, self._standing(arc, now_s)))
-                continue
-            crowded = [rc for rc in arc.shares if not self._table.has_room_for_all(rc)]
-            alone = [rc for rc in arc.uses if rc not in arc.shares]
-            above = [*(exclusive[rc] for rc in arc.uses), *(sharers[rc] for rc in alone if rc in sharers)]
-            standing = self._standing(arc, now_s)
-            frees_s = [
-                end_s + (0.0 if holder.state is RequestState.REVOKING else holder.release_s)
-                for holder, _, end_s in standing
-            ]
-            start_s = max([now_s, *frees_s, *(ends_s.get(rc, now_s) for rc in arc.uses)])
-            if crowded or alone:
-                start_s = max([start_s, *(now_s + taken_s.get(rc, 0.0) for rc in [*crowded, *alone])])
-            if any(one.largest(arc.path) > -math.inf for one in above):
-                start_s = math.inf  # once those above it run, they need not end
-            slots.append(Slot(arc, start_s, [hold for hold in standing if hold[2] > now_s + INSTANT_S]))
-            for rc in arc.uses:
-                (sharers if rc in arc.shares else exclusive)[rc].add(arc.path, start_s)
-            if start_s < math.inf:
-                ends_s.update((rc, start_s + arc.length_s + arc.release_s) for rc in alone)
-                for rc in crowded:
-                    taken_s[rc] = taken_s.get(rc, 0.0) + arc.length_s * self._share(arc, rc)
-        return slots
-
-    def _share(self, arc: ArcEntry, rc: str) -> float:
-        """Return the part of what the RC can give that the ARC asks for, 0 to 1."""
-        return min(
-            1.0, sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams) / self._table.rcs[rc].capacity
-        )
-
-    def _standing(self, arc: ArcEntry, now_s: float) -> list[Hold]:
-        """Return the holders that the ARC cannot run beside."""
-        return [
-            (holder, -math.inf, self._table.stands_until_s(holder, arc, now_s))
-            for holder in dict.fromkeys(holder for rc in arc.uses for holder in self._table.rcs[rc].holders)
-            if holder is not arc and not self._table.fits(arc, [holder])
-        ]

@@ -24,6 +24,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from backbone.rc_manager.discipline import Discipline
 from backbone.rc_manager.entries import CONNECTED, ArcEntry
+from backbone.rc_manager.estimate import estimate
 from backbone.rc_manager.first_in_line import FirstInLine
 from backbone.rc_manager.groups import Group
 from backbone.rc_manager.messages import RequestState
@@ -120,7 +121,9 @@ class MasterSchedule(Table):
 
     def _due_in(self, group: Group[ArcEntry], now_s: float) -> Turn | None:
         """Return whose time is now in a group that is planned whole."""
-        possible = {arc for arc in group.arcs if arc.state is RequestState.WAITING and self.could_start(arc, now_s)}
+        holders = [arc for arc in group.arcs if arc.holds]
+        waiting = (arc for arc in group.arcs if arc.state is RequestState.WAITING)
+        possible = {arc for arc in waiting if self.could_start(arc, holders, now_s)}
         if not possible:
             return None
         plans = self._plans_of(group, now_s)
@@ -210,20 +213,20 @@ class MasterSchedule(Table):
         """Return the place of every queued ARC of a group, in order; of a big group an estimate."""
         if len(group) <= self._exact_up_to:
             return self.plan(group, now_s)
-        return self._line.estimate(self.in_order([arc for arc in group if arc.queued]), now_s)
+        return estimate(self, self.in_order([arc for arc in group if arc.queued]), now_s)
 
     def slot_of(self, arc: ArcEntry, now_s: float) -> Slot | None:
         """Return the place of the ARC in the plan; None if it is not queued."""
         if not arc.queued:
             return None
         if not self.planned_whole(arc):
-            return self._line.estimate([*self.before(arc), arc], now_s)[-1]
+            return estimate(self, [*self.before(arc), arc], now_s)[-1]
         return next(slot for slot in self.plan(self.group_of(arc), now_s) if slot.arc is arc)
 
     def start_s(self, arc: ArcEntry, now_s: float) -> float:
         """Return when the RCs of a queued ARC will begin to settle, as the decision being made sees it."""
         if not self.planned_whole(arc):
-            return self._line.estimate([*self.before(arc), arc], now_s)[-1].start_s
+            return estimate(self, [*self.before(arc), arc], now_s)[-1].start_s
         return self._plans_of(self._groups.of(arc), now_s).now.start_s(arc)
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:

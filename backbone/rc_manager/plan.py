@@ -114,7 +114,7 @@ class Plan:
         touches, excludes = arc.touches, arc.excludes
         start_s = table.free_s(arc, now_s) if arc.holds and not self._handed_over else now_s
         for holder in self._holders:
-            if holder.touches & touches & (excludes | holder.excludes) and holder is not arc:
+            if (holder.touches & excludes or holder.excludes & touches) and holder is not arc:
                 until_s = table.stands_until_s(holder, arc, now_s)
                 start_s = max(start_s, until_s)
         if start_s == math.inf:
@@ -124,9 +124,11 @@ class Plan:
         for begin_s, _, end_s, other in self._reserved:
             if begin_s >= too_late_s:
                 break
-            if not other.touches & touches & (excludes | other.excludes) or not self._binds(begin_s, other, arc):
+            if not (other.touches & excludes or other.excludes & touches):
                 continue
-            if higher(other.path, arc.path):
+            if not (self._among_equals or self._binds(begin_s, other, arc)):
+                continue
+            if rank(other.path, arc.path) > 0:
                 return math.inf
             if end_s > start_s:
                 start_s = end_s
@@ -137,7 +139,7 @@ class Plan:
 
     def _binds(self, begin_s: float, other: ArcEntry, arc: ArcEntry) -> bool:
         """Say whether what is reserved for the other binds the ARC."""
-        if self._among_equals or begin_s <= self._now_s or other.pledge is not None:
+        if begin_s <= self._now_s or other.pledge is not None:
             return True
         return rank(other.path, arc.path) != 0
 
@@ -154,7 +156,7 @@ class Plan:
         against += [
             (other, begin_s, end_s)
             for _, begin_s, end_s, other in before
-            if other.touches & touches and self._binds(begin_s, other, arc)
+            if other.touches & touches and (self._among_equals or self._binds(begin_s, other, arc))
         ]
         return against
 

@@ -39,9 +39,9 @@ def higher(a: Path, b: Path) -> bool:
 
 def rank(a: Path, b: Path) -> int:
     """Return 1 if ``a`` goes strictly before ``b``, -1 if ``b`` goes before ``a``, 0 if neither does."""
-    for (name_a, number_a), (name_b, number_b) in zip(a, b, strict=False):
-        if name_a != name_b:
-            return (number_a > number_b) - (number_a < number_b)
+    for node_a, node_b in zip(a, b, strict=False):
+        if node_a is not node_b and node_a[0] != node_b[0]:
+            return (node_a[1] > node_b[1]) - (node_a[1] < node_b[1])
     return (len(a) < len(b)) - (len(a) > len(b))
 
 
@@ -56,36 +56,36 @@ def by_precedence(items: Sequence[T], path: Callable[[T], Path], key: Callable[[
         path: Of an item; a node has the same number in all of them.
         key: Of an item; of two with the same key the one that is first in ``items`` comes first.
     """
-    root = _Branch()
-    for place, item in enumerate(items):
-        branch = root
-        for node in path(item):
-            branch = branch.children.get(node) or branch.children.setdefault(node, _Branch())
-        branch.own.append((key(item), place))
-    return [items[place] for _, place in root.in_order()]
+    keyed = sorted((key(item), place, path(item)) for place, item in enumerate(items))
+    return [items[place] for _, place, _ in _in_order(keyed, 0)]
 
 
-class _Branch:
-    """A node of the tree that is being ordered: keys and places of its own items, and its children."""
+_Keyed = tuple[Any, int, Path]
+"""Key of an item, its place among those given (no two are the same), and its path."""
 
-    __slots__ = ("children", "own")
 
-    def __init__(self) -> None:
-        self.own: list[tuple[Any, int]] = []
-        self.children: dict[tuple[str, int], _Branch] = {}
-
-    def in_order(self) -> list[tuple[Any, int]]:
-        ordered = sorted(self.own)
-        by_number: dict[int, list[_Branch]] = {}
-        for (_, number), child in self.children.items():
-            by_number.setdefault(number, []).append(child)
-        for number in sorted(by_number, reverse=True):
-            equals = by_number[number]
-            leaves = sorted(one for child in equals if not child.children for one in child.own)
-            orders = [leaves, *(child.in_order() for child in equals if child.children)]
-            # Not sorted each: merging takes the smaller of the first ones again and again, which is what is wanted.
-            ordered += heapq.merge(*orders) if len(orders) > 1 else leaves
-        return ordered
+def _in_order(keyed: list[_Keyed], depth: int) -> list[_Keyed]:
+    """Return items of one branch, ``depth`` nodes below the root, in order; they are given sorted."""
+    ordered: list[_Keyed] = []
+    by_number: dict[int, list[_Keyed]] = {}
+    for one in keyed:
+        below = one[2]
+        if len(below) == depth:
+            ordered.append(one)
+        else:
+            by_number.setdefault(below[depth][1], []).append(one)
+    for number in sorted(by_number, reverse=True):
+        equals = by_number[number]
+        if len(equals) == 1 or all(len(one[2]) == depth + 1 for one in equals):
+            ordered += equals
+            continue
+        branches: dict[str, list[_Keyed]] = {}
+        for one in equals:
+            branches.setdefault(one[2][depth][0], []).append(one)
+        orders = [_in_order(branch, depth + 1) for branch in branches.values()]
+        # Not sorted each: merging takes the smaller of the first ones again and again, which is what is wanted.
+        ordered += heapq.merge(*orders) if len(orders) > 1 else orders[0]
+    return ordered
 
 
 class PriorityTree:
@@ -101,6 +101,7 @@ class PriorityTree:
         self._numbers: dict[tuple[str, ...], int] = {(mission,): priority}
         self._set: dict[str, int] = {}
         self._raised: dict[tuple[str, ...], int] = {}
+        self._shared: dict[tuple[str, int], tuple[str, int]] = {}
         self._moves: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
 
     def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[tuple[str, ...], bool]:
@@ -125,11 +126,12 @@ class PriorityTree:
         return names, renumbered
 
     def path(self, names: tuple[str, ...]) -> Path:
-        """Return the way with its present numbers."""
-        return tuple(
+        """Return the way with its present numbers; what two ways have in common are the same objects."""
+        numbered = [
             (name, self._numbers[way] + self._raised.get(way, 0))
             for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
-        )
+        ]
+        return tuple(self._shared.setdefault(node, node) for node in numbered)
 
     def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
         """Return the way as a request names it, with its numbers as they were set: nobody is raised for waiting."""

@@ -267,6 +267,13 @@ class Table:
                 ordered.insert(0, pledged)
         return ordered
 
+    def first_in_order(self, arcs: Sequence[ArcEntry]) -> ArcEntry:
+        """Return the first of ARCs of one group, at least one, in the order of rule 2."""
+        if any(arc.pledge is not None for arc in arcs):
+            return self.in_order(arcs)[0]
+        by_age = sorted(arcs, key=self.seniority)
+        return next(arc for arc in by_age if not any(rank(other.path, arc.path) > 0 for other in arcs))
+
     def seniority(self, arc: ArcEntry) -> tuple[bool, float, float, int]:
         """Return the key among equals: smaller comes first. Those RCs are being freed for by force come before all."""
         if arc.pledge is not None:
@@ -320,13 +327,24 @@ class Table:
         beside.pop(arc, None)
         return [*beside]
 
-    def could_start(self, arc: ArcEntry, now_s: float) -> bool:
-        """Say whether, of those it cannot share with, nobody holds an RC of it for longer than until now."""
-        return all(
-            holder is arc or self.stands_until_s(holder, arc, now_s) <= now_s + INSTANT_S or self.fits(arc, [holder])
-            for rc in arc.uses
-            for holder in self.rcs[rc].holders
-        )
+    def holders(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the others that hold an RC of the ARC."""
+        holders = dict.fromkeys(holder for rc in arc.uses for holder in self.rcs[rc].holders)
+        holders.pop(arc, None)
+        return [*holders]
+
+    def could_start(self, arc: ArcEntry, holders: Iterable[ArcEntry], now_s: float) -> bool:
+        """Say whether none of these that it cannot share with holds an RC of it for longer than until now."""
+        touches, soon_s = arc.touches, now_s + INSTANT_S
+        for holder in holders:
+            if (
+                holder.touches & touches
+                and holder is not arc
+                and self.stands_until_s(holder, arc, now_s) > soon_s
+                and not self.fits(arc, [holder])
+            ):
+                return False
+        return True
 
     def in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
