@@ -135,7 +135,7 @@ def test_it_does_not_jump_over_half_a_metre() -> None:
 
 @pytest.mark.parametrize(("back", "forth"), [(6, 6), (9, 9), (12, 12), (7, 11), (11, 7)])
 def test_back_and_forth_at_full_speed_puts_it_on_its_wheels_again(back: int, forth: int) -> None:
-    """The wheelie: its tail throws it over. It needs no sensor: to a Scout on its wheels it does nothing but shake it."""
+    """The wheelie: its tail throws it over. One that stands on its wheels is only shaken."""
     dice, fallen = random.Random(2), 0
     for _ in range(8):
         room = world(x_m=4.5)

@@ -1,0 +1,94 @@
+"""Another kind of robot is one MJCF, one class, and its class path in the description."""
+
+import struct
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from scout_model import radio_link
+from scout_model.camera import Camera
+from scout_model.description import SCOUT, ScoutPlace, WorldDescription
+from scout_model.errors import InvalidWorld, UnknownBody
+from scout_model.robot import Robot, robot_class
+from scout_model.scout import Scout
+from scout_model.world import World
+
+
+@pytest.fixture(autouse=True)
+def _robots_can_be_imported(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    yield
+    sys.modules.pop("rover", None)
+
+
+def world(kind: str = "rover:Rover") -> World:
+    places = [
+        ScoutPlace("rover1", 1, 3.0, 3.0, 0.0, kind),
+        ScoutPlace("scout1", 2, 5.0, 3.0, 0.0),
+        ScoutPlace("rover2", 3, 3.0, 4.0, 0.0, kind),
+    ]
+    return World(WorldDescription(9.0, 6.0, scouts=places))
+
+
+def test_the_scout_is_one_kind_among_others() -> None:
+    assert robot_class(SCOUT) is Scout
+    assert isinstance(Scout(), Robot)
+
+
+def test_a_rover_hears_its_packets_drives_and_stops_beside_scouts() -> None:
+    room = world()
+    for frame in range(60):
+        room.hear(1, struct.pack("!ff", 4.0, 4.0))
+        if frame % 5 == 0:
+            room.hear(2, radio_link.encode_drive(10.0, 10.0))
+        room.step_frame()
+    x_m, y_m, heading_rad = room.pose("rover1")
+    assert x_m == pytest.approx(3.0 + 4.0 * 0.05 * 2.0, rel=0.08)
+    assert (y_m, heading_rad) == pytest.approx((3.0, 0.0), abs=0.01)
+    assert room.motors("rover1") == pytest.approx(0.4)
+    assert room.pose("scout1")[0] > 5.3
+    assert room.pose("rover2")[0] == pytest.approx(3.0, abs=0.01)
+    assert room.is_asleep("rover2")
+    room.hear(1, struct.pack("!ff", 0.0, 0.0))
+    for _ in range(90):
+        room.step_frame()
+    assert room.is_asleep("rover1")
+
+
+def test_a_rovers_transmitter_and_camera_are_the_worlds() -> None:
+    room = world()
+    room.hear(1, struct.pack("!ff", 0.0, 0.0))
+    room.step_frame()
+    assert room.transmitting() == {"rover1": "video7"}
+    with Camera(room.mjcf, "paint") as camera:
+        empty = camera.picture("rover2")
+        assert camera.picture("rover1").std() > 10
+        assert (camera.picture("rover1") != empty).any()
+
+
+def test_what_only_scouts_have_is_refused_of_a_rover() -> None:
+    with pytest.raises(UnknownBody, match="no Scout named 'rover1'"):
+        world().spring("rover1")
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        ("rover", "class path"),
+        ("rover:Submarine", "Submarine"),
+        ("submarine:Submarine", "submarine"),
+        ("rover:Bodiless", "body_mjcf"),
+        ("rover:RADIUS_M", "no kind of robot"),
+        ("rover:Broken", "the body of rover1"),
+    ],
+)
+def test_what_is_no_robot_is_refused_with_its_name(kind: str, told: str) -> None:
+    with pytest.raises(InvalidWorld, match=told):
+        world(kind)
+
+
+def test_a_class_that_drives_what_its_body_has_not_is_told_so() -> None:
+    with pytest.raises(InvalidWorld, match="'rudder'"):
+        world("rover:Driverless").step_frame()
