@@ -2,7 +2,7 @@
 
 What stands in it takes the place of walls and marks; a plane in it takes the place of the floor, a light
 in it that of the sun.  How fast and how exactly the world steps is not the room's business: ``<option>``
-and the like are passed over.
+and the like are passed over.  In the world's model the room's names begin with ``room/``.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ def add_room(spec: Any, mjcf: str) -> None:
     Raises:
         InvalidWorld: MuJoCo cannot read it, or it has shapes that no camera draws.
     """
+    if "<mujoco" not in mjcf:
+        raise InvalidWorld("the room's file is no MJCF: it has no <mujoco>")
     try:
         room = mujoco.MjSpec.from_string(mjcf)
     except ValueError as error:
@@ -53,4 +55,4 @@ def add_room(spec: Any, mjcf: str) -> None:
     if room.lights:
         spec.delete(spec.light("sun"))
     room.option, room.visual, room.stat = spec.option, spec.visual, spec.stat
-    spec.attach(room, prefix="", frame=spec.worldbody.add_frame())
+    spec.attach(room, prefix="room/", frame=spec.worldbody.add_frame())

@@ -150,3 +150,81 @@ def test_a_driver_that_hangs_does_not_hang_the_probe() -> None:
 def test_probing_imports_no_mujoco() -> None:
     program = "import sys; from scout_model.gl_probe import probe; probe(0.001); assert 'mujoco' not in sys.modules"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
+# ---------------------------------------------------------------------- what is not drawn twice
+def test_an_unchanged_scene_is_drawn_once() -> None:
+    world = room()
+    with Camera(world.mjcf, "paint") as camera:
+        first = camera.picture("scout1")
+        for _ in range(5):
+            camera.show(world.state())
+            assert camera.picture("scout1") is first
+        assert camera.drawn == 1
+
+
+def test_what_moves_outside_the_view_does_not_matter() -> None:
+    pioneer = Target("pioneer", "pioneer", [(0.0, 3.0), (9.0, 3.0)], 0.5)
+    states, drawn = states_of(pioneer, range(30, 330, 10)), {}
+    for robot in ("scout1", "scout2"):
+        with Camera(room(pioneer).mjcf, "paint") as camera:
+            for state in states:
+                camera.show(state)
+                camera.picture(robot)
+            drawn[robot] = camera.drawn
+    assert 5 < drawn["scout1"] < 20
+    assert drawn["scout2"] == 1
+
+
+def states_of(target: Target, frames: range) -> list[NDArray[np.float64]]:
+    world, states = room(target), []
+    while world.frame < frames.stop:
+        if world.frame in frames:
+            states.append(world.state())
+        world.step_frame()
+    return states
+
+
+def test_a_remembered_picture_is_the_one_that_would_be_drawn_in_whatever_order() -> None:
+    pioneer = Target("pioneer", "pioneer", [(0.0, 3.0), (9.0, 3.0)], 0.5)
+    states = states_of(pioneer, range(0, 150, 6))
+    world = room(pioneer)
+    with (
+        Camera(world.mjcf, "paint") as there,
+        Camera(world.mjcf, "paint") as back,
+        Camera(world.mjcf, "paint", memo_pictures=0) as fresh,
+    ):
+        returning = {}
+        for number, state in reversed([*enumerate(states)]):
+            back.show(state)
+            returning[number] = back.picture("scout1")
+        for number, state in enumerate(states):
+            there.show(state)
+            fresh.show(state)
+            picture = there.picture("scout1")
+            assert np.array_equal(picture, fresh.picture("scout1"))
+            assert np.array_equal(picture, returning[number])
+
+
+def test_a_tremble_below_what_a_picture_shows_changes_nothing() -> None:
+    world = room()
+    with Camera(world.mjcf, "paint") as camera:
+        camera.show(world.state())
+        first = camera.picture("scout1")
+        camera.show(world.state() + 1e-7)
+        assert camera.picture("scout1") is first
+
+
+def test_the_memo_keeps_the_last_pictures_and_no_more() -> None:
+    pioneer = Target("pioneer", "pioneer", [(0.0, 3.0), (9.0, 3.0)], 0.5)
+    states = states_of(pioneer, range(30, 60, 6))
+    with Camera(room(pioneer).mjcf, "paint", memo_pictures=2) as camera:
+        for state in (*states, states[-1], states[-2], states[0]):
+            camera.show(state)
+            camera.picture("scout1")
+        assert camera.drawn == len(states) + 1
+
+
+def test_a_picture_cannot_be_written_to() -> None:
+    with Camera(room().mjcf, "paint") as camera, pytest.raises(ValueError, match="read-only"):
+        camera.picture("scout1")[0, 0] = 1
