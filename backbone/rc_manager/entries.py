@@ -5,12 +5,13 @@ Rule of this file: data, and what can be read off it; nothing decides here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
 from backbone.rc_manager.priority import Path
+from backbone.rc_manager.radio_admission import Stream
 
 INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the rounding of sums of times
 SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, but is not free yet
@@ -75,6 +76,7 @@ class ArcEntry:
         touches: The RCs it uses, as a set of bits.
         excludes: Those of them it uses exclusively.
         shares: Names of those it uses by streams.
+        streams: Sharable RC → its streams there.
         stamp: When it became active or was last served, and which of several at that time it was.
         pledge: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
             comes before all equals; smaller is earlier.
@@ -106,6 +108,7 @@ class ArcEntry:
     touches: int
     excludes: int
     shares: tuple[str, ...]
+    streams: Mapping[str, Sequence[Stream]]
     stamp: tuple[float, int] = (0.0, 0)
     pledge: int | None = None
     state: RequestState = RequestState.IDLE

@@ -65,6 +65,11 @@ def utilization(streams: Sequence[Stream]) -> float:
     return sum(one.packet_us / one.period_us for one in streams)
 
 
+def exceeds(capacity: float, streams: Sequence[Stream]) -> bool:
+    """Say whether they need more of the RC's time together than it may give, in whatever order they come."""
+    return utilization(streams) > capacity + ROUNDING
+
+
 def admissible(streams: Sequence[Stream], capacity: float, analysis: Analysis = "exact") -> bool:
     """Say whether the RC can serve all of them.
 
@@ -74,7 +79,7 @@ def admissible(streams: Sequence[Stream], capacity: float, analysis: Analysis = 
         analysis: ``exact``: every packet is done by its deadline. ``sum``: only the shares are added
             up, as the papers do; this admits sets that miss deadlines.
     """
-    if utilization(streams) > capacity + ROUNDING:
+    if exceeds(capacity, streams):
         return False
     if analysis == "sum":
         return True

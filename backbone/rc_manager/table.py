@@ -24,8 +24,9 @@ from backbone.rc_manager.entries import CONNECTED, INSTANT_S, SOON_S, ArcEntry, 
 from backbone.rc_manager.groups import Group, Groups
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
 from backbone.rc_manager.priority import Path, by_precedence, higher, rank
-from backbone.rc_manager.radio_admission import Analysis, admissible, stream
+from backbone.rc_manager.radio_admission import Analysis, admissible, exceeds, stream
 
+SETS_REMEMBERED = 4096  # chosen: sets of users of one RC; a group of 30 meets some hundred between two arrivals
 EXACT_UP_TO = 64  # chosen: such a group is planned in a few milliseconds
 
 
@@ -92,6 +93,7 @@ class Table:
             touches=sum(self._bits[rc.name] for rc in rcs),
             excludes=sum(self._bits[rc.name] for rc in rcs if rc.name not in shares),
             shares=shares,
+            streams={rc.name: [stream(usage) for usage in uses[rc.name].streams] for rc in rcs if rc.sharable},
         )
         self.arcs[arc.name] = arc
         return arc
@@ -138,13 +140,12 @@ class Table:
 
     def rc_changed(self, rc: str) -> None:
         """Have all who use the RC looked at again: its state or capacity changed."""
-        self._demand_changed([rc])
-        self._usable.clear()
+        self._service_changed([rc])
         self._touched[rc] = None
 
     def priorities_changed(self) -> None:
         """Have everybody looked at again."""
-        self._demand_changed([*self.rcs])
+        self._service_changed([*self.rcs])
         self._touched.update(dict.fromkeys(self.rcs))
 
     def end_at(self, arc: ArcEntry, end_s: float) -> None:
@@ -191,10 +192,18 @@ class Table:
         return None
 
     def _demand_changed(self, rcs: Iterable[str]) -> None:
-        """Forget what was worked out about these sharable RCs: other ARCs, capacities or priorities count now."""
+        """Forget whether these sharable RCs have room for all: others ask for them now."""
         for rc in rcs:
-            self._admitted.pop(rc, None)
             self._roomy.pop(rc, None)
+            if len(self._admitted.get(rc, ())) > SETS_REMEMBERED:
+                del self._admitted[rc]
+
+    def _service_changed(self, rcs: Iterable[str]) -> None:
+        """Forget what these RCs can serve: their capacities or their users' priorities are others now."""
+        for rc in rcs:
+            self._roomy.pop(rc, None)
+            self._admitted.pop(rc, None)
+        self._usable.clear()
 
     # What fits together (rule 1).
 
@@ -230,14 +239,17 @@ class Table:
         known = self._admitted.setdefault(rc, {})
         key = frozenset(users)
         if key not in known:
-            streams = [
-                (user, stream(usage), number) for user in users for number, usage in enumerate(user.uses[rc].streams)
-            ]
-            ranked = by_precedence(streams, lambda s: s[0].path, lambda s: (s[1].period_us, s[0].name, s[2]))
-            known[key] = admissible([packets for _, packets, _ in ranked], self.rcs[rc].capacity, self.admission)
+            known[key] = self._serves(rc, users)
         return known[key]
 
-    # Order and plan (rules 2, 3, 4).
+    def _serves(self, rc: str, users: Sequence[ArcEntry]) -> bool:
+        capacity = self.rcs[rc].capacity
+        streams = [(user, packets, number) for user in users for number, packets in enumerate(user.streams[rc])]
+        if exceeds(capacity, [packets for _, packets, _ in streams]):
+            return False
+        ranked = by_precedence(streams, lambda s: s[0].path, lambda s: (s[1].period_us, s[0].name, s[2]))
+        return admissible([packets for _, packets, _ in ranked], capacity, self.admission)
+
     # Groups and order (rule 2).
 
     def groups(self) -> list[list[ArcEntry]]:
