@@ -13,7 +13,7 @@ from backbone.mission.document import Element, parse, read_bytes
 from backbone.mission.model import ArcWish, Behavior, Component, CoreService, Host, MissionDescription
 from backbone.mission.report import Fault, MissionInvalid, Report
 from backbone.mission.room_files import room_text
-from backbone.mission.schema import apply_schema, schema_text
+from backbone.mission.schema import apply_schema, schema_text, vocabulary
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, Tables, parameters, section
 from backbone.naming import Subsystem
 
@@ -189,8 +189,18 @@ def _world_content(world: Element, tables: Tables, source: str) -> dict[str, Any
             }
             for dark in world.all("dark")
         ],
+        "air": _air(world),
         "mjcf": room_text(source, room.text("mjcf")) if room.text("mjcf") else "",
     }
+
+
+def _air(world: Element) -> dict[str, float | None]:
+    """Return the air as plain data, with the field names of ``scout_model.description.AirDescription``."""
+    air = world.first("air")
+    given = {
+        name: rule.default if air is None else air.text(name) for name, rule in vocabulary()["air"].attributes.items()
+    }
+    return {name.replace("-", "_"): float(value) if value else None for name, value in given.items()}
 
 
 def _behavior(behavior: Element) -> Behavior:

@@ -181,15 +181,18 @@ def test_one_scale_sets_how_much_of_the_time_is_faded(noise: float) -> None:
     assert told.count(FrameKind.FADED) / len(told) == pytest.approx(expected, abs=0.04)
 
 
-def test_the_rows_of_a_faded_frame_are_those_of_the_picture_in_other_places() -> None:
+def test_a_faded_frame_has_the_rows_of_the_picture_but_most_in_another_place_and_brightness() -> None:
     receiver = Receiver(1, "video1", only("fades", 4.0))
     faded = 0
     for frame in range(100):
         reception = receiver.receive([Signal(STRIPES)], frame)
-        assert np.array_equal(np.sort(reception.picture, axis=1), np.sort(STRIPES, axis=1))
+        assert all(len(set(row.tolist())) <= 2 for row in reception.picture)
         if reception.kind is FrameKind.FADED:
             faded += 1
-            assert (reception.picture != STRIPES).any(axis=1).mean() > 0.5, "most rows of it are wrong"
+            off_levels = np.abs(reception.picture.astype(int) - STRIPES).mean(axis=1)
+            assert (off_levels > 15).mean() > 0.5, "most rows are drastically different"
+        else:
+            assert np.array_equal(reception.picture, STRIPES)
     assert faded > 20
 
 
