@@ -102,6 +102,16 @@ def _received(receiver: Receiver, world: World, camera: Camera) -> NDArray[np.ui
     return receiver.receive([Signal(camera.picture("scout"), "scout", motors=motors)], world.frame).picture
 
 
+def told(trial: Trial) -> str:
+    """Return the trial's line of the table."""
+    off_axis_deg, heading_deg = math.degrees(trial.off_axis_rad), math.degrees(trial.heading_rad)
+    return (
+        f"{trial.seed:5d} from {trial.range_m:.2f} m {off_axis_deg:+4.0f}°: {trial.stage} in {trial.took_s:5.1f} s,"
+        f" {trial.approaches} approaches, tracked {trial.tracked:4.0%}, aside {trial.aside_m * 100:+5.1f} cm,"
+        f" ahead {trial.ahead_m * 100:+5.1f} cm, heading {heading_deg:+5.1f}°{'' if trial.succeeded else ' FAILED'}"
+    )
+
+
 def main() -> None:
     """Play the trials and print how they went."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -116,13 +126,7 @@ def main() -> None:
         trial = run(chosen.seed + number, air)
         trials.append(trial)
         if chosen.table:
-            degrees = [math.degrees(angle) for angle in (trial.off_axis_rad, trial.heading_rad)]
-            print(
-                f"{trial.seed:5d} from {trial.range_m:.2f} m {degrees[0]:+4.0f}°: {trial.stage} in {trial.took_s:5.1f} s,"
-                f" {trial.approaches} approaches, tracked {trial.tracked:4.0%}, aside {trial.aside_m * 100:+5.1f} cm,"
-                f" ahead {trial.ahead_m * 100:+5.1f} cm, heading {degrees[1]:+5.1f}° {'' if trial.succeeded else 'FAILED'}",
-                flush=True,
-            )
+            print(told(trial), flush=True)
     took_s = [trial.took_s for trial in trials]
     simulated_s = sum(took_s)
     report(

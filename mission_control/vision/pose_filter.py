@@ -18,6 +18,7 @@ from mission_control.vision.target_pose import (
 
 FORGETTING = 0.97  # chosen: one second of pictures decides between the two sides
 REFUTED_PX = 1.0  # chosen: four times a disc's error; the pose explains what is seen no longer
+REFUTATIONS = 5  # chosen: more than the sightings a bad burst spoils; a moved robot is found again in a sixth second
 WORSE = 12.0  # chosen: in squared pixel errors; the other side is then given up
 
 
@@ -31,6 +32,7 @@ class PoseFilter:
     def __init__(self, camera: CameraModel = SCOUT_CAMERA) -> None:
         self._camera = camera
         self._hypotheses: list[tuple[TargetPose, float]] = []
+        self._refuted = 0
 
     def forget(self) -> None:
         """Know nothing: somebody else may have moved the robot."""
@@ -41,14 +43,24 @@ class PoseFilter:
         self._hypotheses = [(pose.moved(forward_m, turn_rad), badness) for pose, badness in self._hypotheses]
 
     def saw(self, sighting: Sighting) -> TargetPose | None:
-        """Take in a sighting and return the likeliest pose, None if no place on the floor explains it."""
+        """Take in a sighting and return the likeliest pose.
+
+        Returns:
+            None if no place on the floor explains the sighting, or none near the pose known before.  That
+            pose is given up only when ``REFUTATIONS`` sightings on end speak against it.
+        """
         kept = []
         for before, badness in self._hypotheses:
             pose = refine_pose(sighting, before, self._camera)
             if pose is not None and pose.residual_px < REFUTED_PX:
                 kept.append((pose, FORGETTING * badness + _squared(pose)))
         if not kept:
+            self._refuted += 1
+            if self._hypotheses and self._refuted < REFUTATIONS:
+                return None
             kept = [(pose, _squared(pose)) for pose in estimate_poses(sighting, self._camera)]
+            kept = [(pose, badness) for pose, badness in kept if pose.residual_px < REFUTED_PX]
+        self._refuted = 0
         kept.sort(key=lambda hypothesis: hypothesis[1])
         if len(kept) == 2:
             (best, badness), (other, worse) = kept

@@ -4,8 +4,9 @@ The skeleton has the middle of each disc and the points half a pitch above, left
 which lie on the white around it.  That makes 4 + 16 points; a point between two neighbours belongs to
 both discs and counts once, and in a T three pairs are neighbours: 17.
 
-One rule holds in acquisition, tracking and search: a pixel agrees if it is on its model's side of the
-middle between black and white, one outside the picture agrees with nothing, and 70 % must agree.
+One rule holds in acquisition, tracking and search.  A pixel of the skeleton agrees if it is on its
+model's side of the middle between black and white; one outside the picture agrees with nothing.  At
+least 70 % must agree, and the subimage must correlate with the picture by at least 0.7.
 
 Source: RAM 2002, "Visual Servoing" and figure 7.
 """
@@ -156,21 +157,36 @@ class TargetModel:
         levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
         return _share(levels, is_inside, self.middle_level, self.levels > self.middle_level)
 
-    def subimage_match(self, frame: Picture) -> tuple[float, tuple[int, int]]:
-        """Return where in the picture the subimage fits best, and which share of its pixels agrees there.
+    def subimage_match(self, frame: Picture, blobs_px: Floats) -> float:
+        """Return how well the subimage correlates with the picture if the discs are here, -1 to 1.
+
+        Pixels outside the picture are left out; 0 if more than half of the subimage is.
+        """
+        shift = np.rint((blobs_px - self.blobs_px).mean(axis=0)).astype(int)
+        height, width = self.subimage.shape
+        left, top = int(self.corner_px[0] + shift[0]), int(self.corner_px[1] + shift[1])
+        columns = slice(max(0, left), min(frame.shape[1], left + width))
+        rows = slice(max(0, top), min(frame.shape[0], top + height))
+        if 2 * max(0, columns.stop - columns.start) * max(0, rows.stop - rows.start) < width * height:
+            return 0.0
+        there = frame[rows, columns]
+        own = self.subimage[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
+        return float(cv2.matchTemplate(there, own, cv2.TM_CCOEFF_NORMED)[0, 0])
+
+    def best_subimage_match(self, frame: Picture) -> tuple[float, tuple[int, int]]:
+        """Return how well the subimage correlates with the picture where it does best, both at half their size.
 
         Returns:
-            The share, 0 to 1, and the shift from where the target was last seen: columns, rows.
+            The correlation, -1 to 1, and the shift from where the target was last seen: columns, rows.
         """
-        height, width = self.subimage.shape
-        if height > frame.shape[0] or width > frame.shape[1]:
+        small, own = (
+            cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for image in (frame, self.subimage)
+        )
+        if own.shape[0] > small.shape[0] or own.shape[1] > small.shape[1]:
             return 0.0, (0, 0)
-        scores = cv2.matchTemplate(frame, self.subimage, cv2.TM_CCOEFF_NORMED)
-        column, row = cv2.minMaxLoc(scores)[3]
-        middle = self.middle_level
-        there = frame[row : row + height, column : column + width]
-        agrees = (there > middle) == (self.subimage > middle)
-        return float(agrees.mean()), (column - self.corner_px[0], row - self.corner_px[1])
+        scores = cv2.matchTemplate(small, own, cv2.TM_CCOEFF_NORMED)
+        _, match, _, (column, row) = cv2.minMaxLoc(scores)
+        return float(match), (2 * column - self.corner_px[0], 2 * row - self.corner_px[1])
 
 
 def plausible(blobs_px: Floats) -> bool:

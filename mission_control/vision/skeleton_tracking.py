@@ -31,6 +31,7 @@ from mission_control.vision.target_acquisition import acquire
 REACH_COLUMNS_PX = 16  # measured: 0.9 rad/s moves the picture by 13 pixels from frame to frame
 REACH_ROWS_PX = 20  # measured: the pitch of a starting or stopping body moves the picture by up to 18
 SEARCH_FRAMES = 8  # chosen: 0.27 s, longer than nearly every burst of bad pictures (0.15 s on average)
+STEADY_PX, STEADY_SHARE = 0.75, 0.08  # chosen: of the pitch; three times the noise, and the growth of an approach
 
 
 class Phase(StrEnum):
@@ -86,14 +87,14 @@ class TargetTracker:
         if sighting is not None:
             return self._found(frame, self._model, sighting)
         # Only now: the whole picture costs many times the skeleton.
-        share, sighting = search_subimage(frame, self._model)
+        match, sighting = search_subimage(frame, self._model)
         if sighting is not None:
             return self._found(frame, self._model, sighting)
         self._frames_left -= 1
         if self._frames_left > 0:
-            return Track(Phase.SEARCHING, None, share)
+            return Track(Phase.SEARCHING, None, match)
         self.forget()
-        return Track(Phase.ACQUIRING, None, share)
+        return Track(Phase.ACQUIRING, None, match)
 
     def forget(self) -> None:
         """Begin again with acquisition: somebody else may have moved the robot."""
@@ -132,10 +133,10 @@ def search_subimage(frame: Picture, model: TargetModel) -> tuple[float, Sighting
         model: Last valid.
 
     Returns:
-        The share, 0 to 1; and the sighting, None if the share or the skeleton's is below 70 %.
+        The subimage's match, -1 to 1; and the sighting, None if that or the skeleton's is below 70 %.
     """
-    share, shift_px = model.subimage_match(frame)
-    return share, _placed(frame, model, model.blobs_px + np.array(shift_px, float)) if is_match(share) else None
+    match, shift_px = model.best_subimage_match(frame)
+    return match, _placed(frame, model, model.blobs_px + np.array(shift_px, float)) if is_match(match) else None
 
 
 def best_shift_px(frame: Picture, model: TargetModel) -> Floats | None:
@@ -170,11 +171,29 @@ def best_shift_px(frame: Picture, model: TargetModel) -> Floats | None:
 
 
 def _placed(frame: Picture, model: TargetModel, blobs_px: Floats) -> Sighting | None:
-    """Return the sighting with its discs centred, None if what is there is no longer the target."""
-    placed = centred(frame, blobs_px, model.middle_level)
-    # Torn rows pull single discs away; then the model's shape, moved as a whole, is the better guess.
-    for candidate in (placed, blobs_px):
-        share = model.match(frame, candidate) if plausible(candidate) else 0.0
-        if is_match(share):
-            return Sighting(candidate, share)
-    return None
+    """Return the sighting with its discs centred, None if what is there matches one of the models too little.
+
+    With 1300 places to choose from, a spoiled picture often has one with twelve fitting pixels; the
+    subimage does not fit there.
+    """
+    placed = steadied(centred(frame, blobs_px, model.middle_level), blobs_px)
+    if not plausible(placed):
+        return None
+    match = min(model.match(frame, placed), model.subimage_match(frame, placed))
+    return Sighting(placed, match) if is_match(match) else None
+
+
+def steadied(placed_px: Floats, expected_px: Floats) -> Floats:
+    """Return the blobs, those that left the target's shape put back into it.
+
+    A torn row pulls single discs away, while the target's shape changes little from picture to picture.
+
+    Args:
+        placed_px: Where the discs seem to be, as ``Sighting.blobs_px``.
+        expected_px: The shape, somewhere near.
+    """
+    moved_px = placed_px - expected_px
+    usual_px = np.median(moved_px, axis=0)
+    slack_px = STEADY_PX + STEADY_SHARE * float(expected_px[Disc.STEM, 1] - expected_px[Disc.MIDDLE, 1])
+    is_steady = np.abs(moved_px - usual_px).max(axis=1) <= slack_px
+    return np.where(is_steady[:, np.newaxis], placed_px, expected_px + usual_px)
