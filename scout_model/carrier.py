@@ -25,7 +25,7 @@ from scout_model.dimensions import (
     WHEEL_RADIUS_M,
 )
 from scout_model.errors import InvalidWorld
-from scout_model.targets import CARRIER, TargetPose, path_length_m, where
+from scout_model.targets import CARRIER, Route, TargetPose, path_length_m
 
 _LIFT_M = 0.05  # chosen: clears the neighbor on the deck
 _LIFT_SHARE = 0.25  # chosen: of the time; as much to lower it, the rest to reach out
@@ -64,7 +64,10 @@ class CarrierTrip:
     """
 
     def __init__(self, target: Target, places: list[ScoutPlace]) -> None:
-        self._target = target
+        self._target, self._route = target, Route(target)
+        leg_s = path_length_m(target.path) / target.speed_m_s
+        # The first millimetre of a further lap would lead it back.
+        self._last_s = (2 * leg_s + target.rest_s if target.there_and_back else leg_s) - 1e-9
         served = sorted(
             ((_nearest(target, place)[1], place) for place in places), key=lambda stop: (stop[0], stop[1].name)
         )
@@ -82,12 +85,8 @@ class CarrierTrip:
 
     def pose(self, time_s: float) -> TargetPose:
         """Return where the carrier is at this world time."""
-        target = self._target
-        leg_s = path_length_m(target.path) / target.speed_m_s
-        driven_s = self._driven_s(time_s - target.begin_s)
-        # The first millimetre of a further lap would lead it back.
-        last_s = 2 * leg_s + target.rest_s if target.there_and_back else leg_s
-        return where(target, target.begin_s + min(driven_s, last_s - 1e-9))
+        begin_s = self._target.begin_s
+        return self._route.where(begin_s + min(self._driven_s(time_s - begin_s), self._last_s))
 
     def held(self, passenger: str, time_s: float) -> CarriedPose | None:
         """Return where the carrier holds this passenger at this world time; None once it is set down."""

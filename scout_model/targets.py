@@ -51,6 +51,23 @@ def path_length_m(path: list[tuple[float, float]]) -> float:
     return sum(math.dist(a, b) for a, b in pairwise(path))
 
 
+class Route:
+    """The way of one target, worked out once for many questions."""
+
+    def __init__(self, target: Target) -> None:
+        self._target = target
+        self._there = _Path(target.path)
+        self._back = _Path(target.path[::-1])
+        self._lap_s = self._there.length_m / target.speed_m_s + target.rest_s
+
+    def where(self, time_s: float) -> TargetPose:
+        """Return the target's pose at this world time; see ``where``."""
+        target = self._target
+        lap, lap_elapsed_s = divmod(max(0.0, time_s - target.begin_s), self._lap_s)
+        path = self._back if target.there_and_back and lap % 2 == 1 else self._there
+        return path.along(min(path.length_m, lap_elapsed_s * target.speed_m_s))
+
+
 def where(target: Target, time_s: float) -> TargetPose:
     """Return the target's pose at this world time.
 
@@ -62,14 +79,7 @@ def where(target: Target, time_s: float) -> TargetPose:
         >>> where(there, 4.0).x_m, where(there, 19.0).x_m, where(there, 21.0).x_m
         (2.0, 9.0, 8.5)
     """
-    length_m = path_length_m(target.path)
-    leg_s = length_m / target.speed_m_s
-    lap_s = leg_s + target.rest_s
-    elapsed_s = max(0.0, time_s - target.begin_s)
-    lap, lap_elapsed_s = divmod(elapsed_s, lap_s)
-    walked_m = min(length_m, lap_elapsed_s * target.speed_m_s)
-    is_coming_back = target.there_and_back and lap % 2 == 1
-    return _along(target.path[::-1] if is_coming_back else target.path, walked_m)
+    return Route(target).where(time_s)
 
 
 def part_poses(target: Target, time_s: float) -> list[PartPose]:
@@ -100,18 +110,27 @@ def _turned(heading_rad: float, pitch_rad: float) -> tuple[float, float, float, 
     return c_heading * c_pitch, -s_heading * s_pitch, c_heading * s_pitch, s_heading * c_pitch
 
 
-def _along(path: list[tuple[float, float]], walked_m: float) -> TargetPose:
-    left_m = walked_m
-    segments = [(a, b) for a, b in pairwise(path) if a != b]
-    for number, (a, b) in enumerate(segments):
-        segment_m = math.dist(a, b)
-        if left_m <= segment_m or number == len(segments) - 1:
-            share = min(1.0, left_m / segment_m)
-            return TargetPose(
-                a[0] + share * (b[0] - a[0]),
-                a[1] + share * (b[1] - a[1]),
-                math.atan2(b[1] - a[1], b[0] - a[0]),
-                walked_m,
-            )
-        left_m -= segment_m
-    raise ValueError("a path needs two different points")
+class _Path:
+    """Points joined by straight segments."""
+
+    def __init__(self, points: list[tuple[float, float]]) -> None:
+        segments = [(a, b) for a, b in pairwise(points) if a != b]
+        if not segments:
+            raise ValueError("a path needs two different points")
+        lengths_m = [math.dist(a, b) for a, b in segments]
+        self._segments = [
+            (a, b, length_m, math.atan2(b[1] - a[1], b[0] - a[0]))
+            for (a, b), length_m in zip(segments, lengths_m, strict=True)
+        ]
+        self.length_m = path_length_m(points)
+
+    def along(self, walked_m: float) -> TargetPose:
+        """Return where one is who walked so far from the first point."""
+        left_m, last = walked_m, self._segments[-1]
+        for segment in self._segments:
+            if left_m <= segment[2] or segment is last:
+                break
+            left_m -= segment[2]
+        a, b, length_m, heading_rad = segment
+        share = min(1.0, left_m / length_m)
+        return TargetPose(a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), heading_rad, walked_m)

@@ -24,7 +24,7 @@ from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.robot import Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
-from scout_model.targets import part_poses, parts, where
+from scout_model.targets import Route, part_poses, parts
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """What of MuJoCo's state a picture depends on."""
@@ -77,6 +77,10 @@ class World:
         self._carried = {place.name: self._trips[place.carried_by] for place in description.scouts if place.carried_by}
         self._rest = self._data.qpos.copy()
         self._targets = {target.name: target for target in description.targets}
+        self._whereabouts = {
+            target.name: self._trips[target.name].pose if target.name in self._trips else Route(target).where
+            for target in description.targets
+        }
         self._mocap = {
             part.body: int(self._model.body(part.body).mocapid[0])
             for target in description.targets
@@ -302,13 +306,14 @@ class World:
         time_s = self._step * STEP_S
         positions, quaternions = self._data.mocap_pos, self._data.mocap_quat
         for name, target in self._targets.items():
-            trip = self._trips.get(name)
-            for part in parts(target, where(target, time_s) if trip is None else trip.pose(time_s)):
+            for part in parts(target, self._whereabouts[name](time_s)):
                 mocap = self._mocap[part.body]
                 positions[mocap] = part.position_m
                 quaternions[mocap] = part.quaternion
 
     def _hold_carried(self) -> None:
+        if not self._carried:
+            return
         time_s = self._step * STEP_S
         for name in list(self._carried):
             held, body = self._carried[name].held(name, time_s), self._robots[name]
