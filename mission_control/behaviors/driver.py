@@ -20,9 +20,6 @@ AGAIN_AFTER_S = 1.0  # chosen: hardware that refused needs a moment; mission sec
 
 D = TypeVar("D", bound=BehaviorParameters)
 
-NEVER = frozenset({"world.unknown_body", "wire.unknown"})
-"""Codes of refusals that the next attempt would meet again."""
-
 
 class NeedsArc(Refusal):
     """A behavior that drives has no ARC to drive with."""
@@ -39,6 +36,8 @@ class Driver(Behavior[D]):
 
     needs_arc: ClassVar[str] = "drive"
     """Kind of ARC to name in the complaint when there is none."""
+    never: ClassVar[frozenset[str]] = frozenset({"world.unknown_body", "wire.unknown"})
+    """Codes of refusals that the next attempt would meet again."""
 
     async def drive_on(self, robot: str) -> None:
         """Go on with the work.
@@ -84,7 +83,7 @@ class Driver(Behavior[D]):
     async def start(self) -> None:
         """Fail at once without an ARC; see ``Behavior.start``."""
         if self.parameters.arc is None:
-            self._give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
+            self.give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
 
     async def act(self) -> None:
         """Drive on; what can never be done ends the behavior, what can be is done again."""
@@ -97,8 +96,8 @@ class Driver(Behavior[D]):
                 self.report(f"stands: {error}")
                 raise
             except Refusal as refusal:
-                if isinstance(refusal, NoSuchAction) or code_of(refusal) in NEVER:
-                    self._give_up(refusal)
+                if isinstance(refusal, NoSuchAction) or code_of(refusal) in self.never:
+                    self.give_up(refusal)
                     return None
                 self.report(f"stands: {refusal}")
             await self.clock.sleep_s(AGAIN_AFTER_S)
@@ -110,7 +109,8 @@ class Driver(Behavior[D]):
         except (Refusal, LinkError) as error:  # the radio's last packet stops it all the same
             log.info("%s could not be halted: %s", self.name, error)
 
-    def _give_up(self, refusal: Refusal) -> None:
+    def give_up(self, refusal: Refusal) -> None:
+        """Fail, with the refusal's code, words and remedy for the parent."""
         why: dict[str, Any] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
         self.report(f"gives up: {refusal.detail}")
         self.finish(BehaviorStatus.FAILURE, why)

@@ -149,11 +149,13 @@ class JumpCourse:
             self._freeing = None
         if self._stage is not Stage.ONWARD and self._is_beyond(position):
             self._enter(Stage.ONWARD)
-        return Act.WAIT if self.is_final else self._go_on(position, now_s)
+        return self._go_on(position, now_s)
 
     def _go_on(self, position: Position, now_s: float) -> Motion | Act:
         obstacle = self._obstacle
         match self._stage:
+            case Stage.OVER | Stage.FAILED:
+                return Act.WAIT
             case Stage.ONWARD:
                 goal = obstacle.ahead(self._goal_m)
                 if obstacle.passed_m(position) >= self._goal_m or goal.distance_m(position) < ARRIVED_M:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 from behaviors_at_work import Person, at_work, driving, example, hear, pose, wait_until
-from hypothesis import HealthCheck, given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
@@ -55,7 +55,7 @@ take_overs = st.lists(
 )
 
 
-@settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=6, phases=[Phase.generate], derandomize=True, deadline=None)
 @given(take_overs)
 def test_taken_over_at_any_moment_its_record_is_that_of_an_undisturbed_patrol(
     disturbances: list[tuple[float, tuple[float, float], float]],
@@ -66,6 +66,7 @@ def test_taken_over_at_any_moment_its_record_is_that_of_an_undisturbed_patrol(
             heard = hear(running, NAME, WaypointReached)
             behavior = running.component(NAME)
             assert isinstance(behavior, Patrol)
+            await wait_until(running, lambda: behavior.statistics()["times_resumed"], 10.0)
             for after_s, wheels, lasts_s in disturbances:
                 await running.clock.sleep_s(after_s)
                 await person.take_over(ROBOT, driving(*wheels, lasts_s))

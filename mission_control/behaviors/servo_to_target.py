@@ -1,0 +1,183 @@
+"""Servo to target: find the landmark, follow it in the picture, and stop at a place straight before it.
+
+What is seen and how to drive is decided in ``mission_control.vision``; this carries it out. While the robot is not held
+it may be moved or turned: with the next pictures the target is acquired anew, and the approach goes on where it was.
+
+In mission.xml: an ARC of kind ``capture`` at the camera's full rate, with a period as short as a picture's.
+
+Source: RAM 2002, "Visual Servoing" and figure 8.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from backbone.errors import Refusal
+from mission_control.behavior import BehaviorParameters
+from mission_control.behaviors.driver import Driver
+from mission_control.messages import BehaviorStatus
+from mission_control.vision.servo_law import STOP_M, Stage
+from mission_control.vision.skeleton_tracking import Phase
+from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, Step, VisualServo
+from resource_pool.arc_client import Frame
+
+PICTURE_PX = (320, 240)  # what ``SCOUT_CAMERA`` was measured for
+SETTLES_S = 2.0  # chosen: about half of what settling takes; asked for again if it was too little
+
+
+class UnusablePicture(Refusal):
+    """The framegrabber's pictures are not those of the camera that the algorithm knows."""
+
+    code = "servo.unusable_picture"
+    remedy = "Use a framegrabber that delivers grey pictures of 320 by 240 pixels."
+
+
+class TargetNotFound(Refusal):
+    """The robot turned round and round and did not see the target."""
+
+    code = "servo.target_not_found"
+    remedy = "Bring the robot within 2.5 m of the target, where nothing hides it, or let it turn for longer."
+
+
+class ServoParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``ServoToTarget``.
+
+    Attributes:
+        stop_m: How far before the target to stop, 0.4 to 1.2.
+        search_turns: After so many turns without a sight of the target it fails; 0: never.
+        latency_s: From a picture's capture until the command it leads to turns the wheels, 0 to 0.5.
+    """
+
+    stop_m: float = STOP_M
+    search_turns: float = 3.0
+    latency_s: float = LATENCY_S
+
+    def __post_init__(self) -> None:
+        if not NEAREST_STOP_M <= self.stop_m <= FARTHEST_STOP_M:
+            raise ValueError(f"stop_m is {self.stop_m}: it must be from {NEAREST_STOP_M} to {FARTHEST_STOP_M}")
+        if not 0 <= self.search_turns < math.inf:
+            raise ValueError(f"search_turns is {self.search_turns}: write how many, or 0 for no end")
+        if not 0 <= self.latency_s < 0.5:
+            raise ValueError(f"latency_s is {self.latency_s}: it must be at least 0 and below 0.5")
+
+
+S = TypeVar("S", bound=ServoParameters)
+
+
+class Servo(Driver[S]):
+    """What servoing behaviors have in common: pictures in, commands out."""
+
+    needs_arc = "capture"
+    never = Driver.never | {UnusablePicture.code}
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._servo = VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
+        self._step: Step | None = None
+        self._seen_s: float | None = None
+        self._fresh = asyncio.Event()
+        self._unusable: UnusablePicture | None = None
+        self._acquisitions = 0
+        self._phase = Phase.ACQUIRING
+
+    @property
+    def step(self) -> Step | None:
+        """What the last picture led to; read only."""
+        return self._step
+
+    async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera will do
+        """Acquire the target anew; see ``Behavior.resumed``."""
+        self._servo.resumed()
+        self._step, self._seen_s, self._phase = None, None, Phase.ACQUIRING
+        self._fresh.clear()
+
+    def see(self, frame: Frame) -> None:
+        """Work out what this picture leads to; ``drive_on`` carries it out."""
+        self._fresh.set()
+        if (frame.width_px, frame.height_px) != PICTURE_PX:
+            self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
+            return
+        pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
+        elapsed_s = 0.0 if self._seen_s is None else max(0.0, frame.captured_s - self._seen_s)
+        self._step, self._seen_s = self._servo.see(pixels, elapsed_s), frame.captured_s
+        self._note_phase(frame.robot, self._step)
+
+    def not_now(self) -> float:
+        """Ask for the moment that settling before the target needs; see ``Behavior.not_now``."""
+        return SETTLES_S if self._servo.stage is Stage.SETTLING else 0.0
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Say how far it was; see ``Behavior.suspended``."""
+        self.report(f"suspended: {reason} by {by}; {self._servo.approaches} approaches until now")
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters, and how often the target was found and come near to."""
+        mine = {"acquisitions": self._acquisitions, "approaches": self._servo.approaches}
+        return {**super().statistics(), **mine}
+
+    async def next_step(self) -> Step:
+        """Return what the newest picture led to, when there is a newer one than the last time.
+
+        Raises:
+            UnusablePicture: The camera's pictures are not those of a Scout.
+        """
+        await self._fresh.wait()
+        self._fresh.clear()
+        if self._unusable is not None:
+            raise self._unusable
+        assert self._step is not None  # noqa: S101  a picture that is fresh was seen
+        return self._step
+
+    async def follow(self, robot: str, step: Step) -> None:
+        """Command what a picture led to, and say so."""
+        await self.held.drive(*step.command.wheels_rad_s())
+        self.report(f"{robot} {step.stage}, {step.track.phase}, {self._servo.approaches} approaches until now")
+
+    def has_searched(self, turns: float) -> bool:
+        """Return True if the robot has turned round so often without a sight of the target; never for 0."""
+        return turns > 0 and self._servo.searched_rad >= 2 * math.pi * turns
+
+    def arrived(self) -> None:
+        """Succeed, with where the robot stands before the target."""
+        pose = self._step.pose if self._step is not None else None
+        at: dict[str, Any] = {"approaches": self._servo.approaches}
+        if pose is not None:
+            at |= {"ahead_m": pose.ahead_m, "left_m": pose.left_m, "heading_rad": pose.heading_rad}
+        self.finish(BehaviorStatus.SUCCESS, at)
+
+    def _note_phase(self, robot: str, step: Step) -> None:
+        if step.track.phase is self._phase:
+            return
+        if self._phase is Phase.ACQUIRING:
+            self._acquisitions += 1
+        self.story.note(robot, f"the target: {self._phase} → {step.track.phase}")
+        self._phase = step.track.phase
+
+
+class ServoToTarget(Servo[ServoParameters]):
+    """Succeeds at its place before the landmark; fails if the landmark is not to be found."""
+
+    parameters_type = ServoParameters
+
+    async def drive_on(self, robot: str) -> None:
+        """Do what each picture leads to; see ``Driver.drive_on``."""
+        self.report(f"{robot} waits for its first picture")
+        while True:
+            step = await self.next_step()
+            if self.has_searched(self.parameters.search_turns):
+                await self.held.halt()
+                turns = f"{self.parameters.search_turns:g}"
+                self.give_up(TargetNotFound(f"{robot} saw no target in {turns} turns"))
+                return
+            await self.follow(robot, step)
+            if step.stage is Stage.ARRIVED:
+                await self.held.halt()
+                self.arrived()
+                return
