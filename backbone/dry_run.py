@@ -130,13 +130,8 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     hosts = {one.name: one.host for one in placed}
     rules = msgspec.convert(description.core_parameters("rc_manager"), SchedulingRules)
     manager = ScheduleManager(
-        grace_s=rules.grace_s,
+        rules,
         tolerance_s=TOLERANCE_S,
-        policy=rules.policy,
-        discipline=rules.discipline,
-        admission=rules.admission,
-        aging_s=rules.aging_s,
-        grid_s=rules.grid_s,
         mission=description.name,
         mission_priority=description.priority,
     )

@@ -37,6 +37,7 @@ except ModuleNotFoundError as missing:
 
 from backbone.rc_manager.decisions import Departed, Event, Freed, Instruction, Opened, Requested, Woken
 from backbone.rc_manager.rehearsal import Rehearsal, Timetable
+from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
 
 SIZES = ((10, 20), (30, 20), (100, 50), (1000, 200), (10_000, 1000))
@@ -154,7 +155,7 @@ def measure(of: Fleet, arcs: int, *, events: int, within_s: float, seed: int) ->
         seed: Of arrivals and departures.
     """
     rng = Random(seed)
-    manager = ScheduleManager(grace_s=0.2, tolerance_s=0.05, mission=MISSION, mission_priority=0)
+    manager = ScheduleManager(SchedulingRules(grace_s=0.2), tolerance_s=0.05, mission=MISSION, mission_priority=0)
     building = Stopwatch(manager, perf_counter() + within_s)
     rehearsal = Rehearsal(building)
     for rc in of.rcs:

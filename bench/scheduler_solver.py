@@ -27,6 +27,7 @@ from backbone.rc_manager.decisions import Event, Instruction, Requested
 from backbone.rc_manager.messages import RcUse
 from backbone.rc_manager.priority import Path, higher
 from backbone.rc_manager.rehearsal import Rehearsal, Timetable
+from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
 
 SLICE_S = 5.0  # RAM 2002: the papers' slice
@@ -304,7 +305,7 @@ def _ours(
     of: Fleet, requests: Sequence[Requested], arrivals_s: Sequence[float], slots: int, within_s: float
 ) -> Outcome | None:
     began = perf_counter()
-    manager = ScheduleManager(grace_s=0.0, tolerance_s=1e-6, mission=MISSION, mission_priority=0)
+    manager = ScheduleManager(SchedulingRules(grace_s=0.0), tolerance_s=1e-6, mission=MISSION, mission_priority=0)
     rehearsal = Rehearsal(_Limited(manager, began + within_s))
     try:
         for rc in of.rcs:

@@ -28,6 +28,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.plan import Slot
 from backbone.rc_manager.priority import higher
+from backbone.rc_manager.rules import SchedulingRules
 
 UNKNOWN_S = -1.0
 
@@ -53,17 +54,16 @@ class _Told(NamedTuple):
 class Explanation:
     """Answers about one master schedule."""
 
-    def __init__(self, table: MasterSchedule, *, grace_s: float, grid_s: float) -> None:
+    def __init__(self, table: MasterSchedule, rules: SchedulingRules) -> None:
         """Explain this schedule.
 
         Args:
             table: The master schedule; nothing in it changes.
-            grace_s: Time a decision process has to stop cleanly at the end of a slice.
-            grid_s: Slices end at multiples of this many seconds; 0: no grid.
+            rules: With which it is decided.
         """
         self._table = table
-        self._grace_s = grace_s
-        self._foresight = Foresight(table, grace_s=grace_s, grid_s=grid_s)
+        self._rules = rules
+        self._foresight = Foresight(table, rules)
 
     # Views.
 
@@ -206,7 +206,7 @@ class Explanation:
         lines, would_change = [*told.lines], told.would_change
         lines += [self._stands(other, arc, now_s) for other in blockers]
         if arc.state is RequestState.WAITING:
-            blockers = altogether(self._table, arc, now_s, grace_s=self._grace_s)
+            blockers = altogether(self._table, arc, now_s, grace_s=self._rules.grace_s)
             would_change = self._would_let_it_start(arc, blockers, told.would_change)
         if arc.swapped_out and arc.state is RequestState.WAITING:
             lines.append(f"it lost its RCs last because {_reason(arc)}")

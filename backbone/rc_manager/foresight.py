@@ -17,24 +17,22 @@ from backbone.rc_manager.master_schedule import MasterSchedule
 from backbone.rc_manager.messages import RequestState
 from backbone.rc_manager.plan import Slot
 from backbone.rc_manager.priority import higher
-
-ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
+from backbone.rc_manager.rules import SchedulingRules
 
 
 class Foresight:
     """Foretells grants from one master schedule."""
 
-    def __init__(self, table: MasterSchedule, *, grace_s: float, grid_s: float) -> None:
+    def __init__(self, table: MasterSchedule, rules: SchedulingRules) -> None:
         """Foretell for this schedule.
 
         Args:
             table: The master schedule; nothing in it changes.
-            grace_s: Time a decision process has to stop cleanly at the end of a slice; half of it is expected.
-            grid_s: Slices end at multiples of this many seconds; 0: no grid.
+            rules: With which it is decided; of the time to stop cleanly half is expected to be taken.
         """
         self._table = table
-        self._pause_s = grace_s / 2
-        self._grid_s = grid_s
+        self._pause_s = rules.grace_s / 2
+        self._rules = rules
 
     def grants_s(self, slots: Sequence[Slot], now_s: float) -> dict[ArcEntry, float]:
         """Return when each of these will be granted if nothing else happens; infinite: not foreseeable.
@@ -75,8 +73,7 @@ class Foresight:
         return times_s
 
     def _end_s(self, granted_s: float, arc: ArcEntry) -> float:
-        end_s = granted_s + arc.minimum_s
-        return math.ceil(end_s / self._grid_s - ROUNDING) * self._grid_s if self._grid_s else end_s
+        return self._rules.slice_end_s(granted_s, arc.minimum_s)
 
     def _release_s(self, held_by: ArcEntry, arc: ArcEntry) -> float:
         overridden = higher(arc.path, held_by.path) or held_by.request.stops_at_once

@@ -6,6 +6,7 @@ RC manager starts with.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, get_args
 
 from msgspec import Meta, Struct
@@ -15,11 +16,16 @@ from backbone.rc_manager.radio_admission import Analysis
 
 Policy = Literal["no_delay", "strict"]
 
+ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
 LONGEST_S = 86_400.0  # chosen: a day, as for all other times of a mission file
 
 
 class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """With which rules the RC manager decides; the descriptions are also what ``check`` tells people."""
+    """With which rules the RC manager decides; the descriptions are also what ``check`` tells people.
+
+    Raises:
+        ValueError: A rule is not known, or a time is below 0.
+    """
 
     policy: Annotated[
         Policy,
@@ -49,6 +55,25 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         float,
         Meta(ge=0, le=LONGEST_S, description="seconds a decision process has to stop cleanly at the end of a slice"),
     ] = 0.2
+
+    def slice_end_s(self, granted_s: float, minimum_s: float) -> float:
+        """Return when a slice that is granted at this time ends, if nobody ends or extends it.
+
+        Example:
+            >>> SchedulingRules().slice_end_s(1.5, 5.0), SchedulingRules(grid_s=4.0).slice_end_s(1.5, 5.0)
+            (6.5, 8.0)
+        """
+        end_s = granted_s + minimum_s
+        return math.ceil(end_s / self.grid_s - ROUNDING) * self.grid_s if self.grid_s else end_s
+
+    def __post_init__(self) -> None:
+        for rule in ("policy", "discipline", "admission"):
+            if getattr(self, rule) not in values_of(rule):
+                known = " and ".join(values_of(rule))
+                raise ValueError(f"unknown {rule} {getattr(self, rule)!r}; there are {known}")
+        for rule in ("aging_s", "grid_s", "grace_s"):
+            if not 0 <= getattr(self, rule) < math.inf:
+                raise ValueError(f"{rule} is {getattr(self, rule)}; it must be at least 0")
 
 
 def values_of(rule: str) -> tuple[str, ...]:

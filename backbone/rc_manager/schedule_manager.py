@@ -27,7 +27,7 @@ import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import assert_never, get_args
+from typing import assert_never
 
 import msgspec
 
@@ -60,7 +60,6 @@ from backbone.rc_manager.decisions import (
     Wanted,
     Woken,
 )
-from backbone.rc_manager.discipline import Discipline
 from backbone.rc_manager.entries import CONNECTED, Afterwards, ArcEntry, RcEntry
 from backbone.rc_manager.explanation import Explanation
 from backbone.rc_manager.master_schedule import MasterSchedule
@@ -78,12 +77,11 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.plan import Turn
 from backbone.rc_manager.priority import CONSOLE, PriorityTree, carried, higher
-from backbone.rc_manager.radio_admission import Analysis
+from backbone.rc_manager.rules import ROUNDING, SchedulingRules
 from backbone.rc_manager.table import EXACT_UP_TO
 
 RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
 NOT_EXPECTED_S = -1.0
-ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
 STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken invariant
 
 
@@ -92,14 +90,9 @@ class ScheduleManager:
 
     def __init__(
         self,
+        rules: SchedulingRules,
         *,
-        grace_s: float,
         tolerance_s: float,
-        policy: str = "no_delay",
-        discipline: Discipline = "turns",
-        admission: Analysis = "exact",
-        aging_s: float = 0.0,
-        grid_s: float = 0.0,
         exact_up_to: int = EXACT_UP_TO,
         mission: str,
         mission_priority: int,
@@ -107,41 +100,24 @@ class ScheduleManager:
         """Begin with no RCs and no ARCs.
 
         Args:
-            grace_s: Time a decision process has to stop cleanly at the end of a slice.
+            rules: With which rules to decide.
             tolerance_s: Reaction and timer tolerance of this run.
-            policy: ``no_delay``: lower ARCs fill gaps that cost nobody anything. ``strict``: no ARC
-                starts while a higher usable one of its group waits.
-            discipline: ``turns``: equals take turns. ``time``: equals get equal time.
-            admission: ``exact``: a sharable RC serves what is always in time. ``sum``: what adds up to its capacity.
-            aging_s: Seconds of waiting after which an ARC rises by one level, and again; 0: never.
-            grid_s: Slices end at multiples of this many seconds, so that many RCs come free together; 0: no grid.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
             mission_priority: Its number among the consoles.
-
-        Raises:
-            ValueError: The policy, discipline or admission is not known, or a time is below 0.
         """
-        _require("policy", policy, ("no_delay", "strict"))
-        _require("discipline", discipline, get_args(Discipline))
-        _require("admission", admission, get_args(Analysis))
-        if not (0 <= aging_s < math.inf and 0 <= grid_s < math.inf):
-            raise ValueError(f"aging after {aging_s} s and a grid of {grid_s} s; both must be at least 0")
-        self._grace_s = grace_s
+        self._rules = rules
         self._tolerance_s = tolerance_s
-        self._policy = policy
-        self._discipline = discipline
         self._tree = PriorityTree(mission, mission_priority)
-        self._aging_s, self._grid_s = aging_s, grid_s
         self._exact_up_to, self._relaxed = exact_up_to, False
         self._table = MasterSchedule(
             tolerance_s=tolerance_s,
-            strict=policy == "strict",
-            discipline=discipline,
-            admission=admission,
+            strict=rules.policy == "strict",
+            discipline=rules.discipline,
+            admission=rules.admission,
             exact_up_to=exact_up_to,
         )
-        self._explanation = Explanation(self._table, grace_s=grace_s, grid_s=grid_s)
+        self._explanation = Explanation(self._table, rules)
         self._now_s = 0.0
         self._count = 0
         self._told: list[Instruction] = []
@@ -262,7 +238,7 @@ class ScheduleManager:
 
     def _revoke(self, arc: ArcEntry, why: str, by: str, afterwards: Afterwards = Afterwards.WAIT) -> None:
         """Take all its RCs from an ARC that is connected."""
-        deadline_s = self._grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
+        deadline_s = self._rules.grace_s if why == "slice" and not arc.request.stops_at_once else 0.0
         self._swap_out(arc, why, by)
         arc.afterwards = afterwards
         self._tell(RevokeArc(arc.name, dict(arc.epochs), why, by, deadline_s, NOT_EXPECTED_S))
@@ -293,18 +269,13 @@ class ScheduleManager:
         arc.granted_s = self._now_s
         arc.turns += 1
         self._enter(arc, RequestState.RUNNING)
-        self._table.end_at(arc, self._slice_end_s(arc))
+        self._table.end_at(arc, self._rules.slice_end_s(self._now_s, arc.minimum_s))
         newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._table.rcs[rc].granted_epoch}
         for rc, epoch in newest.items():
             self._table.rcs[rc].granted_epoch = epoch
         self._record(trace.grant(self._now_s, arc.name, newest), "its RCs have settled")
-        if self._grid_s:
+        if self._rules.grid_s:
             self._record(trace.extend(self._now_s, name, arc.end_s), "slices end on a common grid (rule 15)")
-
-    def _slice_end_s(self, arc: ArcEntry) -> float:
-        """Return when the slice of an ARC that is granted now ends."""
-        end_s = self._now_s + arc.minimum_s
-        return math.ceil(end_s / self._grid_s - ROUNDING) * self._grid_s if self._grid_s else end_s
 
     def _open_failed(self, name: str, rc: str) -> None:
         self._rc_down(rc, lost_by=name)
@@ -383,7 +354,7 @@ class ScheduleManager:
 
     def _longest_s(self, minimum_s: float) -> float:
         """Return the longest slice of this minimum run time that is not extended on request."""
-        return minimum_s + self._grid_s
+        return minimum_s + self._rules.grid_s
 
     def _request_line(self, arc: ArcEntry) -> trace.Line:
         name, number = arc.path[-1]
@@ -410,7 +381,7 @@ class ScheduleManager:
         self._enter(arc, RequestState.WAITING)
         if not self._relaxed and len(self._table.group_of(arc)) > self._exact_up_to:
             self._relaxed = True
-            self._record(self._rules(), "a group is too big to be planned whole")
+            self._record(self._meta(), "a group is too big to be planned whole")
 
     def _adopted(self, event: Adopted) -> None:
         """Let an ARC run on that an earlier RC manager granted its RCs.
@@ -557,21 +528,21 @@ class ScheduleManager:
 
     def _age(self) -> None:
         """Raise who waits long; it keeps its level until it was served or wants no time any more."""
-        if not self._aging_s:
+        if not self._rules.aging_s:
             return
         for arc in self._table.arcs.values():
             if arc.state is RequestState.WAITING:
-                arc.raised = int((self._now_s - arc.since_s) / self._aging_s + ROUNDING)
+                arc.raised = int((self._now_s - arc.since_s) / self._rules.aging_s + ROUNDING)
             elif arc.served(self._now_s) or not arc.active:
                 arc.raised = 0
         if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._table.arcs.values() if arc.raised):
             self._priorities_changed()
 
     def _next_aging_s(self) -> float | None:
-        if not self._aging_s:
+        if not self._rules.aging_s:
             return None
         waiting = [arc for arc in self._table.arcs.values() if arc.state is RequestState.WAITING]
-        return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
+        return min((arc.since_s + (arc.raised + 1) * self._rules.aging_s for arc in waiting), default=None)
 
     def _renumber(self) -> None:
         for arc in self._table.arcs.values():
@@ -741,14 +712,14 @@ class ScheduleManager:
 
     def opening_lines(self) -> list[Record]:
         """Return the records with which a trace begins."""
-        return [Record(self._rules())]
+        return [Record(self._meta())]
 
-    def _rules(self) -> trace.Line:
+    def _meta(self) -> trace.Line:
         return trace.meta(
             self._now_s,
-            policy=self._policy,
-            discipline=self._discipline,
-            grace_s=self._grace_s,
+            policy=self._rules.policy,
+            discipline=self._rules.discipline,
+            grace_s=self._rules.grace_s,
             tolerance_s=self._tolerance_s,
             relaxed=self._relaxed,
         )
@@ -818,11 +789,6 @@ class ScheduleManager:
         if rang or wake_s != self._wake_s:
             self._wake_s = wake_s
             self._tell(WakeAt(wake_s))
-
-
-def _require(what: str, given: str, known: Sequence[str]) -> None:
-    if given not in known:
-        raise ValueError(f"unknown {what} {given!r}; there are {' and '.join(known)}")
 
 
 def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:

@@ -148,13 +148,8 @@ class RcManager(Component[RcManagerParameters]):
         super().__init__(launch, bus, clock)
         given = self.parameters
         self.manager = ScheduleManager(
-            grace_s=given.grace_s,
+            given,
             tolerance_s=TOLERANCE_S,
-            policy=given.policy,
-            discipline=given.discipline,
-            admission=given.admission,
-            aging_s=given.aging_s,
-            grid_s=given.grid_s,
             mission=given.mission,
             mission_priority=given.mission_priority,
         )

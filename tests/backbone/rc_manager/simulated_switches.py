@@ -34,7 +34,9 @@ from backbone.rc_manager.decisions import (
     Woken,
 )
 from backbone.rc_manager.messages import PathNode, RcUse, SchedulingRequest, Usage
+from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
+from backbone.rc_manager.table import EXACT_UP_TO
 
 MISSION = "watch"
 TOLERANCE_S = 1e-6
@@ -84,8 +86,16 @@ def ask(
     return Requested(request, tuple(wish))
 
 
-def manager(*, grace_s: float = 0.0, tolerance_s: float = TOLERANCE_S, **rules: Any) -> ScheduleManager:
-    return ScheduleManager(grace_s=grace_s, tolerance_s=tolerance_s, mission=MISSION, mission_priority=0, **rules)
+def manager(
+    *, grace_s: float = 0.0, tolerance_s: float = TOLERANCE_S, exact_up_to: int = EXACT_UP_TO, **rules: Any
+) -> ScheduleManager:
+    return ScheduleManager(
+        SchedulingRules(grace_s=grace_s, **rules),
+        tolerance_s=tolerance_s,
+        exact_up_to=exact_up_to,
+        mission=MISSION,
+        mission_priority=0,
+    )
 
 
 class Bench:

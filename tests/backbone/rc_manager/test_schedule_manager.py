@@ -34,7 +34,8 @@ from backbone.rc_manager.messages import (
     UnknownRequest,
     Usage,
 )
-from backbone.rc_manager.schedule_manager import RETRY_S, ScheduleManager
+from backbone.rc_manager.rules import SchedulingRules
+from backbone.rc_manager.schedule_manager import RETRY_S
 
 
 def told(bench: Bench, kind: type) -> list:
@@ -470,9 +471,7 @@ def test_the_schedule_shows_holders_and_who_is_next():
 @pytest.mark.parametrize(("policy", "discipline"), [("greedy", "turns"), ("no_delay", "luck")])
 def test_an_unknown_policy_or_discipline_is_refused(policy, discipline):
     with pytest.raises(ValueError, match="unknown"):
-        ScheduleManager(
-            grace_s=0.0, tolerance_s=0.0, policy=policy, discipline=discipline, mission="m", mission_priority=0
-        )
+        SchedulingRules(policy=policy, discipline=discipline)
 
 
 # Rules to choose.
