@@ -136,13 +136,18 @@ class World:
 
     def step_frame(self) -> None:
         """Advance by one frame, a thirtieth of a second."""
-        for robot in self._robots.values():
-            self._drive(robot)
-        for _ in range(STEPS_PER_FRAME):
-            mujoco.mj_step(self._model, self._data)
-            self._step += 1
+        driven = [self._drive(robot) for robot in self._robots.values()]
+        if not any(driven) and not self._carried and self._is_all_asleep():
+            # Nothing to integrate: one step notices whom a target touches, and wakes it.
+            self._step += STEPS_PER_FRAME
             self._place_targets()
-            self._hold_carried()
+            mujoco.mj_step(self._model, self._data)
+        else:
+            for _ in range(STEPS_PER_FRAME):
+                mujoco.mj_step(self._model, self._data)
+                self._step += 1
+                self._place_targets()
+                self._hold_carried()
         self._frame += 1
 
     def transmitting(self) -> dict[str, str]:
@@ -277,19 +282,24 @@ class World:
             velocities=slice(int(free.dofadr[0]), last_velocity),
         )
 
-    def _drive(self, robot: _Body) -> None:
-        """Hand the actuators what the robot's program says; wake its body if that is anything."""
+    def _is_all_asleep(self) -> bool:
+        return bool((self._data.tree_asleep >= 0).all()) and not self._data.qvel.any()
+
+    def _drive(self, robot: _Body) -> bool:
+        """Hand the actuators what the robot's program says; say whether that is anything, and wake its body if so."""
         controls, data = robot.program.controls(self.time_s), self._data
         for actuator, control in controls.items():
             number = robot.actuators.get(actuator)
             if number is None:
                 raise InvalidWorld(f"{robot.kind} drives {actuator!r}, which its body has not")
             data.ctrl[number] = control
-        if any(controls.values()):
+        is_driven = any(controls.values())
+        if is_driven:
             # Controls do not wake a sleeping body, but any bit in its velocity does: the zero that has one.
             first = robot.velocities.start
             if data.qvel[first] == 0.0:
                 data.qvel[first] = -0.0
+        return is_driven
 
     def _free_joint(self, robot: str) -> NDArray[np.float64]:
         free = self._robots[robot].free
