@@ -27,6 +27,7 @@ _CLASS_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")  # what else it may be
 CARRIER = "carrier"  # the shape of a target that brings robots in
 NEAREST_SET_DOWN_M, FARTHEST_SET_DOWN_M = 0.45, 1.2  # as scout_model.dimensions has them; a test compares
 CARRIER_PLACES = 6  # same
+TABLE_TOP_M, TABLE_LEGS_M = 0.03, 0.10  # what a table is more than: the thickness of its top, two of its legs
 PAIRS_AT_MOST = 1_000_000  # chosen: half a second; a thousand robots among a thousand tables
 
 
@@ -58,6 +59,7 @@ def check_world(tables: Tables, report: Report) -> None:
                 _check_inside(place, body, width_m, depth_m, report)
     boxes = [box for box in world.all("furniture") if box.text("shape") != "table"]
     _check_not_in_boxes(world.all("scout"), boxes, report)
+    _check_tables(world, report)
     _check_not_in_ramps(world.all("scout"), world.all("ramp"), report)
     _check_carried(world, report)
     for target in world.all("target"):
@@ -135,6 +137,19 @@ def _check_not_in_boxes(scouts: list[Element], boxes: list[Element], report: Rep
             if _is_within(x_m, box_x_m, width_m) and _is_within(y_m, box_y_m, depth_m):
                 report.fault(
                     scout.place, f"scout {scout.text('name')} stands inside {box.text('name')}", "Move one of them"
+                )
+
+
+def _check_tables(world: Element, report: Report) -> None:
+    least = {"height-m": TABLE_TOP_M, "width-m": TABLE_LEGS_M, "depth-m": TABLE_LEGS_M}
+    for table in (box for box in world.all("furniture") if box.text("shape") == "table"):
+        for extent, least_m in least.items():
+            extent_m = table.number(extent)
+            if extent_m is not None and 0 < extent_m <= least_m:
+                report.fault(
+                    table.place_of(extent),
+                    f"{table.text('name')} is too small for a table",
+                    f"Make its {extent} more than {least_m:g}, or make it a box",
                 )
 
 

@@ -1,0 +1,107 @@
+"""Everything a mission file can put into a world arrives there; a room's own file travels with the mission."""
+
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from backbone.mission import world_checks
+from backbone.mission.reader import MissionInvalid, read_mission
+from backbone.mission.room_files import MAX_BYTES
+from scout_model import dimensions
+from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, WorldDescription
+from scout_model.world import World
+
+SMALL = (Path(__file__).parent / "small.xml").read_text()
+HALL = '<mujoco model="hall"><worldbody><geom name="pillar" pos="4 4 1" size="0.2"/></worldbody></mujoco>'
+CONTENT = """
+    <furniture name="desk" x-m="6" y-m="5" width-m="1.4" depth-m="0.8" height-m="0.7" shape="table"/>
+    <ramp name="ramp" x-m="6" y-m="2" length-m="1" width-m="0.5" height-m="0.2" heading-deg="90"/>
+    <landmark name="home" x-m="8" y-m="1" heading-deg="180"/>
+    <dark name="corner" x-m="0.5" y-m="5.5" width-m="1" depth-m="1" height-m="0.6"/>
+    <target name="carrier" shape="carrier" speed-m-s="0.5">
+      <point x-m="0.5" y-m="4"/>
+      <point x-m="8.5" y-m="4"/>
+    </target>
+"""
+
+
+def world_of(tmp_path: Path, mission: str) -> WorldDescription:
+    file = tmp_path / "mission.xml"
+    file.write_text(mission)
+    [component] = read_mission(file).components
+    return msgspec.convert(component.parameters["world"], WorldDescription)
+
+
+def with_content(content: str, room: str = "") -> str:
+    begin, end = SMALL.index("<room"), SMALL.index("</world>")
+    room_end = SMALL.index("/>", begin)
+    return f"{SMALL[:room_end]} {room}/>{SMALL[room_end + 2 : end]}{content}{SMALL[end:]}"
+
+
+def refusal(tmp_path: Path, mission: str) -> str:
+    with pytest.raises(MissionInvalid) as caught:
+        world_of(tmp_path, mission)
+    [fault] = caught.value.faults
+    return f"{fault.message} ({fault.remedy})"
+
+
+def test_every_thing_of_the_file_is_in_the_world(tmp_path: Path) -> None:
+    described = world_of(tmp_path, with_content(CONTENT))
+    assert Furniture("desk", 6.0, 5.0, 1.4, 0.8, 0.7, "table") in described.furniture
+    assert described.ramps == [Ramp("ramp", 6.0, 2.0, 1.0, 0.5, 0.2, math.pi / 2)]
+    assert described.landmarks == [Landmark("home", 8.0, 1.0, math.pi)]
+    assert described.dark_places == [DarkPlace("corner", 0.5, 5.5, 1.0, 1.0, 0.6)]
+    assert World(described).pose("carrier") == (0.5, 4.0, 0.0)
+
+
+def test_a_carried_scout_says_who_brings_it(tmp_path: Path) -> None:
+    mission = with_content(CONTENT)
+    begin = mission.index("<scout")
+    end = mission.index("/>", begin)
+    carried = f'{mission[:begin]}<scout name="scout1" x-m="3" y-m="4.7" carried-by="carrier"{mission[end:]}'
+    described = world_of(tmp_path, carried)
+    [scout1] = [scout for scout in described.scouts if scout.name == "scout1"]
+    assert (scout1.carried_by, scout1.kind) == ("carrier", "scout_model.scout:Scout")
+    assert World(described).is_carried("scout1")
+
+
+def test_a_room_of_ones_own_travels_with_the_mission(tmp_path: Path) -> None:
+    (tmp_path / "rooms").mkdir()
+    (tmp_path / "rooms" / "hall.xml").write_text(HALL)
+    described = world_of(tmp_path, with_content("", 'mjcf="rooms/hall.xml"'))
+    (tmp_path / "rooms" / "hall.xml").unlink()
+    assert described.mjcf == HALL
+    assert "room/pillar" in World(described).mjcf
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("<mujoco>", "no well-formed XML"),
+        ("<robot/>", "begins with <robot>"),
+        ('<mujoco><include file="walls.xml"/></mujoco>', "needs the file 'walls.xml' in line 1"),
+        ('<mujoco><asset>\n<texture name="t" file="t.png"/></asset></mujoco>', "needs the file 't.png' in line 2"),
+        ("<!DOCTYPE mujoco><mujoco/>", "document type declaration"),
+        ("<mujoco/>" + " " * MAX_BYTES, "is larger than"),
+        ("\udcff", "no well-formed XML"),
+    ],
+)
+def test_a_room_file_that_cannot_be_used_is_refused_with_a_remedy(tmp_path: Path, content: str, told: str) -> None:
+    (tmp_path / "hall.xml").write_bytes(content.encode(errors="surrogateescape"))
+    message = refusal(tmp_path, with_content("", 'mjcf="hall.xml"'))
+    assert told in message
+    assert message.endswith(")")
+
+
+def test_a_folder_is_no_room(tmp_path: Path) -> None:
+    assert "is no file" in refusal(tmp_path, with_content("", 'mjcf="."'))
+
+
+def test_what_a_carrier_and_a_table_are_is_what_the_world_takes_them_for() -> None:
+    assert world_checks.NEAREST_SET_DOWN_M == dimensions.NEAREST_SET_DOWN_M
+    assert world_checks.FARTHEST_SET_DOWN_M == dimensions.FARTHEST_SET_DOWN_M
+    assert world_checks.CARRIER_PLACES == dimensions.CARRIER_PLACES
+    just_a_table = Furniture("t", 1.0, 1.0, 0.101, 0.101, 0.031, "table")
+    assert World(WorldDescription(9.0, 6.0, furniture=[just_a_table])).mjcf
