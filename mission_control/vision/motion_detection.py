@@ -4,9 +4,9 @@ Half-size mean → blur → running average → difference → threshold → row
 link noise → connected regions → a vote over the last frames. Without the row filter and the vote,
 link noise alone gives an alarm in every slice.
 
-Source: RAM 2002, "Experiments": frame averaging, subtraction from the running average, thresholding,
-connected regions. Row filter, vote and numbers: chosen on simulated links of 13 to 40 dB, where they
-gave no false alarm.
+Source: RAM 2002, "Distributed Surveillance Task": a weighted average, subtraction of each new picture,
+a threshold, connected regions; blobs of whole rows are link noise and dropped. Vote and numbers: chosen
+on simulated links of 13 to 40 dB, where they gave no false alarm.
 """
 
 from __future__ import annotations
@@ -40,6 +40,23 @@ class Blob:
     width_px: int
     height_px: int
     area_px: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stages:
+    """The pictures a detector went through for its last one, of half the size, for a look at how it judged.
+
+    Attributes:
+        picture: The new picture, blurred, grey levels.
+        average: What it was compared with; changes when the next picture is looked at.
+        changed: Where it differed by more than noise does.
+        kept: The same without rows that changed as a whole; all False if the picture was not judged.
+    """
+
+    picture: NDArray[np.float32]
+    average: NDArray[np.float32]
+    changed: NDArray[np.bool_]
+    kept: NDArray[np.bool_]
 
 
 def halve(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -85,11 +102,12 @@ def torn_rows(changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.asarray(changed.mean(axis=1) > ROW_SHARE, np.bool_)
 
 
-def largest_blob(changed: NDArray[np.bool_]) -> Blob | None:
+def largest_blob(changed: NDArray[np.bool_], *, drop_streaks: bool = True) -> Blob | None:
     """Return the largest connected region that is neither too small nor a streak, or None.
 
     Args:
         changed: Of the halved picture, shape (height, width).
+        drop_streaks: False lets streaks pass, the pieces of torn rows.
 
     Returns:
         The region in pixels of the full picture.
@@ -97,16 +115,22 @@ def largest_blob(changed: NDArray[np.bool_]) -> Blob | None:
     count, _labels, found, _centres = cv2.connectedComponentsWithStats(changed.astype(np.uint8), connectivity=8)
     best: Blob | None = None
     for x, y, width, height, area in found[1:count].tolist():
-        is_streak = height <= STREAK_HEIGHT_PX and width >= STREAK_RATIO * height
+        is_streak = drop_streaks and height <= STREAK_HEIGHT_PX and width >= STREAK_RATIO * height
         if area >= LEAST_AREA_PX and not is_streak and (best is None or 4 * area > best.area_px):
             best = Blob(2 * x, 2 * y, 2 * width, 2 * height, 4 * area)
     return best
 
 
 class MotionDetector:
-    """Looks at one camera's pictures, one after the other; keeps the average when its robot is swapped out."""
+    """Looks at one camera's pictures, one after the other; keeps the average when its robot is swapped out.
 
-    def __init__(self) -> None:
+    Args:
+        filters_rows: False leaves out the second filter, of whole rows and their pieces: to measure what it is for.
+    """
+
+    def __init__(self, *, filters_rows: bool = True) -> None:
+        self._filters_rows = filters_rows
+        self._stages: Stages | None = None
         self._average: NDArray[np.float32] | None = None
         self._fast_frames_left = FAST_FRAMES
         self._votes: deque[bool] = deque(maxlen=VOTERS)
@@ -121,6 +145,11 @@ class MotionDetector:
     def has_glimpsed(self) -> bool:
         """Whether any of the last ``VOTERS`` pictures since the swap had a region, certain or not."""
         return any(self._votes)
+
+    @property
+    def stages(self) -> Stages | None:
+        """The pictures on the way to the last judgment, None before the second picture."""
+        return self._stages
 
     def look(self, frame: NDArray[np.uint8]) -> Blob | None:
         """Return where something moves, or None.
@@ -143,7 +172,8 @@ class MotionDetector:
             self.swapped_in()
             return None
         changed = changed_pixels(self._average, picture)
-        torn = torn_rows(changed)
+        torn = torn_rows(changed) if self._filters_rows else np.zeros(len(changed), np.bool_)
+        self._stages = Stages(picture, self._average, changed, np.zeros_like(changed))
         if self._fast_frames_left > 0:
             # Another view changes most rows as a whole, so here a torn row cannot be told from a turned robot.
             self._fast_frames_left -= 1
@@ -153,9 +183,9 @@ class MotionDetector:
             self.rejected += 1
             cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT)
             return None
-        changed[torn] = False
-        kept = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1).astype(np.uint8)
-        cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=kept)
-        blob = largest_blob(changed)
+        sound = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1)
+        self._stages = Stages(picture, self._average, changed, changed & sound)
+        cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
+        blob = largest_blob(self._stages.kept, drop_streaks=self._filters_rows)
         self._votes.append(blob is not None)
         return blob if sum(self._votes) >= VOTES else None
