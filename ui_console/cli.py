@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,12 +19,14 @@ from backbone.cli import ExitCode, run, say
 if TYPE_CHECKING:
     from backbone.bus.interface import Clock
     from backbone.component.launch import Launch
+    from ui_console.console_events import ConsoleEvent
     from ui_console.observer import Observer
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
 others; a script needs no picture, so it waits for none to settle and leaves the video frequency to others too."""
 
+AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -39,12 +42,25 @@ class Profile(StrEnum):
     """How a console looks."""
 
     TERMINAL = "terminal"  # picture, tables, keys
-    PENDANT = "pendant"  # keys and tables; the picture is on a video monitor
+    PENDANT = "pendant"  # six keys and the state of one robot; the picture is on a video monitor
     MONITOR = "monitor"  # tables only; drives nothing
 
 
 Mission = Annotated[str | None, typer.Option("--mission", help="Name of a mission that is up on this machine.")]
 Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")]
+
+
+User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
+
+
+@dataclass(frozen=True)
+class _Looks:
+    """How a console with a screen looks, and who sits at it."""
+
+    profile: Profile
+    user: str
+    is_bare: bool
+    has_gamepad: bool
 
 
 @app.command()
@@ -57,13 +73,19 @@ def attach(
     within: Annotated[float, typer.Option(help="Mission seconds a script waits for the grant; 0: for ever.")] = 0.0,
     minimum_runtime: Annotated[float, typer.Option(help="Shortest useful time beside equals, seconds.")] = 5.0,
     kind: Annotated[str, typer.Option(help="Kind of ARC; default: what the console shows needs.")] = "",
+    away_after: Annotated[
+        float, typer.Option(help="Give the robot back when no key was pressed for so many seconds; 0: never.")
+    ] = AWAY_AFTER_S,
+    video_only: Annotated[bool, typer.Option("--video-only", help="Begin with the picture alone.")] = False,
+    gamepad: Annotated[bool, typer.Option("--gamepad", help="Drive by the gamepad of this machine, too.")] = False,
+    user: User = "",
     mission: Mission = None,
     connect: Connect = None,
 ) -> None:
     """Take over a robot, drive it, give it back."""
     script = script or ("-" if as_json else "")
     if profile is Profile.MONITOR:
-        run(lambda: _watch(mission, connect, as_json=as_json))
+        run(lambda: _watch(mission, connect, user or _user(), as_json=as_json))
     wished = {
         "robot": robot,
         "priority": priority,
@@ -73,19 +95,21 @@ def attach(
     if script:
         run(lambda: _drive_by_script(mission, connect, wished, script, within))
     _need_a_terminal("attach", "--script FILE or --json")
-    run(lambda: _drive_by_hand(mission, connect, wished))
+    looks = _Looks(profile, user or _user(), is_bare=video_only, has_gamepad=gamepad)
+    run(lambda: _drive_by_hand(mission, connect, {**wished, "away_after_s": away_after}, looks))
 
 
 @app.command()
 def monitor(
     as_json: Annotated[bool, typer.Option("--json", help="JSON lines instead of a screen.")] = False,
+    user: User = "",
     mission: Mission = None,
     connect: Connect = None,
 ) -> None:
-    """Watch who holds what, who waits why, and what happens; claim nothing."""
+    """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
     if not as_json:
         _need_a_terminal("monitor", "--json")
-    run(lambda: _watch(mission, connect, as_json=as_json))
+    run(lambda: _watch(mission, connect, user or _user(), as_json=as_json))
 
 
 def main() -> None:
@@ -128,14 +152,27 @@ async def _drive_by_script(
     return ExitCode.INTERRUPTED if interrupted() else driver.exit_code(console)
 
 
-async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[str, Any]) -> int:
+async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[str, Any], looks: _Looks) -> int:
+    from ui_console.gamepad import find_gamepad
     from ui_console.teleoperation import Teleoperation
+    from ui_console.terminal import app as screens
     from ui_console.terminal.session import TerminalSession
 
+    pad = find_gamepad() if looks.has_gamepad else None
     launch, clock = await _launch(mission, connect, wished)
-    session = TerminalSession(launch.name)
-    see = session.see if wished["kind"] == KINDS[Profile.TERMINAL] else None
-    console = Teleoperation(launch, await _open_bus(launch, clock), clock, show=session.show, see=see)
+    sees = wished["kind"] == KINDS[Profile.TERMINAL] and looks.profile is Profile.TERMINAL
+    session = TerminalSession(
+        launch.name,
+        launch.mission,
+        looks.user,
+        profile=screens.Profile(looks.profile),
+        is_bare=looks.is_bare,
+        sees=sees,
+        gamepad=pad,
+    )
+    bus = await _open_bus(launch, clock)
+    see = session.see if sees else None
+    console = Teleoperation(launch, bus, clock, show=session.show, see=see, user=looks.user)
     _end_on_signals(console)
     await session.run(console)
     if console.refusal is not None and console.given_back is None:
@@ -143,27 +180,40 @@ async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[
     return ExitCode.DONE
 
 
-async def _watch(mission: str | None, connect: str | None, *, as_json: bool) -> int:
+async def _watch(mission: str | None, connect: str | None, user: str, *, as_json: bool) -> int:
     from backbone.component.component import NoParameters
-    from ui_console.console_events import event_json
+    from ui_console.console_events import for_scripts
     from ui_console.observer import Observer
 
     launch, clock = await _launch(mission, connect, {})
     bus = await _open_bus(launch, clock)
     if as_json:
-        console: Observer[NoParameters] = Observer(
-            launch, bus, clock, show=lambda event: _write_line(event_json(event))
-        )
+
+        def show(event: ConsoleEvent) -> None:
+            for line in for_scripts(event):
+                _write_line(line)
+
+        console: Observer[NoParameters] = Observer(launch, bus, clock, show=show, user=user)
         interrupted = _end_on_signals(console)
         await console.run()
         return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
     from ui_console.terminal.session import TerminalSession
 
-    session = TerminalSession(launch.name)
-    console = Observer(launch, bus, clock, show=session.show)
+    session = TerminalSession(launch.name, launch.mission, user, sees=False)
+    console = Observer(launch, bus, clock, show=session.show, user=user)
     _end_on_signals(console)
     await session.run(console)
     return ExitCode.DONE
+
+
+def _user() -> str:
+    """Return who is logged in, as far as the system knows."""
+    import getpass
+
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):  # a user without a name, in a container
+        return f"uid-{os.getuid()}"
 
 
 async def _launch(mission: str | None, connect: str | None, parameters: dict[str, Any]) -> tuple[Launch, Clock]:

@@ -356,6 +356,15 @@ def event_json(event: ConsoleEvent) -> bytes:
     return msgspec.json.encode({"event": event_word(event), **plain})
 
 
+FOR_SCRIPTS = (ScheduleHeard, StoryHeard, StopHeard, ComponentGone, ProcessFallen, LinkTrouble, CommandRefused)
+"""What a program that watches a mission is told; the rest comes several times a second."""
+
+
+def for_scripts(event: ConsoleEvent) -> list[bytes]:
+    """Return the event as one line of JSON if it is one for programs that watch, else none."""
+    return [event_json(event)] if isinstance(event, FOR_SCRIPTS) else []
+
+
 def _by_name(value: Any) -> Any:
     """Return messages, which travel as arrays, as dictionaries of their fields, all the way down."""
     if isinstance(value, msgspec.Struct):

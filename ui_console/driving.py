@@ -46,6 +46,28 @@ Wish = Command | GiveBack
 
 Direction = Literal["forward", "backward", "left", "right"]
 
+STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages say what they want
+
+
+def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> Drive:
+    """Return the wheel speeds for a stick or a drag pad.
+
+    Args:
+        forward: −1 (full backward) to 1 (full forward); beyond is clipped.
+        right: −1 (full left) to 1 (full right).
+        speed_rad_s: Of the wheels at full forward.
+
+    Example:
+        >>> drive_by_stick(1.0, 0.0, 4.0)
+        Drive(left_rad_s=4.0, right_rad_s=4.0)
+        >>> drive_by_stick(0.0, 1.0, 4.0)
+        Drive(left_rad_s=2.0, right_rad_s=-2.0)
+    """
+    forward, right = min(max(forward, -1.0), 1.0), min(max(right, -1.0), 1.0)
+    left_share, right_share = forward + right / 2, forward - right / 2
+    most = max(1.0, abs(left_share), abs(right_share))
+    return Drive(speed_rad_s * left_share / most, speed_rad_s * right_share / most)
+
 
 def drive_towards(direction: Direction, speed_rad_s: float) -> Drive:
     """Return the wheel speeds for a direction key; turns are on the spot, at half the speed.
@@ -78,9 +100,20 @@ class DeadMan:
         self._repeats = 0
         self._must_halt = False
 
-    def press(self, drive: Drive, now_s: float) -> None:
-        """A key is down, for the first time or again."""
-        if drive == self._held and now_s < self._until_s:
+    def press(self, drive: Drive, now_s: float, lasts_s: float | None = None) -> None:
+        """A key is down, for the first time or again.
+
+        Args:
+            drive: What it stands for.
+            now_s: When.
+            lasts_s: How long that counts, for what says so again and again while it is held and tells when it is let
+                go; None: for a key, whose rhythm is found out.
+        """
+        if lasts_s is not None:
+            if self._held is None or now_s >= self._until_s:
+                self._next_s = now_s
+            self._repeats, hold_s = 0, lasts_s
+        elif drive == self._held and now_s < self._until_s:
             self._repeats += 1
             least, most = REPEATED_HOLD_S
             rhythm_s = HOLD_INTERVALS * (now_s - self._pressed_s)

@@ -12,7 +12,7 @@ import logging
 import time
 import types
 from collections.abc import Awaitable, Callable
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import msgspec
 
@@ -37,6 +37,7 @@ from resource_pool.arc_client import (
 )
 from ui_console.console_events import (
     Asked,
+    Attention,
     CommandApplied,
     CommandRefused,
     ConsoleEvent,
@@ -65,12 +66,15 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
         kind: Component type of the ARC.
         priority: Among the consoles and the mission; larger is higher.
         minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
+        away_after_s: The robot is given back when its operator touched nothing for so long, so that it goes on with
+            useful work; seconds of the machine; 0: never.
     """
 
     robot: str = ""
     kind: str = "capture"
     priority: int = 100
     minimum_runtime_s: float = 5.0
+    away_after_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
 
 
 class Teleoperation(Observer[TeleoperationParameters]):
@@ -82,6 +86,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         work: Run once the console is ready, instead of waiting for somebody to end it; its end is the console's.
         takes: Claim at once.
         watches: Also tell what happens to others.
+        user: Who drives, for the record; empty: the console's name.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
@@ -98,8 +103,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         work: Callable[[Teleoperation], Awaitable[None]] | None = None,
         takes: bool = True,
         watches: bool = True,
+        user: str = "",
     ) -> None:
-        super().__init__(launch, bus, clock, show=show, watches=watches)
+        super().__init__(launch, bus, clock, show=show, watches=watches, user=user)
         self._see, self._work, self._takes = see, work, takes
         self._arc: ArcClient | None = None
         self._keeping: asyncio.Task[None] | None = None
@@ -111,6 +117,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._dead_man = DeadMan()
         self._pressed = asyncio.Event()
         self._asking_why: asyncio.Task[None] | None = None
+        self._touched = asyncio.Event()
+        self._is_attended = True
+        self._holding = ""
         self.refusal: Refusal | None = None
         """Why the claim was refused; None if it was not."""
         self.given_back: bool | None = None
@@ -140,6 +149,28 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self.show(Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
         self._keeping = self.start_task(self._keep(self._arc), "arc")
 
+    async def switch(self, robot: str) -> None:
+        """Claim another robot in place of the one that is claimed, which is stopped and given back first."""
+        if robot == self.parameters.robot and self._keeping is not None:
+            return
+        await self.give_back(f"{self.user} takes {robot}")
+        self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+        self.take()
+
+    def touch(self) -> None:
+        """The operator is there; driving says so by itself."""
+        if not self._is_attended:
+            self._is_attended = True
+            self.show(Attention(self.clock.now_s(), True))
+        self._touched.set()
+
+    def leave(self) -> None:
+        """The operator turned away, or the window is no longer in front: the wheels stop."""
+        if self._is_attended:
+            self._is_attended = False
+            self.show(Attention(self.clock.now_s(), False))
+        self.stop()
+
     async def wait_granted(self) -> None:
         """Return when the claim was granted.
 
@@ -150,9 +181,15 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self.refusal is not None:
             raise self.refusal
 
-    def hold(self, drive: Drive) -> None:
-        """A drive key is down: the command repeats until the hold ends, then the wheels stop."""
-        self._dead_man.press(drive, asyncio.get_running_loop().time())
+    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+        """A drive key is down: the command repeats until the hold ends, then the wheels stop.
+
+        Args:
+            drive: What the key stands for.
+            lasts_s: How long that counts, machine seconds, for what says it again while it is held; None: as for keys.
+        """
+        self.touch()
+        self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
         self._pressed.set()
 
     def stop(self) -> None:
@@ -211,6 +248,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._frames.close()
         self._arc, self._frames, self._releasing = None, None, False
         self.given_back = confirmed
+        if self._holding:
+            self.tell(self._holding, f"was given back by {self.user}: {reason}")
+            self._holding = ""
         self.show(GivenBack(self.clock.now_s(), reason, confirmed))
 
     # ------------------------------------------------------------------ the component's hooks
@@ -219,6 +259,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._takes:
             self.take()
         self.start_task(self._drive_while_held(), "keys")
+        if self.parameters.away_after_s > 0:
+            self.start_task(self._give_back_when_away(), "attention")
         if self._work is not None:
             self.start_task(self._work_and_end(self._work), "work")
         await super().serve()
@@ -247,6 +289,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         now_s = self.clock.now_s()
         robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.report(f"drives {robot}")
+        if not again:
+            self.tell(robot, f"was taken over by {self.user}")
+        self._holding = robot
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 
@@ -312,6 +357,19 @@ class Teleoperation(Observer[TeleoperationParameters]):
                     await self._pressed.wait()
             except TimeoutError:
                 continue
+
+    async def _give_back_when_away(self) -> None:
+        """Let the robot go on with useful work when nobody drives it."""
+        away_after_s = self.parameters.away_after_s
+        while True:
+            self._touched.clear()
+            try:
+                async with asyncio.timeout(away_after_s):
+                    await self._touched.wait()
+            except TimeoutError:
+                self.leave()
+                await self.give_back(f"{self.user} is away")
+                await self._touched.wait()
 
     async def _jump(self) -> None:
         await self.do(Jump())

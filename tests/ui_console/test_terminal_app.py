@@ -2,26 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from console_scenes import ASK, GRANT, SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 from numpy.typing import NDArray
-from textual.events import AppBlur
-from textual.widgets import Static
+from screen_text import same_as_before, screen_text
+from textual.events import AppBlur, AppFocus
+from textual.widgets import Input
 
-from backbone.rc_manager.messages import Holder, RcView, Schedule
-from ui_console.console_events import Asked, Granted, PictureSeen, ScheduleHeard
+from ui_console.console_events import Attention, ConsoleEvent, LinkTrouble, Lost, ScheduleHeard, StopHeard
 from ui_console.console_model import ConsoleModel
-from ui_console.driving import Drive
-from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, Video
+from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.terminal.app import (
+    DRIVE_KEYS,
+    DRIVES,
+    PENDANT_DOES,
+    SPEED_MOST_RAD_S,
+    ConsoleApp,
+    PanelName,
+    Profile,
+    read_value,
+)
+from ui_console.terminal.widgets import DrivePad, Panel, Video
+
+SIZE = (120, 36)
 
 
 class WrittenSession:
     """Writes down what keys want."""
 
-    def __init__(self) -> None:
-        self.model = ConsoleModel("console-1")
-        self.wanted: list[object] = []
+    def __init__(self, *events: ConsoleEvent, shown: ConsoleModel | None = None) -> None:
+        self.model = shown or model(*events)
+        self.wanted: list[Any] = []
+        self.touched = 0
         self.shown: NDArray[np.uint8] | None = None
+        self.is_sure = True
 
     def picture(self) -> NDArray[np.uint8] | None:
         return self.shown
@@ -29,8 +46,8 @@ class WrittenSession:
     def now_s(self) -> float:
         return 12.0
 
-    def hold(self, drive: Drive) -> None:
-        self.wanted.append(drive)
+    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+        self.wanted.append(drive if lasts_s is None else (drive, lasts_s))
 
     def stop(self) -> None:
         self.wanted.append("stop")
@@ -44,85 +61,421 @@ class WrittenSession:
     def release(self) -> None:
         self.wanted.append("release")
 
+    async def switch(self, robot: str) -> None:
+        self.wanted.append(("switch", robot))
+
+    def touch(self) -> None:
+        self.touched += 1
+
+    def leave(self) -> None:
+        self.wanted.append("leave")
+
+    def acknowledge(self, key: str) -> None:
+        self.wanted.append(("acknowledge", key))
+        self.model.acknowledge(key)
+
+    async def stop_robot(self, robot: str) -> bool:
+        self.wanted.append(("stop robot", robot))
+        return self.is_sure
+
+    async def stop_all(self) -> list[str]:
+        self.wanted.append("stop all")
+        return [] if self.is_sure else ["scout2"]
+
+    async def lift_stop(self, robot: str) -> bool:
+        self.wanted.append(("lift", robot))
+        return True
+
+    async def why(self, name: str) -> list[str]:
+        self.wanted.append(("why", name))
+        return [f"{name}: waiting", "  watch1 has its minimum run time"]
+
+    async def ask_parameters(self, name: str) -> bool:
+        self.wanted.append(("ask", name))
+        return True
+
+    async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
+        self.wanted.append(("set", name, parameter, value))
+        return self.is_sure
+
 
 FORWARD, BACKWARD = Drive(4.0, 4.0), Drive(-4.0, -4.0)
 LEFT, RIGHT = Drive(-2.0, 2.0), Drive(2.0, -2.0)
-KEYS: list[tuple[str, object]] = [
-    ("up", FORWARD),
-    ("w", FORWARD),
-    ("down", BACKWARD),
-    ("s", BACKWARD),
-    ("left", LEFT),
-    ("a", LEFT),
-    ("right", RIGHT),
-    ("d", RIGHT),
-    ("space", "stop"),
-    ("escape", "stop"),
-    ("j", "jump"),
-    ("r", "release"),
-    ("t", "take"),
+KEYS: list[tuple[str, list[Any]]] = [
+    ("up", [FORWARD]),
+    ("w", [FORWARD]),
+    ("down", [BACKWARD]),
+    ("s", [BACKWARD]),
+    ("left", [LEFT]),
+    ("a", [LEFT]),
+    ("right", [RIGHT]),
+    ("d", [RIGHT]),
+    ("space", ["stop"]),
+    ("escape", ["stop"]),
+    ("j", ["jump"]),
+    ("r", ["release"]),
+    ("t", ["take"]),
+    ("x", ["stop", ("stop robot", "scout1")]),
+    ("X", ["stop", "stop all"]),
+    ("c", [("lift", "scout1")]),
+    ("1", [("switch", "scout1")]),
+    ("2", [("switch", "scout2")]),
+    ("3", []),
+    ("y", [("why", "scout1")]),
+    ("i", [("ask", "scout1")]),
+    ("k", [("acknowledge", "no_answer:")]),
+    ("K", [("acknowledge", "")]),
+    ("enter", []),
 ]
 
 
-@pytest.mark.parametrize(("key", "wanted"), KEYS, ids=[key for key, _wanted in KEYS])
-async def test_a_key_does_what_it_says(key: str, wanted: object) -> None:
-    session = WrittenSession()
-    async with ConsoleApp(session).run_test() as pilot:
-        await pilot.press(key)
-    assert session.wanted == [wanted]
+async def settle(pilot: Any) -> None:
+    """Return when what keys began is done and drawn."""
+    await pilot.app.workers.wait_for_complete()
+    await pilot.pause()
+    await pilot.pause()
+
+
+async def test_every_key_does_what_it_says() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), LinkTrouble(9.0, "nobody"))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        for number, (key, wanted) in enumerate(KEYS, 1):
+            session.wanted.clear()
+            await pilot.press(key)
+            await settle(pilot)
+            assert session.wanted == wanted, key
+            if len(pilot.app.screen_stack) > 1:
+                await pilot.press("escape")
+            assert session.touched >= number
+
+
+def test_every_key_the_console_knows_is_tried_here() -> None:
+    elsewhere = {
+        "plus",
+        "equals_sign",
+        "minus",
+        "p",
+        "tab",
+        "shift+tab",
+        "q",
+        "ctrl+c",
+        "v",
+        "question_mark",
+        "f1",
+        "e",
+    }
+    elsewhere |= {"left_square_bracket", "pageup", "right_square_bracket", "pagedown", "4", "5", "6", "7", "8", "9"}
+    known = set(ConsoleApp(WrittenSession())._bindings.key_to_bindings)  # noqa: SLF001  what the footer is made of
+    assert known - {"ctrl+q"} == {key for key, _wanted in KEYS} | elsewhere
 
 
 async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds() -> None:
     session = WrittenSession()
     screen = ConsoleApp(session)
     async with screen.run_test() as pilot:
-        await pilot.press("plus", "w", "minus", "minus", "w")
+        await pilot.press("plus", "w", "minus", "minus", "w", "equals_sign")
         assert session.wanted == [Drive(5.0, 5.0), Drive(3.0, 3.0)]
         await pilot.press(*["plus"] * 13)
         assert screen.speed_rad_s == SPEED_MOST_RAD_S
 
 
-async def test_q_quits() -> None:
+@pytest.mark.parametrize("key", ["q", "ctrl+c"])
+async def test_q_and_ctrl_c_quit(key: str) -> None:
     screen = ConsoleApp(WrittenSession())
     async with screen.run_test() as pilot:
-        await pilot.press("q")
+        await pilot.press(key)
         await pilot.pause()
         assert not screen.is_running
 
 
-async def test_leaving_the_window_stops_the_wheels() -> None:
+async def test_leaving_the_window_stops_the_wheels_and_coming_back_is_noticed() -> None:
     session = WrittenSession()
     screen = ConsoleApp(session)
     async with screen.run_test() as pilot:
         screen.post_message(AppBlur())
         await pilot.pause()
-    assert session.wanted == ["stop"]
+        assert session.wanted == ["leave"]
+        screen.post_message(AppFocus())
+        await pilot.pause()
+    assert session.touched == 1
 
 
+# ---------------------------------------------------------------------- emergency stop
+async def test_without_a_robot_of_ones_own_the_stop_is_for_the_row_the_cursor_is_on() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
+        await pilot.press("x")
+        await settle(pilot)
+        assert ("stop robot", "scout2") not in session.wanted
+        while pilot.app.chosen is not PanelName.ROBOTS:
+            await pilot.press("tab")
+        await pilot.press("right_square_bracket", "x")
+        await settle(pilot)
+    assert session.wanted[-1] == ("stop robot", "scout2")
+
+
+async def test_with_a_robot_of_ones_own_the_stop_is_for_that_one_wherever_the_cursor_is() -> None:
+    session = WrittenSession(shown=held_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("pagedown", "x")
+        await settle(pilot)
+    assert session.wanted == ["stop", ("stop robot", "scout1")]
+
+
+@pytest.mark.parametrize(("key", "said"), [("x", "scout1 did not confirm"), ("X", "not confirmed: scout2")])
+async def test_a_stop_nobody_confirmed_is_said_aloud(key: str, said: str) -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session.is_sure = False
+    async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press(key)
+        await settle(pilot)
+        await pilot.pause()
+        assert said in screen_text(pilot.app)
+
+
+async def test_all_robots_can_be_stopped_with_a_dialog_in_front() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("p", "X")
+        await settle(pilot)
+    assert "stop all" in session.wanted
+
+
+# ---------------------------------------------------------------------- robots, tables, dialogs
+async def test_the_picker_takes_the_robot_chosen_and_escape_takes_none() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("p", "escape")
+        await settle(pilot)
+        assert session.wanted == []
+        await pilot.press("p", "down", "enter")
+        await settle(pilot)
+    assert session.wanted == [("switch", "scout2")]
+
+
+async def test_tab_goes_through_all_tables_and_back() -> None:
+    screen = ConsoleApp(WrittenSession(*TEAM_EVENTS))
+    async with screen.run_test(size=SIZE) as pilot:
+        seen = []
+        for _table in PanelName:
+            seen.append(screen.chosen)
+            await pilot.press("tab")
+        assert seen == list(PanelName)
+        await pilot.press("shift+tab")
+        assert screen.chosen is PanelName.LOG
+
+
+async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        await pilot.press("right_square_bracket", "right_square_bracket")
+        panel = screen.query_one("#robots", Panel)
+        assert panel.row is not None
+        assert panel.row.subject == "scout2"
+        screen.redraw()
+        assert panel.row.subject == "scout2"
+        await pilot.press("left_square_bracket")
+        assert panel.row.subject == "scout1"
+
+
+async def test_why_is_shown_and_closed_and_drives_nothing_meanwhile() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("y")
+        await settle(pilot)
+        assert "watch1 has its minimum run time" in screen_text(pilot.app)
+        await pilot.press("w", "escape")
+        await pilot.pause()
+        assert "minimum run time" not in screen_text(pilot.app)
+    assert session.wanted == [("why", "scout1")]
+
+
+@pytest.mark.parametrize("is_sure", [True, False])
+async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> None:
+    session = WrittenSession(*TEAM_EVENTS)
+    session.is_sure = is_sure
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE, notifications=True) as pilot:
+        while screen.chosen is not PanelName.PARAMETERS:
+            await pilot.press("tab")
+        await pilot.press("e")
+        await pilot.pause()
+        screen.screen.query_one(Input).value = "25"
+        await pilot.press("enter")
+        await settle(pilot)
+        assert session.wanted == [("set", "watch1", "threshold", 25)]
+        assert ("did not take" in screen_text(screen)) is not is_sure
+
+
+def test_what_is_typed_is_json_or_the_text_itself() -> None:
+    assert [read_value(text) for text in ("1", "0.5", "true", '"a"', "a b", "[1]")] == [1, 0.5, True, "a", "a b", [1]]
+
+
+async def test_video_only_hides_everything_but_picture_and_status_and_brings_it_back() -> None:
+    session = WrittenSession(shown=held_model())
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        await pilot.press("v")
+        await pilot.pause()
+        assert not screen.query_one("#side").display
+        assert screen.query_one(Video).size.width == SIZE[0]
+        assert screen.query_one(Video).size.height == SIZE[1] - 1
+        await pilot.press("w", "v")
+        await pilot.pause()
+        assert screen.query_one("#side").display
+    assert session.wanted == [FORWARD]
+
+
+# ---------------------------------------------------------------------- the drag pad
+async def test_dragging_in_the_pad_drives_until_it_is_let_go() -> None:
+    session = WrittenSession()
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        pad = screen.query_one(DrivePad)
+        middle = (pad.region.width // 2, 1)
+        await pilot.mouse_down(pad, offset=middle)
+        await pilot.pause(0.35)
+        await pilot.mouse_up(pad, offset=middle)
+        await pilot.pause(0.2)
+    held = [one for one in session.wanted if one != "stop"]
+    assert len(held) >= 3
+    assert session.wanted[-1] == "stop"
+    drive, lasts_s = held[0]
+    assert lasts_s == STICK_LASTS_S
+    assert drive.left_rad_s == pytest.approx(drive.right_rad_s, abs=0.3)
+    assert drive.left_rad_s > 2.0
+
+
+@pytest.mark.parametrize(
+    ("forward", "right", "drive"),
+    [
+        (1, 0, Drive(4, 4)),
+        (-2, 0, Drive(-4, -4)),
+        (0, 1, Drive(2, -2)),
+        (0, 0, Drive(0, 0)),
+        (1, 1, Drive(4, 4 / 3)),
+    ],
+)
+def test_a_stick_turns_on_the_spot_or_bends_the_way_and_never_exceeds_the_speed(
+    forward: float, right: float, drive: Drive
+) -> None:
+    found = drive_by_stick(forward, right, 4.0)
+    assert (found.left_rad_s, found.right_rad_s) == pytest.approx((drive.left_rad_s, drive.right_rad_s))
+
+
+# ---------------------------------------------------------------------- profiles
 async def test_a_monitor_has_no_keys_that_drive() -> None:
     session = WrittenSession()
-    async with ConsoleApp(session, drives=False).run_test() as pilot:
-        await pilot.press("w", "space", "j", "r", "t")
+    async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
+        await pilot.press("w", "space", "j", "r", "t", "1", "p", "enter", "plus", "v")
+        assert screen_text(pilot.app)
     assert session.wanted == []
+    assert {"drive", "jump", "take", "release"} <= DRIVES
 
 
+async def test_a_pendant_drives_with_six_keys_and_knows_no_other() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    async with ConsoleApp(session, profile=Profile.PENDANT).run_test(size=(50, 20)) as pilot:
+        await pilot.press("up", "down", "left", "right", "space", "enter")
+        await pilot.press("j", "t", "r", "y", "x", "1", "p", "v", "k")
+        await settle(pilot)
+    assert session.wanted == [FORWARD, BACKWARD, LEFT, RIGHT, "stop", "take"]
+    assert len(DRIVE_KEYS) + len(PENDANT_DOES - {"drive", "quit"}) == 6
+
+
+async def test_the_pendants_key_gives_back_what_is_wanted_or_held() -> None:
+    session = WrittenSession(ASK, GRANT)
+    async with ConsoleApp(session, profile=Profile.PENDANT).run_test(size=(50, 20)) as pilot:
+        await pilot.press("enter")
+    assert session.wanted == ["release"]
+
+
+# ---------------------------------------------------------------------- the picture
 async def test_the_screen_shows_picture_holder_and_status() -> None:
-    session = WrittenSession()
+    session = WrittenSession(shown=held_model())
     session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
-    schedule = Schedule(
-        8.0, [RcView("scout1", "scout", "held", False, 1.0, [Holder("watch1-capture", 6, 5.0, 9.0)], 6, [])], [], []
-    )
-    session.model.apply(Asked(9.0, "scout1", "capture", 100))
-    session.model.apply(Granted(10.0, {"scout": "scout1"}, {"scout1": 7}, 15.0, 9.0, False))
-    session.model.apply(PictureSeen(11.9, 11.5, "scout1"))
-    session.model.apply(ScheduleHeard(11.0, schedule))
     screen = ConsoleApp(session)
-    async with screen.run_test(size=(120, 30)) as pilot:
+    async with screen.run_test(size=SIZE) as pilot:
         screen.redraw()
         await pilot.pause()
-        status = str(screen.query_one("#status", Static).render())
-        assert "you hold scout1 (epoch 7)" in status
-        assert "picture 0.5 s old" in status
+        first = screen_text(screen).splitlines()[0]
+        assert "you hold scout1 (epoch 7)" in first
+        assert "picture 0.2 s old" in first
         line = screen.query_one(Video).render_line(2)
         assert "▀" in line.text
         assert line.cell_length == screen.query_one(Video).size.width
+
+
+async def test_an_old_picture_says_so_across_the_picture() -> None:
+    session = WrittenSession(shown=held_model())
+    session.shown = np.full((30, 40), 200, np.uint8)
+    session.now_s = lambda: 20.0  # type: ignore[method-assign]
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        screen.redraw()
+        await pilot.pause()
+        video = screen.query_one(Video)
+        assert "picture is 8 s old" in video.render_line(video.size.height // 2).text
+
+
+async def test_a_robot_that_was_taken_away_says_by_whom_across_the_picture() -> None:
+    session = WrittenSession(shown=held_model())
+    session.shown = np.full((30, 40), 200, np.uint8)
+    session.model.apply(Lost(11.9, "higher", "console-2", -1.0))
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=SIZE) as pilot:
+        screen.redraw()
+        await pilot.pause()
+        video = screen.query_one(Video)
+        assert "higher by console-2" in video.render_line(video.size.height // 2).text
+
+
+# ---------------------------------------------------------------------- every screen as it was when somebody looked
+ALARMING: list[ConsoleEvent] = [
+    Attention(8.0, False),
+    LinkTrouble(9.0, "nobody answers at resource_pool/scout2"),
+    Attention(9.5, True),
+    StopHeard(11.0, STOP),
+]
+
+
+async def test_every_table_looks_as_it_did() -> None:
+    shown = held_model()
+    for event in ALARMING:
+        shown.apply(event)
+    screen = ConsoleApp(WrittenSession(shown=shown))
+    async with screen.run_test(size=SIZE) as pilot:
+        for panel in PanelName:
+            assert screen.chosen is panel
+            await pilot.pause()
+            same_as_before(screen, f"table-{panel}")
+            await pilot.press("tab")
+
+
+@pytest.mark.parametrize(
+    ("name", "profile", "size", "keys"),
+    [
+        ("attach-narrow", Profile.TERMINAL, (60, 40), []),
+        ("attach-video-only", Profile.TERMINAL, (80, 24), ["v"]),
+        ("pendant", Profile.PENDANT, (50, 20), []),
+        ("monitor", Profile.MONITOR, SIZE, []),
+        ("dialog-picker", Profile.TERMINAL, SIZE, ["p"]),
+        ("dialog-why", Profile.TERMINAL, SIZE, ["y"]),
+        ("dialog-keys", Profile.TERMINAL, (120, 46), ["question_mark"]),
+        ("dialog-parameter", Profile.TERMINAL, SIZE, [*["tab"] * 6, "e"]),
+    ],
+)
+async def test_every_screen_looks_as_it_did(
+    name: str, profile: Profile, size: tuple[int, int], keys: list[str]
+) -> None:
+    session = WrittenSession(shown=held_model())
+    session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
+    screen = ConsoleApp(session, profile=profile)
+    async with screen.run_test(size=size) as pilot:
+        for key in keys:
+            await pilot.press(key)
+        await settle(pilot)
+        screen.redraw()
+        await pilot.pause()
+        same_as_before(screen, name)

@@ -136,6 +136,13 @@ def status_text(view: ConsoleView, speed_rad_s: float | None, hint: str) -> Text
     own = view.own
     style = "bold white on red" if own.stop else "bold black on green" if own.is_held else "bold"
     parts = [Text(f" {own.status} ", style=style)]
+    if hint:
+        parts.append(Text(hint, style="bold yellow"))
+    unseen = [alarm for alarm in view.alarms if not alarm.acknowledged_by]
+    if unseen:
+        worst = ALARM_STYLES[unseen[0].severity]
+        away = sum(alarm.while_away for alarm in unseen)
+        parts.append(Text(f"{len(unseen)} alarms{f', {away} while you were away' if away else ''}", style=worst))
     if own.taken_because and not own.is_held:
         parts.append(Text(f"taken: {own.taken_because}", style="yellow"))
     if speed_rad_s is not None:
@@ -143,13 +150,6 @@ def status_text(view: ConsoleView, speed_rad_s: float | None, hint: str) -> Text
         parts += [
             _video(video.age_s, video.rate_hz, video.is_stale) for video in view.videos if video.robot == own.robot
         ]
-    unseen = [alarm for alarm in view.alarms if not alarm.acknowledged_by]
-    if unseen:
-        worst = ALARM_STYLES[unseen[0].severity]
-        away = sum(alarm.while_away for alarm in unseen)
-        parts.append(Text(f"{len(unseen)} alarms{f', {away} while you were away' if away else ''}", style=worst))
-    if hint:
-        parts.append(Text(hint, style="bold yellow"))
     return Text(" · ").join(parts)
 
 

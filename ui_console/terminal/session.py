@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import sys
-from collections.abc import Callable, Coroutine
-from typing import Any
+from collections.abc import Callable, Coroutine, Mapping
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 from textual import pilot as textual_pilot
 
+from backbone.component.messages import LifeState
 from resource_pool.arc_client import Frame
 from ui_console.console_events import ConsoleEvent
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
+from ui_console.gamepad import Gamepad, PadWish, Stick, play_gamepad
 from ui_console.observer import Observer
+from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
-from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.app import ConsoleApp, Profile
 from ui_console.terminal.hangup import HangupWatch
+from ui_console.terminal.pixels import can_show_pixels
 
 Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
 
@@ -28,10 +33,27 @@ class TerminalSession:
 
     Args:
         name: Name of the console.
+        mission: Name of the mission.
+        user: Who sits at it, for people and for the record.
+        profile: How the screen looks.
+        is_bare: True to begin with the picture alone.
+        sees: True if pictures are to come.
+        gamepad: Device to drive by, with the ranges of its stick.
     """
 
-    def __init__(self, name: str) -> None:
-        self.model = ConsoleModel(name)
+    def __init__(
+        self,
+        name: str,
+        mission: str = "",
+        user: str = "",
+        *,
+        profile: Profile = Profile.TERMINAL,
+        is_bare: bool = False,
+        sees: bool = True,
+        gamepad: tuple[Gamepad, Mapping[int, tuple[int, int]]] | None = None,
+    ) -> None:
+        self.model = ConsoleModel(name, user, TeamModel(mission), sees=sees)
+        self._profile, self._is_bare, self._gamepad = profile, is_bare, gamepad
         self._console: Observer[Any] | None = None
         self._frame: Frame | None = None
         self._picture: NDArray[np.uint8] | None = None
@@ -58,17 +80,54 @@ class TerminalSession:
             BaseException: What ended the component, if that was a bug or a refusal.
         """
         self._console = console
-        screen = ConsoleApp(self, drives=isinstance(console, Teleoperation))
+        screen = ConsoleApp(
+            self,
+            profile=self._profile if isinstance(console, Teleoperation) else Profile.MONITOR,
+            has_pixels=pilot is None and can_show_pixels(os.environ),
+            is_bare=self._is_bare,
+        )
         living = asyncio.create_task(console.run(), name="console")
         living.add_done_callback(lambda _living: screen.exit())
+        playing = asyncio.create_task(self._play_gamepad(screen), name="gamepad")
         try:
             if pilot is None:
                 await self._on_terminal(screen, console)
             else:
                 await screen.run_async(headless=True, size=size, auto_pilot=pilot)
         finally:
+            playing.cancel()
             console.end("the screen was closed")
             await living
+            await asyncio.wait({playing})
+            if not playing.cancelled():
+                playing.result()
+
+    async def _play_gamepad(self, screen: ConsoleApp) -> None:
+        if self._gamepad is None:
+            return
+        device, ranges = self._gamepad
+        await play_gamepad(
+            device,
+            Stick(ranges),
+            hold=self.hold,
+            stop=self.stop,
+            wish=lambda wish: self._begin_wish(wish, screen),
+            speed_rad_s=lambda: screen.speed_rad_s,
+        )
+
+    def _begin_wish(self, wish: PadWish, screen: ConsoleApp) -> None:
+        self.touch()
+        match wish:
+            case PadWish.JUMP:
+                self.jump()
+            case PadWish.TAKE:
+                self.take()
+            case PadWish.RELEASE:
+                self.release()
+            case PadWish.STOP_ROBOT:
+                screen.action_stop_robot()
+            case _:
+                assert_never(wish)
 
     @staticmethod
     async def _on_terminal(screen: ConsoleApp, console: Observer[Any]) -> None:
@@ -100,9 +159,9 @@ class TerminalSession:
         """Return the mission time."""
         return self._console.clock.now_s() if self._console is not None else 0.0
 
-    def hold(self, drive: Drive) -> None:
+    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
         """A drive key is down."""
-        self._with_robot(lambda console: console.hold(drive))
+        self._with_robot(lambda console: console.hold(drive, lasts_s))
 
     def stop(self) -> None:
         """Stop the wheels now."""
@@ -120,6 +179,55 @@ class TerminalSession:
         """Give the robot back."""
         self._with_robot(Teleoperation.begin_release)
 
+    async def switch(self, robot: str) -> None:
+        """Give the robot back and ask for this one."""
+        if isinstance(self._console, Teleoperation) and self._console.is_ready:
+            await self._console.switch(robot)
+
+    def touch(self) -> None:
+        """Somebody is there."""
+        self._with_robot(Teleoperation.touch)
+
+    def leave(self) -> None:
+        """Nobody is."""
+        self._with_robot(Teleoperation.leave)
+
+    def acknowledge(self, key: str) -> None:
+        """One alarm was seen, or all."""
+        seen = self.model.acknowledge(key)
+        if seen and self._console is not None and self._console.state is LifeState.READY:
+            self._console.tell("alarms", f"{self.model.user} has seen {key or f'all {seen}'}")
+
+    async def stop_robot(self, robot: str) -> bool:
+        """Emergency stop of one robot."""
+        return await self._ready_console().stop_robot(robot)
+
+    async def stop_all(self) -> list[str]:
+        """Emergency stop of all robots."""
+        return await self._ready_console().stop_all()
+
+    async def lift_stop(self, robot: str) -> bool:
+        """Let the robot move again."""
+        stop = self.model.team.stop_of(robot)
+        return stop is not None and await self._ready_console().lift_stop(stop)
+
+    async def why(self, name: str) -> list[str]:
+        """Return why it is as it is."""
+        return await self._ready_console().why(name)
+
+    async def ask_parameters(self, name: str) -> bool:
+        """Have its parameters told."""
+        return await self._ready_console().feed.ask_parameters(name)
+
+    async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
+        """Change one."""
+        return await self._ready_console().set_parameter(name, parameter, value)
+
     def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:
             act(self._console)
+
+    def _ready_console(self) -> Observer[Any]:
+        if self._console is None:
+            raise RuntimeError("the session does not run")
+        return self._console

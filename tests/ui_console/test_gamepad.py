@@ -1,0 +1,149 @@
+"""A stick drives only while the dead-man button is held, and a gamepad that is gone stops the wheels."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backbone.bus.clock import run_virtual
+from ui_console.driving import STICK_LASTS_S, Drive
+from ui_console.gamepad import (
+    ABS_X,
+    ABS_Y,
+    BTN_EAST,
+    BTN_SELECT,
+    BTN_SOUTH,
+    BTN_START,
+    BTN_TL,
+    BTN_TR,
+    BUTTONS,
+    EV_ABS,
+    EV_KEY,
+    PadWish,
+    Stick,
+    buttons_help,
+    play_gamepad,
+)
+
+RANGES = {ABS_X: (-32768, 32767), ABS_Y: (-32768, 32767)}
+
+
+@dataclass
+class Said:
+    type: int
+    code: int
+    value: int
+
+
+EVENTS = st.one_of(
+    st.builds(Said, st.just(EV_KEY), st.sampled_from([BTN_TL, BTN_TR, BTN_SOUTH, 999]), st.integers(0, 2)),
+    st.builds(Said, st.just(EV_ABS), st.sampled_from([ABS_X, ABS_Y, 5]), st.integers(-40000, 40000)),
+)
+
+
+@given(st.lists(EVENTS, max_size=40))
+def test_without_the_dead_man_button_nothing_drives_and_with_it_never_faster_than_allowed(events: list[Said]) -> None:
+    stick, held = Stick(RANGES), {BTN_TL: False, BTN_TR: False}
+    for event in events:
+        stick.feel(event)
+        if event.type == EV_KEY and event.code in held:
+            held[event.code] = bool(event.value)
+        wanted = stick.wanted(4.0)
+        assert (wanted is not None) == any(held.values())
+        if wanted is not None:
+            assert max(abs(wanted.left_rad_s), abs(wanted.right_rad_s)) <= 4.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("code", "wish"),
+    [
+        (BTN_SOUTH, PadWish.JUMP),
+        (BTN_EAST, PadWish.STOP_ROBOT),
+        (BTN_START, PadWish.TAKE),
+        (BTN_SELECT, PadWish.RELEASE),
+    ],
+)
+def test_a_button_asks_once_when_it_is_pressed(code: int, wish: PadWish) -> None:
+    stick = Stick(RANGES)
+    assert [stick.feel(Said(EV_KEY, code, value)) for value in (1, 2, 0)] == [wish, None, None]
+
+
+def test_a_stick_that_rests_beside_its_middle_stands_still() -> None:
+    stick = Stick(RANGES)
+    for event in (Said(EV_KEY, BTN_TL, 1), Said(EV_ABS, ABS_Y, -2000), Said(EV_ABS, ABS_X, 3000)):
+        stick.feel(event)
+    assert stick.wanted(4.0) == Drive(0.0, 0.0)
+
+
+def test_up_is_forward_and_right_turns_right() -> None:
+    stick = Stick(RANGES)
+    for event in (Said(EV_KEY, BTN_TR, 1), Said(EV_ABS, ABS_Y, -32768)):
+        stick.feel(event)
+    assert stick.wanted(4.0) == Drive(4.0, 4.0)
+    stick.feel(Said(EV_ABS, ABS_X, 32767))
+    wanted = stick.wanted(4.0)
+    assert wanted is not None
+    assert wanted.left_rad_s > wanted.right_rad_s
+
+
+class PlayedGamepad:
+    """Says what it is told to, then is unplugged, or hangs."""
+
+    def __init__(self, script: list[tuple[float, Said]], *, unplugged: bool) -> None:
+        self.script, self.unplugged = script, unplugged
+
+    async def async_read_loop(self) -> AsyncIterator[Said]:
+        for pause_s, event in self.script:
+            await asyncio.sleep(pause_s)
+            yield event
+        if self.unplugged:
+            raise OSError(19, "No such device")
+        await asyncio.Event().wait()
+
+
+def play(script: list[tuple[float, Said]], *, unplugged: bool, for_s: float) -> list[Any]:
+    said: list[Any] = []
+
+    async def main() -> None:
+        device = PlayedGamepad(script, unplugged=unplugged)
+        playing = asyncio.create_task(
+            play_gamepad(
+                device,
+                Stick(RANGES),
+                hold=lambda drive, lasts_s: said.append((drive, lasts_s)),
+                stop=lambda: said.append("stop"),
+                wish=said.append,
+                speed_rad_s=lambda: 4.0,
+            )
+        )
+        await asyncio.sleep(for_s)
+        assert playing.done() is unplugged
+        playing.cancel()
+        await asyncio.gather(playing, return_exceptions=True)
+
+    run_virtual(main())
+    return said
+
+
+def test_what_is_held_is_said_again_until_it_is_let_go() -> None:
+    held = [(0.0, Said(EV_ABS, ABS_Y, -32768)), (0.0, Said(EV_KEY, BTN_TL, 1)), (1.0, Said(EV_KEY, BTN_TL, 0))]
+    said = play(held, unplugged=False, for_s=3.0)
+    assert said[-1] == "stop"
+    assert set(said[:-1]) == {(Drive(4.0, 4.0), STICK_LASTS_S)}
+    assert 9 <= len(said[:-1]) <= 13
+
+
+def test_a_gamepad_that_is_gone_while_it_is_held_stops_the_wheels() -> None:
+    said = play([(0.0, Said(EV_KEY, BTN_TL, 1)), (0.5, Said(EV_KEY, BTN_SOUTH, 1))], unplugged=True, for_s=3.0)
+    assert said[-1] == "stop"
+    assert PadWish.JUMP in said
+
+
+def test_the_help_names_every_button() -> None:
+    assert len(buttons_help()) == 1 + len(BUTTONS)

@@ -1,0 +1,221 @@
+"""Widgets of the terminal console; what they show is worked out elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.style import Style
+from rich.text import Text
+from textual import events
+from textual.message import Message
+from textual.strip import Strip
+from textual.widget import Widget
+from textual.widgets import Static
+
+from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.terminal.lines import Row
+from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
+from ui_console.terminal.video import fit, row_segments, shrink
+
+SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``
+CURSOR = Style(reverse=True)
+OLD = Style(bold=True, color="white", bgcolor="red")
+
+
+class Video(Widget):
+    """The newest picture, as large as fits; an old one is dark and says so, for it must not look alive.
+
+    Args:
+        newest: Returns the newest picture, grey levels, shape (height, width), or None.
+        has_pixels: True if the terminal shows real pixels.
+    """
+
+    def __init__(self, newest: Callable[[], NDArray[np.uint8] | None], *, has_pixels: bool = False) -> None:
+        super().__init__(id="video")
+        self._newest, self._has_pixels = newest, has_pixels
+        self._shown: NDArray[np.uint8] | None = None
+        self._steps: NDArray[np.uint8] | None = None
+        self._remark = ""
+
+    def look(self, remark: str = "") -> None:
+        """Take the newest picture; redraw if there is anything new.
+
+        Args:
+            remark: Why what is shown is not to be driven by; empty: it is.
+        """
+        picture = self._newest()
+        if self.size.width == 0 or self.size.height == 0:
+            return
+        if picture is None:
+            if self._shown is not None or remark != self._remark:
+                self._shown, self._steps, self._remark = None, None, remark
+                self.refresh()
+            return
+        columns, rows = self._cells(picture)
+        fits = self._steps is not None and self._steps.shape == (2 * rows, columns)
+        if picture is self._shown and fits and remark == self._remark:
+            return
+        self._shown, self._remark = picture, remark
+        steps = shrink(picture, columns, rows)
+        self._steps = steps // 3 if remark else steps
+        self.refresh()
+
+    def render_line(self, y: int) -> Strip:
+        """Return one row of cells."""
+        if self._remark and y == self.size.height // 2:
+            return Strip([*Text(self._remark.center(self.size.width), OLD).render(self.app.console, end="")]).crop(
+                0, self.size.width
+            )
+        if self._steps is None or self._shown is None or 2 * y >= len(self._steps):
+            return Strip.blank(self.size.width)
+        if not self._has_pixels or self._remark:
+            return Strip(row_segments(self._steps, y)).adjust_cell_length(self.size.width)
+        rows, columns = len(self._steps) // 2, self._steps.shape[1]
+        cells = Strip([row_of_cells(y, columns)], columns).adjust_cell_length(self.size.width)
+        return Strip([send(self._shown, columns, rows), *cells], self.size.width) if y == 0 else cells
+
+    def _cells(self, picture: NDArray[np.uint8]) -> tuple[int, int]:
+        most_rows = min(self.size.height, MOST_ROWS) if self._has_pixels else self.size.height
+        return fit(picture.shape[1], picture.shape[0], self.size.width, most_rows)
+
+
+class Panel(Static):
+    """Rows, one of which the cursor is on.
+
+    Args:
+        name: What is above it, and its id.
+        most_lines: As high as it grows; 0: as high as there is room.
+    """
+
+    def __init__(self, name: str, *, most_lines: int = 0) -> None:
+        super().__init__(id=name, classes="panel")
+        self.border_title = name
+        self._most_lines = most_lines
+        self._rows: Sequence[Row] = ()
+        self._key = ""
+        self._is_chosen = False
+        self._drawn: Text | None = None
+
+    @property
+    def row(self) -> Row | None:
+        """The row the cursor is on."""
+        return next((row for row in self._rows if row.key == self._key), self._rows[0] if self._rows else None)
+
+    def show_rows(self, rows: Sequence[Row], *, is_chosen: bool, nothing: str) -> None:
+        """Show these rows; the cursor stays where it was, if that is still there.
+
+        Args:
+            rows: From top to bottom.
+            is_chosen: True: the keys for rows mean this panel.
+            nothing: What to say if there are none.
+        """
+        self._rows, self._is_chosen = rows, is_chosen
+        self._draw(nothing)
+
+    def move(self, steps: int) -> None:
+        """Move the cursor down, or up for negative steps, within the rows."""
+        if not self._rows:
+            return
+        keys = [row.key for row in self._rows]
+        at = keys.index(self._key) if self._key in keys else 0
+        self._key = keys[min(max(0, at + steps), len(keys) - 1)]
+        self._draw("")
+
+    def _draw(self, nothing: str) -> None:
+        here = self.row
+        shown: list[Text] = []
+        offset = 0
+        room = self._most_lines or max(1, self.content_size.height)
+        for row in self._rows:
+            text = row.text.copy()
+            if self._is_chosen and here is not None and row.key == here.key:
+                text.stylize(CURSOR, 0, len(text.plain.partition("\n")[0]))
+                above = sum(one.plain.count("\n") + 1 for one in shown)
+                offset = max(0, above + text.plain.count("\n") + 1 - room)
+            shown.append(text)
+        lines = Text("\n").join(shown).split("\n", allow_blank=True)[offset:] if shown else []
+        drawn = Text("\n").join(lines) if shown else Text(nothing, style="dim")
+        if drawn != self._drawn or drawn.spans != (self._drawn.spans if self._drawn else None):
+            self._drawn = drawn
+            self.update(drawn)
+
+
+class DrivePad(Widget):
+    """A square to drag in with the mouse: farther up is faster, sideways turns; letting go stops the wheels.
+
+    The only control of a terminal that tells when it is let go, apart from a gamepad.
+
+    Args:
+        speed_rad_s: Returns the speed at the upper edge.
+    """
+
+    class Held(Message):
+        """It is being dragged; said again every ``SAY_EVERY_S``."""
+
+        def __init__(self, drive: Drive) -> None:
+            super().__init__()
+            self.drive, self.lasts_s = drive, STICK_LASTS_S
+
+    class LetGo(Message):
+        """It was let go."""
+
+    def __init__(self, speed_rad_s: Callable[[], float]) -> None:
+        super().__init__(id="pad")
+        self._speed_rad_s = speed_rad_s
+        self._at: tuple[float, float] | None = None
+
+    def on_mount(self) -> None:
+        """Say again and again what is wanted while it is held."""
+        self.border_title = "drag to drive"
+        self.set_interval(SAY_EVERY_S, self._say)
+
+    def on_mouse_down(self, event: events.MouseDown) -> None:
+        """Begin to drive."""
+        self.capture_mouse()
+        self._drag(event)
+
+    def on_mouse_move(self, event: events.MouseMove) -> None:
+        """Drive another way."""
+        if self._at is not None:
+            self._drag(event)
+
+    def on_mouse_up(self, _event: events.MouseUp) -> None:
+        """Stop."""
+        self.release_mouse()
+        self._let_go()
+
+    def on_mouse_release(self, _event: events.MouseRelease) -> None:
+        """Stop: the mouse went to somebody else."""
+        self._let_go()
+
+    def render_line(self, y: int) -> Strip:
+        """Return one row: a cross, and where it is held."""
+        width, height = self.size.width, self.size.height
+        cells = ["│" if column == width // 2 else "─" if y == height // 2 else " " for column in range(width)]
+        if self._at is not None:
+            forward, right = self._at
+            row = round((1 - forward) / 2 * (height - 1))
+            column = round((1 + right) / 2 * (width - 1))
+            if y == row:
+                cells[column] = "●"
+        return Strip([*Text("".join(cells)).render(self.app.console, end="")], width)
+
+    def _drag(self, event: events.MouseEvent) -> None:
+        half_width, half_height = max(1, self.size.width - 1) / 2, max(1, self.size.height - 1) / 2
+        forward = min(max(1 - event.y / half_height, -1.0), 1.0)
+        right = min(max(event.x / half_width - 1, -1.0), 1.0)
+        self._at = forward, right
+        self.refresh()
+        self._say()
+
+    def _say(self) -> None:
+        if self._at is not None:
+            self.post_message(self.Held(drive_by_stick(*self._at, self._speed_rad_s())))
+
+    def _let_go(self) -> None:
+        if self._at is not None:
+            self._at = None
+            self.refresh()
+            self.post_message(self.LetGo())
