@@ -24,7 +24,6 @@ Source: RAM 2002, "The RC Scheduler", last paragraph.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import assert_never
@@ -34,6 +33,7 @@ import msgspec
 from backbone.rc_manager import trace
 from backbone.rc_manager.alternatives import choose
 from backbone.rc_manager.attributes import attributes
+from backbone.rc_manager.chronicle import Chronicle
 from backbone.rc_manager.decisions import (
     Adopted,
     CapacityChanged,
@@ -76,13 +76,12 @@ from backbone.rc_manager.messages import (
     Why,
 )
 from backbone.rc_manager.plan import Turn
-from backbone.rc_manager.priority import CONSOLE, PriorityTree, carried, higher
+from backbone.rc_manager.priority import PriorityTree, carried, higher
 from backbone.rc_manager.rules import ROUNDING, SchedulingRules
 from backbone.rc_manager.table import EXACT_UP_TO
 
 RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
 NOT_EXPECTED_S = -1.0
-STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken invariant
 
 
 class ScheduleManager:
@@ -122,12 +121,9 @@ class ScheduleManager:
         self._count = 0
         self._told: list[Instruction] = []
         self._wake_s: float | None = None
-        self._traced_rcs: set[str] = set()
-        self._traced_nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
-        self._node_ids: dict[tuple[str, ...], str] = {}
         self._replaced_by: dict[str, Requested] = {}
         self._retrying: dict[str, ArcEntry] = {}
-        self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
+        self._chronicle = Chronicle(self._tell)
 
     # Events in, instructions out.
 
@@ -219,7 +215,9 @@ class ScheduleManager:
         arc.began_s = self._now_s
         self._enter(arc, RequestState.CONNECTING)
         self._renew_if_ranks_changed(arc)
-        self._record(trace.connect(self._now_s, arc.name, arc.epochs), "it is next, and all its RCs are free (rule 3)")
+        self._chronicle.record(
+            trace.connect(self._now_s, arc.name, arc.epochs), "it is next, and all its RCs are free (rule 3)"
+        )
         self._tell(ConnectArc(arc.name, dict(arc.epochs), arc.settle_s, self._now_s + arc.length_s, self._ranks(arc)))
 
     def _renew_if_ranks_changed(self, arc: ArcEntry) -> None:
@@ -255,7 +253,7 @@ class ScheduleManager:
                     self._told[place] = replace(told, expected_s=start_s + arc.settle_s)
 
     def _swap_out(self, arc: ArcEntry, why: str, by: str) -> None:
-        self._record(trace.revoke(self._now_s, arc.name, why, by), _because(why, by))
+        self._chronicle.record(trace.revoke(self._now_s, arc.name, why, by), _because(why, by))
         if arc.served(self._now_s):
             arc.stamp = (self._now_s, self._next())
         arc.swapped_out, arc.swapped_out_by = why, by
@@ -273,9 +271,9 @@ class ScheduleManager:
         newest = {rc: epoch for rc, epoch in arc.epochs.items() if epoch > self._table.rcs[rc].granted_epoch}
         for rc, epoch in newest.items():
             self._table.rcs[rc].granted_epoch = epoch
-        self._record(trace.grant(self._now_s, arc.name, newest), "its RCs have settled")
+        self._chronicle.record(trace.grant(self._now_s, arc.name, newest), "its RCs have settled")
         if self._rules.grid_s:
-            self._record(trace.extend(self._now_s, name, arc.end_s), "slices end on a common grid (rule 15)")
+            self._chronicle.record(trace.extend(self._now_s, name, arc.end_s), "slices end on a common grid (rule 15)")
 
     def _open_failed(self, name: str, rc: str) -> None:
         self._rc_down(rc, lost_by=name)
@@ -285,7 +283,9 @@ class ScheduleManager:
         if rc in arc.uses:
             self._swap_out(arc, "rc", rc)
         else:
-            self._record(trace.about("idle", self._now_s, name), f"it could not open its gate; again in {RETRY_S:g} s")
+            self._chronicle.record(
+                trace.about("idle", self._now_s, name), f"it could not open its gate; again in {RETRY_S:g} s"
+            )
             self._swap_out(arc, "failed", "")
             arc.afterwards = Afterwards.IDLE
             arc.retry_s = self._now_s + RETRY_S
@@ -297,7 +297,7 @@ class ScheduleManager:
         if arc is None or arc.state is not RequestState.REVOKING:
             return
         arc.epochs = {}
-        self._record(trace.about("free", self._now_s, name), "its RCs are in their safe states")
+        self._chronicle.record(trace.about("free", self._now_s, name), "its RCs are in their safe states")
         match arc.afterwards:
             case Afterwards.WAIT:
                 self._enter(arc, RequestState.WAITING)
@@ -342,12 +342,12 @@ class ScheduleManager:
     def _add(self, event: Requested) -> ArcEntry:
         request = event.request
         for rc in event.rcs:
-            self._introduce(rc)
+            self._chronicle.introduce_rc(self._table.rcs[rc], self._now_s)
         place_in_tree = self._note_nodes(request)
         uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
         arc = self._table.make_arc(request, uses, place_in_tree, path, self._now_s)
         arc.maximum_s = max(arc.maximum_s, self._longest_s(arc.minimum_s))
-        self._record(self._request_line(arc), f"asked by {request.owner}")
+        self._chronicle.record_request(arc, self._now_s)
         if not request.idle:
             self._queue(arc)
         return arc
@@ -355,23 +355,6 @@ class ScheduleManager:
     def _longest_s(self, minimum_s: float) -> float:
         """Return the longest slice of this minimum run time that is not extended on request."""
         return minimum_s + self._rules.grid_s
-
-    def _request_line(self, arc: ArcEntry) -> trace.Line:
-        name, number = arc.path[-1]
-        owner = (
-            trace.console_owner(name.removeprefix(CONSOLE), number)
-            if name.startswith(CONSOLE)
-            else self._node_id(arc.place_in_tree)
-        )
-        return trace.request(
-            self._now_s,
-            arc.name,
-            owner,
-            minimum_s=arc.minimum_s,
-            maximum_s=arc.maximum_s,
-            uses=arc.uses,
-            idle=arc.request.idle,
-        )
 
     def _queue(self, arc: ArcEntry) -> None:
         """Let it wait as one who just came."""
@@ -381,7 +364,7 @@ class ScheduleManager:
         self._enter(arc, RequestState.WAITING)
         if not self._relaxed and len(self._table.group_of(arc)) > self._exact_up_to:
             self._relaxed = True
-            self._record(self._meta(), "a group is too big to be planned whole")
+            self._chronicle.record(self._meta(), "a group is too big to be planned whole")
 
     def _adopted(self, event: Adopted) -> None:
         """Let an ARC run on that an earlier RC manager granted its RCs.
@@ -406,8 +389,8 @@ class ScheduleManager:
             entry.epoch = max(entry.epoch, epoch)
             entry.granted_epoch = max(entry.granted_epoch, epoch)
         why = "it held its RCs when this RC manager started"
-        self._record(trace.connect(self._now_s, arc.name, arc.epochs), why)
-        self._record(trace.grant(self._now_s, arc.name, arc.epochs), why)
+        self._chronicle.record(trace.connect(self._now_s, arc.name, arc.epochs), why)
+        self._chronicle.record(trace.grant(self._now_s, arc.name, arc.epochs), why)
         arc.turns = 1
         arc.began_s = arc.granted_s = event.granted_s
         self._enter(arc, RequestState.RUNNING)
@@ -421,7 +404,7 @@ class ScheduleManager:
         if arc.state is RequestState.REVOKING and arc.afterwards is Afterwards.IDLE:
             arc.afterwards = Afterwards.WANT
         elif arc.state is RequestState.IDLE:
-            self._record(trace.about("want", self._now_s, name), "it wants time again")
+            self._chronicle.record(trace.about("want", self._now_s, name), "it wants time again")
             self._queue(arc)
 
     def _idled(self, name: str) -> None:
@@ -432,12 +415,12 @@ class ScheduleManager:
         arc.retry_s = None
         if arc.state is RequestState.REVOKING:
             if arc.afterwards is Afterwards.WAIT:
-                self._record(trace.about("idle", self._now_s, name), "it wants no time now")
+                self._chronicle.record(trace.about("idle", self._now_s, name), "it wants no time now")
             if arc.afterwards is not Afterwards.GONE:
                 arc.afterwards = Afterwards.IDLE
                 self._table.touch(arc)
         elif arc.state is not RequestState.IDLE:
-            self._record(trace.about("idle", self._now_s, name), "it wants no time now")
+            self._chronicle.record(trace.about("idle", self._now_s, name), "it wants no time now")
             if arc.state is RequestState.WAITING:
                 arc.pledge = None
                 self._enter(arc, RequestState.IDLE)
@@ -456,7 +439,7 @@ class ScheduleManager:
         arc = self._table.arcs.get(name)
         if arc is None or (arc.holds and arc.afterwards is Afterwards.GONE):
             return
-        self._record(trace.about("depart", self._now_s, name), _because(why, ""))
+        self._chronicle.record(trace.about("depart", self._now_s, name), _because(why, ""))
         if not arc.holds:
             self._forget(arc)
         elif arc.state is RequestState.REVOKING:
@@ -474,7 +457,7 @@ class ScheduleManager:
             return  # no slice can be planned for such times; the old ones hold on
         arc.minimum_s, arc.maximum_s = minimum_s, maximum_s
         self._table.touch(arc)
-        self._record(trace.runtime(self._now_s, name, minimum_s, maximum_s), "from the next slice on")
+        self._chronicle.record(trace.runtime(self._now_s, name, minimum_s, maximum_s), "from the next slice on")
 
     def _extended(self, name: str, until_s: float) -> None:
         arc = self._table.arcs.get(name)
@@ -483,7 +466,7 @@ class ScheduleManager:
         until_s = min(until_s, arc.granted_s + arc.maximum_s)
         if until_s > arc.end_s:
             self._table.end_at(arc, until_s)
-            self._record(trace.extend(self._now_s, name, until_s), "it asked to go on (rule 14)")
+            self._chronicle.record(trace.extend(self._now_s, name, until_s), "it asked to go on (rule 14)")
 
     def _retry(self) -> None:
         for arc in [*self._retrying.values()]:
@@ -499,7 +482,7 @@ class ScheduleManager:
         names, renumbered = self._tree.place(request.path, console=request.console)
         if renumbered:
             self._renumber()
-        self._introduce_nodes(names)
+        self._chronicle.introduce_nodes(self._tree.path(names), self._now_s)
         return names
 
     def _priority_changed(self, node: str, priority: int) -> None:
@@ -510,17 +493,15 @@ class ScheduleManager:
         if self._tree.obstacle(node, parent):
             return
         old, new = self._tree.move(node, parent)
-        # In the trace a node keeps the id under which it came, wherever it stands later.
-        self._node_ids = {carried(way, old, new): self._node_id(way) for way in self._traced_nodes}
-        self._traced_nodes = {carried(way, old, new): told for way, told in self._traced_nodes.items()}
+        self._chronicle.nodes_moved(old, new)
         for arc in self._table.arcs.values():
             arc.place_in_tree = carried(arc.place_in_tree, old, new)
         self._priorities_changed()
 
     def _priorities_changed(self) -> None:
         self._renumber()
-        for names in [*self._traced_nodes]:
-            self._introduce_nodes(names)
+        for names in self._chronicle.nodes():
+            self._chronicle.introduce_nodes(self._tree.path(names), self._now_s)
         for rc in self._table.rcs.values():
             for holder in self._table.overloading(rc.name) if rc.sharable else ():
                 self._revoke(holder, "order", rc.name)
@@ -549,21 +530,6 @@ class ScheduleManager:
             arc.path = self._tree.path(arc.place_in_tree)
         self._table.priorities_changed()
 
-    def _introduce_nodes(self, names: tuple[str, ...]) -> None:
-        """Bring new nodes, new numbers and new parents on this way into the trace, parents first."""
-        for depth, (name, number) in enumerate(self._tree.path(names), start=1):
-            way = names[:depth]
-            parent = self._node_id(way[:-1]) if depth > 1 else None
-            told = self._traced_nodes.get(way)
-            self._traced_nodes[way] = (parent, number)
-            if told == (parent, number) or (told is None and name.startswith(CONSOLE)):
-                continue  # the request tells a console's first number
-            why = "its parent" if told is not None and told[0] != parent else "its number among its siblings"
-            self._record(trace.node(self._now_s, self._node_id(way), parent, number), why)
-
-    def _node_id(self, names: tuple[str, ...]) -> str:
-        return self._node_ids.get(names, "/".join(names))
-
     # RCs.
 
     def _rc_known(self, event: RcKnown) -> None:
@@ -582,32 +548,13 @@ class ScheduleManager:
                 )
             )
             if event.up:
-                self._introduce(event.rc)
+                self._chronicle.introduce_rc(self._table.rcs[event.rc], self._now_s)
             return
         if event.up:
             self._rc_up(event.rc, event.last_epoch)
         else:
             self._rc_down(event.rc)
         self._capacity_changed(event.rc, event.capacity)
-
-    def _introduce(self, name: str) -> None:
-        """Bring the RC into the trace: when it is up for the first time, or asked for before."""
-        if name in self._traced_rcs:
-            return
-        self._traced_rcs.add(name)
-        rc = self._table.rcs[name]
-        self._record(
-            trace.rc(
-                self._now_s,
-                name,
-                sharable=rc.sharable,
-                capacity=rc.capacity,
-                connect_s=rc.connect_s,
-                disconnect_s=rc.disconnect_s,
-            )
-        )
-        if not rc.up:
-            self._record(trace.rc_state(self._now_s, name, up=False), "not started yet")
 
     def _rc_down(self, name: str, lost_by: str = "") -> None:
         """Take note that the RC does not answer; its holders lose all their RCs, ``lost_by`` has lost them already."""
@@ -617,7 +564,7 @@ class ScheduleManager:
         rc.up = False
         rc.failed = True
         self._table.rc_changed(name)
-        self._record(trace.rc_state(self._now_s, name, up=False), "it does not answer")
+        self._chronicle.record(trace.rc_state(self._now_s, name, up=False), "it does not answer")
         for arc in [*self._table.arcs.values()]:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
                 self._revoke(arc, "rc", name)
@@ -634,9 +581,9 @@ class ScheduleManager:
         rc.up = True
         rc.failed = False
         self._table.rc_changed(name)
-        if name in self._traced_rcs:
-            self._record(trace.rc_state(self._now_s, name, up=True), "it answers")
-        self._introduce(name)
+        if self._chronicle.has_introduced(name):
+            self._chronicle.record(trace.rc_state(self._now_s, name, up=True), "it answers")
+        self._chronicle.introduce_rc(rc, self._now_s)
 
     def _capacity_changed(self, name: str, capacity: float) -> None:
         rc = self._table.rcs.get(name)
@@ -644,8 +591,8 @@ class ScheduleManager:
             return
         rc.capacity = capacity
         self._table.rc_changed(name)
-        if name in self._traced_rcs:
-            self._record(trace.rc_capacity(self._now_s, name, capacity))
+        if self._chronicle.has_introduced(name):
+            self._chronicle.record(trace.rc_capacity(self._now_s, name, capacity))
         for holder in self._table.overloading(name):
             self._revoke(holder, "capacity", name)
 
@@ -756,7 +703,7 @@ class ScheduleManager:
         if kept:
             return
         names = {arc.name for arc in whom}
-        story = [line for line in self._story if not names or line.get("arc", line.get("id")) in names]
+        story = self._chronicle.story_of(names)
         raise AssertionError("\n".join([f"broken at {self._now_s}: {what}", *map(str, story)]))
 
     # Bookkeeping.
@@ -775,10 +722,6 @@ class ScheduleManager:
 
     def _tell(self, instruction: Instruction) -> None:
         self._told.append(instruction)
-
-    def _record(self, line: trace.Line, cause: str = "") -> None:
-        self._story.append(line)
-        self._tell(Record(line, cause))
 
     def _set_alarm(self, *, rang: bool) -> None:
         """Ask to be woken when the next decision can be due without an event."""
