@@ -100,6 +100,7 @@ class Camera:
         self._memo: OrderedDict[bytes, NDArray[np.uint8]] = OrderedDict()
         self._memo_pictures = memo_pictures
         self._drawn = 0
+        self._shown: NDArray[np.float64] | None = None
         self._length = mujoco.mj_stateSize(self._model, STATE)
         state = np.empty(self._length)
         mujoco.mj_getState(self._model, self._data, state, STATE)
@@ -131,6 +132,9 @@ class Camera:
             raise StateMismatch(f"a state of shape {state.shape}, this world's have {self._length} numbers")
         # Adding zero makes the negative zero, whose bits differ, an ordinary one.
         rounded = np.round(state, _STATE_DECIMALS) + 0.0
+        if self._shown is not None and np.array_equal(rounded, self._shown):
+            return
+        self._shown = rounded
         mujoco.mj_setState(self._model, self._data, rounded, STATE)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
