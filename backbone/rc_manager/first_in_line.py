@@ -57,7 +57,8 @@ class FirstInLine:
                 continue
             if self._takes_from_others(arc, now_s) or table.must_let_higher_go_first(arc):
                 continue
-            if not table.fits(arc, [one for one in holders if table.stands_until_s(one, arc, now_s) > now_s]):
+            staying = [one for one in holders if table.stands_until_s(one, arc, now_s) > now_s + INSTANT_S]
+            if not table.fits(arc, staying):
                 continue  # one by one they would let it in, but not together
             in_the_way = table.in_the_way(arc, [], holders, now_s)
             if in_the_way or table.fits(arc, holders):

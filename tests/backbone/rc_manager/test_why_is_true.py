@@ -93,6 +93,11 @@ def test_without_those_that_why_names_a_waiting_arc_is_granted_after_one_hand_ov
     assert untrue(60, rules) == []
 
 
+def test_beside_others_a_slice_that_is_over_but_for_rounding_is_over() -> None:
+    """Something happened at 14.25 s, when a slice ended at 14.250000000000002 s: nobody looked again."""
+    assert granted_without_blockers(252, {"exact_up_to": 0}) is None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("rules", RULES, ids=str)
 def test_without_those_that_why_names_each_of_a_thousand_is_granted(rules: dict[str, Any]) -> None:
