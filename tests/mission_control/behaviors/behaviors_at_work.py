@@ -7,6 +7,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
@@ -22,6 +24,17 @@ from ui_console.teleoperation import Teleoperation
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 PEOPLE = 100  # a console's priority above every mission of these tests
 Hands = Callable[[Teleoperation], Awaitable[None]]
+
+
+def filmed_at(mission: MissionDescription, frame_rate_hz: float) -> MissionDescription:
+    """Return the mission with so many pictures a second, for behaviors that need no more."""
+    grabbers = [
+        msgspec.structs.replace(resource, parameters={**resource.parameters, "frame_rate_hz": frame_rate_hz})
+        if resource.type == "framegrabber"
+        else resource
+        for resource in mission.resources
+    ]
+    return mission.model_copy(update={"resources": tuple(grabbers)})
 
 
 def example(*behaviors: str, **parameters: Any) -> MissionDescription:

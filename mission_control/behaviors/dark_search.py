@@ -1,0 +1,268 @@
+"""Dark search: look around for the darkest direction, go there a little, look again; stop where it is dark all around.
+
+Rules of this file: no bus, no clock. Pictures and mission time go in, motions come out.
+
+A Scout has no odometry: directions count from where it began to look around, by the turn it was told to make, and are
+forgotten with the next look around. A view kept from before an interruption tells whether the robot still stands where
+it stood; if so it goes on, otherwise it looks around anew.
+
+Source: the behaviors that RAM 2002, "Visual Servoing", reports as earlier work: they navigated by patches of light and
+dark. Numbers: chosen in simulated rooms with a dark corner and with a table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mission_control.behaviors.motion import STILL, Motion, turned
+
+Picture = NDArray[np.uint8]
+
+TURN_RAD_S = 0.8  # chosen: a look around takes eight seconds
+SECTORS = 18  # chosen: 20 degrees, half of what the camera sees
+NEAREST_M, FARTHEST_M = 0.25, 2.0  # chosen: the floor between them fills 40 of 240 rows
+NEAR_ROWS = 0.12  # chosen: the lowest rows show the floor 15 to 20 cm before the robot
+AHEAD_COLUMNS = (1 / 3, 2 / 3)  # chosen: 13 degrees, less than a sector
+HORIZON, CAMERA_HEIGHT = 150.2 / 240, 11.4 / 240  # the Scout's camera: rows of the horizon and of a meter's floor
+ALL_AROUND = 0.75  # chosen: legs of furniture and the way out may look bright
+IN_M, BACK_M = 0.35, 0.12  # chosen: three bodies into the dark; a body's length away from what it may have run into
+CERTAIN_PICTURES = 4  # chosen: torn pictures come two or three in a row
+CHOICES = 4  # chosen: what looks darkest from afar is often a shadow line; then others get their turn
+BARRED_RAD = math.radians(60.0)  # chosen: no way back to where it just came from
+LONGEST_STEP_S = 0.2  # chosen: between pictures that are further apart the robot may have stood still
+SAME_VIEW, VIEW_COLUMNS, VIEW_ROWS = 9.0, 40, 15  # chosen: grey levels between views of 8 by 16 pixels
+SHIFTS = 8  # chosen: columns of such a view, 8 degrees; a robot that was stopped in a turn runs on less than that
+COMPARED = 10  # chosen: the first pictures after a switch roll
+
+
+class Stage(StrEnum):
+    """What the search does."""
+
+    LOOK = "looks around"
+    TURN = "turns to where it looked darkest"
+    GO = "goes there"
+    ENTER = "goes into the dark"
+    BACK = "backs off a little"
+    FACE_OUT = "turns to look out"
+    HIDDEN = "is hidden"
+    FAILED = "found no dark place"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Glimpse:
+    """What a picture says about light.
+
+    Attributes:
+        ahead: Mean brightness straight ahead, near and far counting alike, 0 to 255.
+        ground: Mean brightness of the floor right before the robot.
+        view: The picture in coarse blocks, shape (``VIEW_ROWS``, ``VIEW_COLUMNS``).
+    """
+
+    ahead: float
+    ground: float
+    view: NDArray[np.float32]
+
+
+def glimpse(picture: Picture) -> Glimpse:
+    """Return what a picture says about light.
+
+    Args:
+        picture: Grey levels 0 to 255, shape (height, width), row 0 on top; at least 15 by 40 pixels.
+
+    Raises:
+        ValueError: It has another shape.
+    """
+    if picture.ndim != 2 or picture.shape[0] < VIEW_ROWS or picture.shape[1] < VIEW_COLUMNS:
+        raise ValueError(f"a grey picture of at least {VIEW_COLUMNS} by {VIEW_ROWS} pixels, not {picture.shape}")
+    height, width = picture.shape
+    middle = picture[:, round(AHEAD_COLUMNS[0] * width) : round(AHEAD_COLUMNS[1] * width)]
+    distances_m = np.linspace(NEAREST_M, FARTHEST_M, 15)
+    rows = np.minimum(((HORIZON + CAMERA_HEIGHT / distances_m) * height).astype(int), height - 1)
+    ahead = (float(middle.mean()) + float(middle[rows].mean())) / 2
+    ground = float(picture[-max(1, round(NEAR_ROWS * height)) :].mean())
+    tall, wide = height // VIEW_ROWS, width // VIEW_COLUMNS
+    blocks = picture[: tall * VIEW_ROWS, : wide * VIEW_COLUMNS].reshape(VIEW_ROWS, tall, VIEW_COLUMNS, wide)
+    return Glimpse(ahead, ground, blocks.mean(axis=(1, 3), dtype=np.float32))
+
+
+def is_same_view(before: NDArray[np.float32], now: NDArray[np.float32]) -> bool:
+    """Return True if both may have been taken from one place, the robot having turned a few degrees at most."""
+    width = before.shape[1]
+    for shift in range(-SHIFTS, SHIFTS + 1):
+        here = before[:, max(0, shift) : width + min(0, shift)]
+        there = now[:, max(0, -shift) : width - max(0, shift)]
+        if float(np.abs(here - there).mean()) < SAME_VIEW:
+            return True
+    return False
+
+
+class DarkSearch:
+    """The state of a search.
+
+    Args:
+        dark_level: Floor darker than this is dark, 0 to 255.
+        leg_m: So far it goes before it looks around again.
+        speed_m_s: On the way.
+        looks: After so many looks around it gives up; 0: never.
+    """
+
+    def __init__(self, *, dark_level: float, leg_m: float, speed_m_s: float, looks: int) -> None:
+        self._dark_level, self._leg_m, self._speed_m_s, self._most_looks = dark_level, leg_m, speed_m_s, looks
+        self._stage = Stage.LOOK
+        self._looks = 0
+        self._left = 0.0  # of the stage: radians to turn or meters to go
+        self._turned_rad = 0.0  # since the look around began
+        self._seen: list[tuple[float, float, float]] = []
+        self._barred_rad: float | None = None
+        self._dark_pictures = 0
+        self._decided_s: float | None = None
+        self._last = STILL
+        self._view: NDArray[np.float32] | None = None
+        self._to_compare = 0
+        self._begin_look()
+
+    @property
+    def stage(self) -> Stage:
+        """What it does."""
+        return self._stage
+
+    @property
+    def looks(self) -> int:
+        """How often it has looked all around."""
+        return self._looks
+
+    @property
+    def is_final(self) -> bool:
+        """True when it is hidden, or has given up."""
+        return self._stage in (Stage.HIDDEN, Stage.FAILED)
+
+    def interrupt(self) -> None:
+        """Note that the robot is not held any more; the next pictures will tell whether it was moved meanwhile."""
+        self._decided_s, self._last = None, STILL
+        self._to_compare = COMPARED
+
+    def decide(self, seen: Glimpse, now_s: float) -> Motion:
+        """Return how to move now.
+
+        Args:
+            seen: Of the newest picture.
+            now_s: When it was taken, never before an earlier call's.
+        """
+        if self.is_final:
+            return STILL
+        if self._to_compare and self._view is not None and not self._is_back(seen):
+            return STILL
+        self._view = seen.view
+        passed_s = 0.0 if self._decided_s is None else min(now_s - self._decided_s, LONGEST_STEP_S)
+        self._decided_s = now_s
+        self._take_in(seen, passed_s)
+        self._last = self._motion()
+        return self._last
+
+    def _is_back(self, seen: Glimpse) -> bool:
+        """Say whether the first pictures after an interruption have told what they can; begin anew if it was moved."""
+        assert self._view is not None  # noqa: S101  asked only then
+        self._to_compare -= 1
+        if is_same_view(self._view, seen.view):
+            self._to_compare = 0
+        elif not self._to_compare:
+            self._barred_rad = None
+            self._begin_look()
+        return not self._to_compare
+
+    def _take_in(self, seen: Glimpse, passed_s: float) -> None:
+        """Count what the last motion did until now, and go to the next stage when this one is done."""
+        turned_rad, gone_m = self._last.turn_rad_s * passed_s, abs(self._last.forward_m_s) * passed_s
+        self._turned_rad += turned_rad
+        self._dark_pictures = self._dark_pictures + 1 if seen.ground < self._dark_level else 0
+        match self._stage:
+            case Stage.LOOK:
+                self._seen.append((self._turned_rad, seen.ahead, seen.ground))
+                if self._turned_rad >= 2 * math.pi:
+                    self._looks += 1
+                    self._conclude()
+            case Stage.TURN | Stage.FACE_OUT:
+                before, self._left = self._left, self._left - turned_rad
+                if before * self._left <= 0 or abs(self._left) < 0.02:
+                    self._after_turn()
+            case Stage.GO:
+                self._left -= gone_m
+                if self._dark_pictures >= CERTAIN_PICTURES:
+                    self._enter(Stage.ENTER, IN_M)
+                elif self._left <= 0:
+                    self._begin_look()
+            case Stage.ENTER:
+                self._left -= gone_m
+                if self._left <= 0:
+                    self._enter(Stage.BACK, BACK_M)
+            case Stage.BACK:
+                self._left -= gone_m
+                if self._left <= 0:
+                    self._begin_look()
+            case Stage.HIDDEN | Stage.FAILED:
+                return
+
+    def _conclude(self) -> None:
+        """Say what all those views mean."""
+        is_dark = [ground < self._dark_level for _angle, _ahead, ground in self._seen]
+        if sum(is_dark) >= ALL_AROUND * len(is_dark):
+            brightest = sectors(self._seen, brightest=True)[0]
+            self._enter(Stage.FACE_OUT, turned(brightest - self._turned_rad))
+        elif self._looks == self._most_looks:
+            self._enter(Stage.FAILED, 0.0)
+        else:
+            barred = self._barred_rad
+            ways = [way for way in sectors(self._seen) if barred is None or abs(turned(way - barred)) > BARRED_RAD]
+            way = ways[(self._looks - 1) % CHOICES]
+            self._enter(Stage.TURN, turned(way - self._turned_rad))
+
+    def _after_turn(self) -> None:
+        if self._stage is Stage.FACE_OUT:
+            self._enter(Stage.HIDDEN, 0.0)
+        else:
+            self._enter(Stage.GO, self._leg_m)
+            self._barred_rad = math.pi  # seen from the next look around, which begins straight ahead
+
+    def _begin_look(self) -> None:
+        self._seen, self._turned_rad = [], 0.0
+        self._enter(Stage.LOOK, 0.0)
+
+    def _enter(self, stage: Stage, left: float) -> None:
+        self._stage, self._left, self._dark_pictures = stage, left, 0
+
+    def _motion(self) -> Motion:
+        match self._stage:
+            case Stage.LOOK:
+                return Motion(0.0, TURN_RAD_S)
+            case Stage.TURN | Stage.FACE_OUT:
+                return Motion(0.0, math.copysign(TURN_RAD_S, self._left))
+            case Stage.GO | Stage.ENTER:
+                return Motion(self._speed_m_s, 0.0)
+            case Stage.BACK:
+                return Motion(-self._speed_m_s, 0.0)
+            case Stage.HIDDEN | Stage.FAILED:
+                return STILL
+
+
+def sectors(seen: Sequence[tuple[float, float, float]], *, brightest: bool = False) -> list[float]:
+    """Return the directions of all sectors that were seen, the darkest first, or the brightest.
+
+    Args:
+        seen: Direction in radians, brightness ahead, and brightness of the ground, of each picture.
+        brightest: True: the brightest first.
+
+    Returns:
+        Middles of sectors, radians from 0 to 2 pi.
+    """
+    width_rad = 2 * math.pi / SECTORS
+    ahead: list[list[float]] = [[] for _sector in range(SECTORS)]
+    for angle_rad, brightness, _ground in seen:
+        ahead[int(angle_rad / width_rad) % SECTORS].append(brightness)
+    found = [(sum(levels) / len(levels), (sector + 0.5) * width_rad) for sector, levels in enumerate(ahead) if levels]
+    return [way for _level, way in sorted(found, reverse=brightest)]

@@ -1,0 +1,112 @@
+"""Hide: find a dark place by the pictures alone, go into it, and look out of it.
+
+In mission.xml: an ARC of kind ``capture``. A slice should be long enough for a look around, eight seconds, but need not
+be: if the robot still stands where it stood, the look around goes on in the next one.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+
+import numpy as np
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from mission_control.behavior import BehaviorParameters
+from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, Stage, glimpse
+from mission_control.behaviors.driver import Driver
+from mission_control.behaviors.motion import MOST_M_S, STILL
+from mission_control.behaviors.servo_to_target import UnusablePicture
+from mission_control.messages import BehaviorStatus
+from resource_pool.arc_client import Frame
+
+
+class HideParameters(BehaviorParameters, frozen=True, kw_only=True):
+    """Parameters of ``Hide``.
+
+    Attributes:
+        dark_level: Floor darker than this is dark: a grey level above 0 and below 255.
+        leg_m: So far the robot goes before it looks around again, above 0.
+        speed_m_s: On the way, above 0, at most 0.3.
+        looks: After so many looks around it fails; 0: never.
+    """
+
+    dark_level: float = 60.0
+    leg_m: float = 0.6
+    speed_m_s: float = 0.2
+    looks: int = 20
+
+    def __post_init__(self) -> None:
+        if not 0 < self.dark_level < 255:
+            raise ValueError(f"dark_level is {self.dark_level}: it must be above 0 and below 255")
+        if not 0 < self.leg_m < math.inf:
+            raise ValueError(f"leg_m is {self.leg_m}: it must be above 0")
+        if not 0 < self.speed_m_s <= MOST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+        if self.looks < 0:
+            raise ValueError(f"looks is {self.looks}: write how many, or 0 for no end")
+
+
+class Hide(Driver[HideParameters]):
+    """Succeeds in a dark place; fails if it finds none."""
+
+    parameters_type = HideParameters
+    needs_arc = "capture"
+    never = Driver.never | {UnusablePicture.code}
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        self._search = self._plan()
+        self._motion = STILL
+        self._fresh = asyncio.Event()
+        self._unusable: UnusablePicture | None = None
+
+    @property
+    def search(self) -> DarkSearch:
+        """How far it is; read only."""
+        return self._search
+
+    def see(self, frame: Frame) -> None:
+        """Decide by this picture; ``drive_on`` carries it out."""
+        self._fresh.set()
+        if frame.width_px < VIEW_COLUMNS or frame.height_px < VIEW_ROWS:
+            self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
+            return
+        pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
+        self._motion = self._search.decide(glimpse(pixels), frame.captured_s)
+
+    async def drive_on(self, robot: str) -> None:
+        """Do what each picture leads to; see ``Driver.drive_on``."""
+        while not self._search.is_final:
+            self.report(f"{robot} {self._search.stage}, {self._seen()}")
+            await self._fresh.wait()
+            self._fresh.clear()
+            if self._unusable is not None:
+                raise self._unusable
+            await self.move(self._motion)
+        await self.held.halt()
+        is_hidden = self._search.stage is Stage.HIDDEN
+        self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self._search.looks})
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Keep what was seen; the next pictures tell whether the robot still stands there."""
+        self._search.interrupt()
+        self._motion = STILL
+        self._fresh.clear()
+        self.report(f"suspended: {reason} by {by}; {self._seen()}")
+
+    def parameters_changed(self) -> None:
+        """Begin anew with the new parameters."""
+        self._search = self._plan()
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters and the looks around."""
+        return {**super().statistics(), "looks": self._search.looks}
+
+    def _plan(self) -> DarkSearch:
+        given = self.parameters
+        return DarkSearch(dark_level=given.dark_level, leg_m=given.leg_m, speed_m_s=given.speed_m_s, looks=given.looks)
+
+    def _seen(self) -> str:
+        return f"{self._search.looks} looks around until now"
