@@ -148,7 +148,7 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the air does to packets and pictures. The default is mild: a good day in the papers' room.
+    """What the air does to packets and pictures. The default is mild: a very good day in the papers' room.
 
     Scales go from 0, off, over 1, as the papers tell, to 10; ``noise`` multiplies the five next to it.
 
@@ -171,7 +171,7 @@ class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         antenna_z_m: Above the floor.
     """
 
-    noise: Scale = 0.25
+    noise: Scale = 0.1
     white_noise: Scale = 1.0
     tears: Scale = 1.0
     ghosts: Scale = 1.0

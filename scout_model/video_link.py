@@ -43,7 +43,8 @@ PARTIAL_IN_FADE = 0.5  # chosen: RAM 2002 blames partial images on signals that 
 _BANK_MARGIN_PX = 128  # chosen: 16 384 different windows into the noise, drawn once instead of every frame
 _GARBAGE_SHIFT_PX = 60  # chosen: rows tear by up to a fifth of the picture's width
 _SLIP_PX = (2.0, 10.0)  # chosen: how far a row slips past the one above, at the edge and in the depth of a fade
-_OFF_LEVELS = (30.0, 60.0)  # chosen: same; how far a row's black is off, so that whole rows look drastically different
+_OFF_LEVELS = (60.0, 120.0)  # chosen: how far black is off in a fade; RAM 2002: whole rows look "drastically different"
+_CLAMP_ROWS = 6  # chosen: so many rows until the receiver tries to find black again
 _LONG_AGO = -1_000_000
 
 
@@ -320,11 +321,12 @@ def _with_tears(picture: Picture, count: int, rng: np.random.Generator) -> Pictu
 
 
 def _slipping(picture: Picture, depth: float, rng: np.random.Generator) -> Picture:
-    """Return the picture out of step: each row slips past the one above, and has a black of its own."""
-    step_px, off_levels = (edge + (bottom - edge) * depth for edge, bottom in (_SLIP_PX, _OFF_LEVELS))
+    """Return the picture out of step: each row slips past the one above, and black is lost every few rows."""
+    step_px = _SLIP_PX[0] + (_SLIP_PX[1] - _SLIP_PX[0]) * depth
     slipped = _shifted(picture, np.cumsum(rng.normal(0.0, step_px, PICTURE_HEIGHT_PX)))
-    offsets = rng.normal(0.0, off_levels, (PICTURE_HEIGHT_PX, 1)).astype(np.int16)
-    return _add(slipped, np.repeat(offsets, PICTURE_WIDTH_PX, axis=1))
+    bands = PICTURE_HEIGHT_PX // _CLAMP_ROWS
+    offsets = (rng.uniform(*_OFF_LEVELS, bands) * rng.choice((-1, 1), bands)).astype(np.int16)
+    return _add(slipped, np.repeat(offsets, _CLAMP_ROWS * PICTURE_WIDTH_PX).reshape(picture.shape))
 
 
 def _rolling(picture: Picture, unlocked: float, rng: np.random.Generator) -> Picture:
