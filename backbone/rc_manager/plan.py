@@ -139,7 +139,7 @@ class Plan:
 
     def _binds(self, begin_s: float, other: ArcEntry, arc: ArcEntry) -> bool:
         """Say whether what is reserved for the other binds the ARC."""
-        if begin_s <= self._now_s or other.pledge is not None:
+        if begin_s <= self._now_s + INSTANT_S or other.pledge is not None:
             return True
         return rank(other.path, arc.path) != 0
 
