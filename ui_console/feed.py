@@ -114,15 +114,20 @@ class ConsoleFeed:
         answers = await asyncio.gather(*(self._stop(robot, reason, user) for robot in wanted))
         return [robot for robot, is_stopped in zip(wanted, answers, strict=True) if not is_stopped]
 
-    async def known_robots(self) -> list[str]:
-        """Return every robot of the mission, also those this feed has not heard of yet."""
+    @property
+    def robots(self) -> frozenset[str]:
+        """Every robot heard of so far."""
+        return frozenset(self._robots)
+
+    async def find_robots(self) -> frozenset[str]:
+        """Return every robot of the mission, also those not heard of yet."""
         try:
             question = ListComponents(subsystem=str(Subsystem.RESOURCE_POOL), type=ROBOT_KIND)
             listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
         except LinkError as error:
             self._trouble(error)
-            return sorted(self._robots)
-        return sorted(self._robots | {component_of(component.address) for component in listing.components})
+            return self.robots
+        return self.robots | {component_of(component.address) for component in listing.components}
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again; return whether it may."""

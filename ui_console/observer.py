@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
@@ -49,10 +50,14 @@ class Observer(Component[P], Generic[P]):
         return not await self.feed.stop_robots([robot], reason, self.user)
 
     async def stop_all(self, reason: str = "") -> list[str]:
-        """Stop every robot of the mission, whoever holds it; return those of which it is not certain."""
-        robots = await self.feed.known_robots()
-        self.tell("robots", f"{self.user} stops all: {', '.join(robots)}")
-        return await self.feed.stop_robots(robots, reason, self.user)
+        """Stop every robot of the mission, whoever holds it; return those of which it is not certain.
+
+        Those that are known are stopped at once, before anybody is asked whether there are more.
+        """
+        known = self.feed.robots
+        self.tell("robots", f"{self.user} stops all: {', '.join(sorted(known)) or 'whatever there is'}")
+        unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, self.user), self.feed.find_robots())
+        return unsure + await self.feed.stop_robots(found - known, reason, self.user)
 
     async def lift_stop(self, stop: StopState) -> bool:
         """Let a robot move again that was stopped; return whether it may."""

@@ -12,13 +12,15 @@ from fake_resource_pool import FakeArc, FakePlacer
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.launch import Launch
+from backbone.component.messages import StoryEvent
 from backbone.errors import NoResponder
+from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
-from ui_console.console_events import CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.console_events import Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
 from ui_console.driving import drive_towards
 from ui_console.script import read_script
 from ui_console.scripted import ScriptDriver
@@ -45,8 +47,10 @@ def placer_world(local_mission: Any) -> Callable[[Scene], None]:
     return run
 
 
-def console(placer: FakePlacer, show: Callable[[ConsoleEvent], None], **options: Any) -> Teleoperation:
-    parameters = {"robot": "scout1", "kind": "video_drive", "priority": 100}
+def console(
+    placer: FakePlacer, show: Callable[[ConsoleEvent], None], away_after_s: float = 0.0, **options: Any
+) -> Teleoperation:
+    parameters = {"robot": "scout1", "kind": "video_drive", "priority": 100, "away_after_s": away_after_s}
     launch = Launch(
         "iros2001",
         Subsystem.UI_CONSOLE,
@@ -295,5 +299,86 @@ def test_a_command_without_an_answer_is_told_as_such(placer_world: Any, beside: 
             assert not any(isinstance(event, CommandApplied) for event in events)
             with pytest.raises(NoResponder):
                 await driven.bus.ask("resource_pool/console-7-video_drive", ArcHalt(), ArcHalt, within_s=0.1)
+
+    placer_world(scene)
+
+
+# ---------------------------------------------------------------------- another robot, nobody there, a pad
+def test_switching_gives_the_first_robot_back_before_the_other_is_asked_for(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        events: list[ConsoleEvent] = []
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, events.append)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            [first] = placer.arcs.values()
+            await driven.switch("scout2")
+            assert first.released == "console-7 takes scout2"
+            await placer.wait(lambda: driven.is_held)
+            [second] = placer.arcs.values()
+            assert second.parameters["wish"] == {"scout": "scout2"}
+            await driven.switch("scout2")
+            assert list(placer.arcs.values()) == [second]
+        kinds = [type(event) for event in events if isinstance(event, Granted | GivenBack)]
+        assert kinds == [Granted, GivenBack, Granted, GivenBack]
+
+    placer_world(scene)
+
+
+def test_a_robot_whose_operator_touched_nothing_for_long_is_given_back_and_can_be_taken_again(
+    placer_world: Any, beside: Any
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        events: list[ConsoleEvent] = []
+        placer.on_arc = grant_at_once
+        driven = console(placer, events.append, away_after_s=20.0)
+        async with beside(driven):
+            await placer.wait(lambda: driven.is_held)
+            for _key in range(5):
+                await placer.clock.sleep_s(15.0)
+                driven.hold(FORWARD)
+            assert driven.is_held
+            await placer.clock.sleep_s(21.0)
+            assert not placer.arcs
+            attention = [event.is_there for event in events if isinstance(event, Attention)]
+            assert attention == [False]
+            driven.touch()
+            driven.take()
+            await placer.wait(lambda: driven.is_held)
+            await placer.clock.sleep_s(21.0)
+            assert not placer.arcs
+
+    placer_world(scene)
+
+
+def test_a_hold_that_says_how_long_it_counts_ends_then_and_not_later(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            for _message in range(10):
+                driven.hold(FORWARD, 0.3)
+                await placer.clock.sleep_s(0.1)
+            silent_s = placer.clock.now_s() - 0.1
+            await placer.clock.sleep_s(2.0)
+            halts = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcHalt)]
+            assert len(halts) == 1
+            assert 0.25 <= halts[0] - silent_s <= 0.35
+
+    placer_world(scene)
+
+
+def test_taking_and_giving_back_are_told_to_the_mission_with_the_users_name(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        heard: list[tuple[str, str]] = []
+        placer.on_arc = grant_at_once
+        placer.bus.subscribe(
+            "*/*", Conversation.LOG, StoryEvent, lambda said: heard.append((said.body.subject, said.body.what))
+        )
+        async with beside(console(placer, lambda event: None, user="anna")) as driven:
+            await placer.wait(lambda: driven.is_held)
+            await driven.give_back()
+            await placer.clock.sleep_s(0.1)
+        assert heard == [("scout1", "was taken over by anna"), ("scout1", "was given back by anna: released")]
 
     placer_world(scene)

@@ -473,6 +473,9 @@ async def test_every_screen_looks_as_it_did(
     session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
     screen = ConsoleApp(session, profile=profile)
     async with screen.run_test(size=size) as pilot:
+        await pilot.pause()
+        screen.redraw()
+        await pilot.pause()
         for key in keys:
             await pilot.press(key)
         await settle(pilot)

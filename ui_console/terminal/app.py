@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import StrEnum
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import msgspec
 import numpy as np
@@ -16,6 +16,7 @@ from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.events import AppBlur, AppFocus, Key, MouseDown
+from textual.screen import Screen
 from textual.widgets import Footer, Static
 
 from ui_console.console_model import ConsoleModel
@@ -267,29 +268,36 @@ class ConsoleApp(App[None]):
 
     def redraw(self) -> None:
         """Show what the model says now."""
-        if not self.screen.query("#status"):  # a dialog is in front, or the screen is just being taken down
+        main = self._main()
+        if main is None:
             return
         now_s = self._session.now_s()
         view = self._view = self._session.model.view(now_s)
         speed_rad_s = self.speed_rad_s if self.drives else None
-        self.query_one("#status", Static).update(status_text(view, speed_rad_s, self._hint(view)))
+        main.query_one("#status", Static).update(status_text(view, speed_rad_s, self._hint(view)))
         for name in FIXED:
-            self._show(name, self.query_one(f"#{name}", Panel), view)
-        turn = self.query_one("#turn", Panel)
+            self._show(name, main.query_one(f"#{name}", Panel), view)
+        turn = main.query_one("#turn", Panel)
         turn.border_title = self._turn
         self._show(self._turn, turn, view)
         self.redraw_video()
 
     def redraw_video(self) -> None:
         """Show the newest picture, or why there is none to drive by."""
-        if self._view is None or self.profile is not Profile.TERMINAL or not self.screen.query("#video"):
+        main = self._main()
+        if self._view is None or self.profile is not Profile.TERMINAL or main is None:
             return
         own = self._view.own
         stale = [video for video in self._view.videos if video.robot == own.robot and video.is_stale]
         remark = f"picture is {stale[0].age_s:.0f} s old" if stale else ""
         if own.is_asked and not own.is_held:
             remark = own.status
-        self.query_one(Video).look(remark)
+        main.query_one(Video).look(remark)
+
+    def _main(self) -> Screen[Any] | None:
+        """Return the screen behind all dialogs; None while it is just being taken down."""
+        screens = self.screen_stack if self.is_running else []
+        return screens[0] if screens and screens[0].query("#status") else None
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
         """Hide the keys that drive from those who only watch, and all but six from a pendant."""
@@ -323,7 +331,7 @@ class ConsoleApp(App[None]):
         return rows[name]()
 
     def _panel(self) -> Panel:
-        return self.query_one(f"#{self.chosen}" if self.chosen in FIXED else "#turn", Panel)
+        return self.screen_stack[0].query_one(f"#{self.chosen}" if self.chosen in FIXED else "#turn", Panel)
 
     def _subject(self) -> str:
         row = self._panel().row
@@ -473,7 +481,7 @@ class ConsoleApp(App[None]):
     def action_acknowledge(self) -> None:
         """The alarm the cursor is on was seen; without one, the first of the list."""
         shown = self._alarms()
-        row = self.query_one(f"#{PanelName.ALARMS}", Panel).row
+        row = self.screen_stack[0].query_one(f"#{PanelName.ALARMS}", Panel).row
         if shown and row is not None:
             self._session.acknowledge(row.key)
             self.redraw()

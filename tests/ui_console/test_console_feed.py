@@ -1,0 +1,244 @@
+"""The feed hears a mission, in one process on virtual time; what needs no grant goes through it."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from console_scenes import SCHEDULE
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.component import Component, NoParameters
+from backbone.component.launch import Launch
+from backbone.component.messages import StoryEvent
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule, Lease, Leases, Schedule
+from backbone.wire import Envelope, Message
+from resource_pool.messages import AskStop, EmergencyStop, LiftStop
+from resource_pool.stop_latch import StopLatch
+from ui_console.console_events import ConsoleEvent, event_word
+from ui_console.console_model import ConsoleModel
+from ui_console.feed import PULSE_S
+from ui_console.observer import Observer
+from ui_console.views import AlarmKind
+
+Scene = Callable[["Stage"], Awaitable[None]]
+
+
+class Watcher(Component[Any]):
+    """A behavior with a parameter."""
+
+    class Parameters(NoParameters, frozen=True):
+        threshold: int = 20
+
+    parameters_type = Parameters
+
+
+class RcManager(Component[Any]):
+    """Answers with one schedule."""
+
+    accepts = AskSchedule
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        return SCHEDULE
+
+
+class Robot(Component[Any]):
+    """Only stops and moves again; says nothing any more when it is told to."""
+
+    accepts = AskStop | EmergencyStop | LiftStop
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.latch = StopLatch(self.name)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        match asked.body:
+            case EmergencyStop(reason=reason, user=user):
+                self.latch.stop(user, reason, self.clock.now_s())
+            case LiftStop(number=number, user=user):
+                self.latch.lift(number, user, self.clock.now_s())
+        return self.latch.state
+
+
+class Stage:
+    """A mission with few players and one observer."""
+
+    def __init__(self, network: Any, beside: Any) -> None:
+        self.network, self.beside, self.clock = network, beside, VirtualClock()
+        self.model = ConsoleModel("console-1", "anna")
+        self.events: list[ConsoleEvent] = []
+
+    def show(self, event: ConsoleEvent) -> None:
+        self.events.append(event)
+        self.model.apply(event)
+
+    def make(self, kind: type[Component[Any]], subsystem: Subsystem, name: str, type_name: str, **more: Any) -> Any:
+        launch = Launch(
+            "local", subsystem, name, type_name, "x:Y", "local", "", 0.0, 1.0, requester="backbone/launcher"
+        )
+        return kind(launch, self.network.join(launch.address, self.clock), self.clock, **more)
+
+    def observer(self) -> Any:
+        return self.make(Observer, Subsystem.UI_CONSOLE, "console-1", "console", show=self.show, user="anna")
+
+    def robot(self, name: str) -> Any:
+        return self.make(Robot, Subsystem.RESOURCE_POOL, name, "scout")
+
+    def manager(self) -> Any:
+        return self.make(RcManager, Subsystem.BACKBONE, "rc_manager", "rc_manager")
+
+    async def until(self, condition: Callable[[], Any], within_s: float = 10.0) -> None:
+        deadline_s = self.clock.now_s() + within_s
+        while not condition():
+            assert self.clock.now_s() < deadline_s, [event_word(event) for event in self.events]
+            await self.clock.sleep_s(0.01)
+
+    def words(self) -> set[str]:
+        return {event_word(event) for event in self.events}
+
+
+@pytest.fixture
+def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
+    def run(scene: Scene) -> None:
+        async def main() -> None:
+            async with local_mission() as network:
+                await scene(Stage(network, beside))
+
+        run_virtual(main())
+
+    return run
+
+
+def test_one_that_comes_late_hears_how_things_are_and_then_what_changes(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        async with on.beside(on.manager()) as manager, on.beside(on.robot("scout1")) as robot:
+            robot.latch.stop("ben", "fire", 0.0)
+            async with on.beside(on.observer()):
+                await on.until(lambda: {"schedule", "components", "stop"} <= on.words())
+                assert [row.robot for row in on.model.robots(8.0)] == ["scout1", "scout2"]
+                stop = on.model.team.stop_of("scout1")
+                assert stop is not None
+                assert stop.by == "ben"
+                manager.bus.publish(RC_MANAGER, Conversation.SCHEDULE, Schedule(9.0, [], [], []))
+                await on.until(lambda: not on.model.robots(9.0))
+                manager.bus.publish(RC_MANAGER, Conversation.LEASES, Leases([Lease("a", "b", 1)], 2.0))
+                manager.tell("scout1", "saw something")
+                await on.until(lambda: "leases" in on.words() and on.model.log())
+                assert on.model.log()[-1].what == "saw something"
+
+    stage(scene)
+
+
+def test_a_death_is_an_alarm_and_a_good_end_is_none(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        async with on.beside(on.manager()), on.beside(on.observer()):
+            async with on.beside(on.robot("scout1")):
+                await on.until(lambda: on.model.team.component("scout1"))
+            await on.until(lambda: on.model.team.component("scout1") is None)
+            assert on.model.team.alarms.views() == []
+            dying = on.robot("scout2")
+            async with on.beside(dying):
+                await on.until(lambda: on.model.team.component("scout2"))
+                await dying.bus.close()
+                await on.until(on.model.team.alarms.views)
+            [alarm] = on.model.team.alarms.views()
+            assert (alarm.kind, alarm.subject) == (AlarmKind.LOST, "scout2")
+
+    stage(scene)
+
+
+def test_hosts_and_what_fell_there_are_heard_from_their_creators(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        creator = on.make(Component, Subsystem.BACKBONE, "creator-local", "creator")
+        async with on.beside(on.manager()), on.beside(creator), on.beside(on.observer()):
+            await on.until(lambda: "components" in on.words())
+            await on.clock.sleep_s(0.1)
+            creator.bus.publish(creator.address, Conversation.TELEMETRY, HostLoad("local", [], 0.5, 0.2, 2, 3))
+            fell = ProcessFell("scout1", "signal 9", -1.0, [])
+            creator.bus.publish(creator.address, Conversation.EVENTS, fell)
+            await on.until(lambda: {"load", "fell"} <= on.words())
+            assert on.model.team.hosts(0.0)[0].host == "local"
+            assert "given up" in on.model.team.alarms.views()[0].line
+
+    stage(scene)
+
+
+def test_the_pulse_measures_the_link_and_counts_the_radio(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        radio = on.make(Component, Subsystem.RESOURCE_POOL, "radio", "command_radio")
+        async with on.beside(on.manager()), on.beside(radio), on.beside(on.observer()):
+            await on.clock.sleep_s(2.5 * PULSE_S)
+            links = {link.name: link for link in on.model.links(0.0)}
+            assert links["hub"].latency_s >= 0
+            assert "packets sent" in links["radio"].feedback
+
+    stage(scene)
+
+
+def test_all_robots_are_stopped_also_those_not_heard_of_and_a_silent_one_is_named(
+    stage: Callable[[Scene], None],
+) -> None:
+    async def scene(on: Stage) -> None:
+        console = on.observer()
+        one, other = on.robot("scout1"), on.robot("scout9")
+        async with on.beside(one), on.beside(other), on.beside(on.manager()), on.beside(console):
+            await on.until(lambda: "schedule" in on.words())
+            unsure = await console.stop_all("fire")
+            assert unsure == ["scout2"]
+            for robot in (one, other):
+                state = robot.latch.state
+                assert (state.is_stopped, state.by, state.reason) == (True, "anna", "fire")
+            lines = [alarm.line for alarm in on.model.team.alarms.views()]
+            assert any("scout2 did not confirm the stop" in line for line in lines)
+            assert await console.lift_stop(one.latch.state)
+            assert on.model.team.stop_of("scout1") is None
+            assert not one.latch.state.is_stopped
+
+    stage(scene)
+
+
+def test_what_an_operator_does_is_told_to_the_mission_with_the_name(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        console = on.observer()
+        heard: list[str] = []
+        async with on.beside(on.manager()) as manager, on.beside(on.robot("scout1")), on.beside(console):
+            manager.bus.subscribe("*/*", Conversation.LOG, StoryEvent, lambda said: heard.append(said.body.what))
+            await console.stop_robot("scout1", "child in the room")
+            await on.clock.sleep_s(0.1)
+        assert heard == ["anna stops it: child in the room"]
+
+    stage(scene)
+
+
+def test_a_parameter_is_told_changed_and_refused(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        console = on.observer()
+        watcher = on.make(Watcher, Subsystem.MISSION_CONTROL, "watch1", "watch")
+        async with on.beside(on.manager()), on.beside(watcher), on.beside(console):
+            assert await console.feed.ask_parameters("watch1")
+            assert await console.set_parameter("watch1", "threshold", 30)
+            [parameter] = on.model.team.parameters()
+            assert (parameter.value, parameter.before, parameter.changed_by) == ("30", "20", "anna")
+            assert watcher.parameters.threshold == 30
+            assert not await console.set_parameter("watch1", "threshold", "high")
+            assert not await console.set_parameter("watch1", "nothing", 1)
+            assert not await console.feed.ask_parameters("nobody")
+            assert watcher.parameters.threshold == 30
+            assert on.model.team.alarms.views()
+
+    stage(scene)
+
+
+def test_why_asks_whoever_knows_and_says_so_if_nobody_does(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        console = on.observer()
+        async with on.beside(on.manager()), on.beside(on.robot("scout1")), on.beside(console):
+            assert any("scout1 is ready" in line for line in await console.why("scout1"))
+            assert all(await console.why("nobody"))
+
+    stage(scene)
