@@ -9,6 +9,7 @@ import sys
 from scout_model import gl_probe
 
 VIEWS = [("pioneer", "scout1"), ("pioneer", "scout2"), ("empty", "scout1"), ("empty", "scout2"), ("pioneer", "scout3")]
+THINGS = ("scout1", "scout2", "scout3", "scout4")
 
 
 def main() -> None:
@@ -20,7 +21,7 @@ def main() -> None:
     import numpy as np
 
     from scout_model.camera import Camera
-    from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
+    from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
     from scout_model.world import World
 
     pictures = {}
@@ -45,6 +46,30 @@ def main() -> None:
         with Camera(world.mjcf, "paint" if backend == "none" else "gl") as camera:
             camera.show(world.state())
             pictures.update({f"{shown}_{robot}": camera.picture(robot) for shown, robot in VIEWS if shown == scene})
+    world = World(
+        WorldDescription(
+            9.0,
+            6.0,
+            seed=1,
+            furniture=[
+                Furniture("desk", 4.0, 5.2, 1.4, 1.2, 0.5, "table"),
+                Furniture("step", 5.3, 4.0, 0.5, 0.5, 0.05),
+            ],
+            ramps=[Ramp("ramp", 3.0, 3.9, 0.8, 0.6, 0.2, math.pi / 2)],
+            landmarks=[Landmark("home", 2.0, 2.0, -0.6)],
+            dark_places=[DarkPlace("corner", 8.5, 5.5, 1.0, 1.0, 0.6)],
+            scouts=[
+                ScoutPlace("scout1", 1, 3.0, 2.9, math.pi / 2),
+                ScoutPlace("scout2", 2, 4.0, 3.6, math.pi / 2),
+                ScoutPlace("scout3", 3, 2.8, 1.5, 2.6),
+                ScoutPlace("scout4", 4, 7.3, 4.3, math.pi / 4),
+                ScoutPlace("hidden", 5, 8.2, 5.2, 0.0),
+            ],
+            targets=[Target("carrier", "carrier", [(4.3, 4.4), (5.0, 4.4)], 0.5, begin_s=100.0)],
+        )
+    )
+    with Camera(world.mjcf, "paint" if backend == "none" else "gl") as camera:
+        pictures.update({f"things_{robot}": camera.picture(robot) for robot in THINGS})
     np.savez(file, **pictures)
 
 

@@ -114,7 +114,7 @@ def test_a_process_not_prepared_for_opengl_is_told_so(monkeypatch: pytest.Monkey
 
 
 def test_a_painting_process_needs_no_opengl(tmp_path: Path) -> None:
-    assert len(views("none", tmp_path)) == 5
+    assert len(views("none", tmp_path)) == 9
 
 
 def test_rendered_and_painted_pictures_show_the_same(gl: GlSupport, tmp_path: Path) -> None:
