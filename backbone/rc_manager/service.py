@@ -16,20 +16,18 @@ import json
 import logging
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO, assert_never
 
-from backbone.bus.interface import Bus, Clock, Reply
+from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import ComponentState
 from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
+from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
@@ -91,18 +89,17 @@ from backbone.rc_manager.messages import (
     UnknownRequest,
     Withdraw,
 )
+from backbone.rc_manager.roll_call import Found, RollCall
 from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
-SERVICE_REPLY_S = 1.0  # chosen: core services answer in milliseconds; after this the question was lost
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
 START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
 MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: what keeps an RC from connecting is mostly an old hold
 SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
-RETRY_S = 0.1  # chosen: a restarted hub is back within a few of these
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
 
@@ -118,24 +115,6 @@ class RcManagerParameters(SchedulingRules, frozen=True, forbid_unknown_fields=Tr
     mission: str
     mission_priority: int = 0
     trace: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """What a starting RC manager finds: RCs by name, ARCs by name."""
-
-    rcs: Mapping[str, RcState]
-    arcs: Mapping[str, CurrentRequest]
-
-    def holds_rightly(self, arc: str) -> bool:
-        """Say whether every RC the ARC thinks it holds says so too."""
-        current = self.arcs.get(arc)
-        if current is None or not current.epochs:
-            return False
-        return all(
-            rc in self.rcs and any(h.arc == arc and h.epoch == epoch for h in self.rcs[rc].holders)
-            for rc, epoch in current.epochs.items()
-        )
 
 
 class RcManager(Component[RcManagerParameters]):
@@ -165,7 +144,8 @@ class RcManager(Component[RcManagerParameters]):
         self._wake_at_s: float | None = None
         self._trace: TextIO | None = None
         self._context_switch = ContextSwitch(bus, clock, self.story.note)
-        self._found = _Found({}, {})
+        self._roll_call = RollCall(bus, clock)
+        self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
         self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
 
@@ -176,9 +156,10 @@ class RcManager(Component[RcManagerParameters]):
             self._trace = Path(self.parameters.trace).open("a", encoding="utf-8", buffering=1)  # noqa: ASYNC230, SIM115
         for record in self.manager.opening_lines():
             self._record(record)
-        found = await self._until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
+        found = await self._roll_call.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
         self._resources = {resource.name: resource for resource in found.resources}
-        self._found = await self._look_around()
+        self._found = await self._roll_call.find(self._resources)
+        await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
     async def serve(self) -> None:
         """Take over what was found; then wake when a decision is due, renew leases, publish changes."""
@@ -401,23 +382,7 @@ class RcManager(Component[RcManagerParameters]):
         return True
 
     # ------------------------------------------------------------------ who is there
-    async def _look_around(self) -> _Found:
-        """Ask every RC who holds it and every ARC what it asks for; free RCs nobody rightly holds."""
-        pool = [c.address for c in await self._listing() if c.address.startswith(f"{Subsystem.RESOURCE_POOL}/")]
-        rcs = await self._ask_all([at for at in pool if component_of(at) in self._resources], AskRc(), RcState)
-        arcs = await self._ask_all(
-            [at for at in pool if component_of(at) not in self._resources], AskRequest(), CurrentRequest
-        )
-        found = _Found(rcs, arcs)
-        orphans = [
-            (rc.name, holder) for rc in rcs.values() for holder in rc.holders if not found.holds_rightly(holder.arc)
-        ]
-        await self._context_switch.disconnect(
-            [(rc, holder.arc, holder.epoch) for rc, holder in orphans], "not adopted after a restart"
-        )
-        return found
-
-    def _take_over(self, found: _Found) -> None:
+    def _take_over(self, found: Found) -> None:
         """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait."""
         for resource in self._resources.values():
             state = found.rcs.get(resource.name)
@@ -443,32 +408,6 @@ class RcManager(Component[RcManagerParameters]):
             if current.rcs and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
 
-    async def _ask_all(self, addresses: list[str], question: Message, reply: type[Reply]) -> dict[str, Reply]:
-        async def one(of: str) -> Reply | None:
-            try:
-                return await self.bus.ask(of, question, reply, within_s=RC_REPLY_S)
-            except (Refusal, LinkError):
-                return None  # a component of another kind, or one that is just dying
-
-        answers = await asyncio.gather(*(one(of) for of in addresses))
-        return {component_of(of): got for of, got in zip(addresses, answers, strict=True) if got is not None}
-
-    async def _listing(self) -> list[ComponentState]:
-        """Return who is there, once the nameserver can tell for sure."""
-        while True:
-            found = await self._until_answered(NAMESERVER, ListComponents(), Components)
-            if found.complete:
-                return found.components
-            await self.clock.sleep_s(RETRY_S * self.clock.rate)
-
-    async def _until_answered(self, of: str, question: Message, reply: type[Reply]) -> Reply:
-        while True:
-            try:
-                return await self.bus.ask(of, question, reply, within_s=SERVICE_REPLY_S)
-            except LinkError as error:
-                log.info("%s does not answer yet: %s", of, error)
-                await self.clock.sleep_s(RETRY_S * self.clock.rate)
-
     def _heard_from_nameserver(self, envelope: Envelope[Any]) -> None:
         match envelope.body:
             case Appeared(component=component):
@@ -485,13 +424,10 @@ class RcManager(Component[RcManagerParameters]):
         self._failing_rcs.add(rc)
         try:
             await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
-            while not await self._meet_rc(rc) and rc in await self._present():
+            while not await self._meet_rc(rc) and rc in await self._roll_call.present():
                 await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
         finally:
             self._failing_rcs.discard(rc)
-
-    async def _present(self) -> set[str]:
-        return {component_of(component.address) for component in await self._listing()}
 
     async def _meet_again(self, rc: str) -> None:
         await self._meet_rc(rc)
@@ -533,7 +469,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
-        names = await self._present()
+        names = await self._roll_call.present()
         for name in [*sorted(self._running_rcs), *self._uses]:
             if name not in names:
                 self._disappeared(name)
@@ -593,7 +529,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _meet_arc(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
-        current = (await self._ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
+        current = (await self._roll_call.ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._uses or self._requesting[arc]:
             return
         if current.rcs:

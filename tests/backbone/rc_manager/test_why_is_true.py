@@ -99,6 +99,7 @@ def test_beside_others_a_slice_that_is_over_but_for_rounding_is_over() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("rules", RULES, ids=str)
 def test_without_those_that_why_names_each_of_a_thousand_is_granted(rules: dict[str, Any]) -> None:
     """On a grid slices last longer than the plan counts: there one in a thousand may be left waiting."""
@@ -180,6 +181,7 @@ def test_a_waiting_arc_is_granted_within_a_switch_of_its_predicted_start(rules: 
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize(("rules", "least"), LEAST_SHARE, ids=str)
 def test_a_thousand_predictions_hold_within_a_switch(rules: dict[str, Any], least: float) -> None:
     found = predictions(2000, rules)
