@@ -98,7 +98,7 @@ class Reception:
 class _Effect(IntEnum):
     """Which random numbers."""
 
-    WINDOW = 0
+    WHETHER = 0
     TEARS = 1
     SLIP = 2
     PARTIAL = 3
@@ -106,6 +106,24 @@ class _Effect(IntEnum):
     SETTLING = 5
     FADING = 6
     ECHO = 7
+
+
+class _Dice:
+    """What is drawn for every frame, whether an effect is on or not; what an effect then needs it draws by itself."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._top, self._left = rng.integers(0, _BANK_MARGIN_PX, 2)
+        self.partial = rng.random()
+        self._rng = rng
+
+    def window(self, levels: float) -> NDArray[np.int16]:
+        """Return noise of about this standard deviation, in steps of 1 dB: few banks serve all strengths."""
+        bank = _bank(round(20 * math.log10(max(levels, FAINTEST_LEVELS))))
+        return bank[self._top : self._top + PICTURE_HEIGHT_PX, self._left : self._left + PICTURE_WIDTH_PX]
+
+    def tears(self, expected: float) -> int:
+        """Return how many lines there are; to be called once, as the last die of the frame."""
+        return int(self._rng.poisson(expected))
 
 
 class Receiver:
@@ -147,17 +165,18 @@ class Receiver:
             _check(signal)
         if self._tuned_frame is None:
             self._tuned_frame = frame
+        dice = _Dice(self._random(_Effect.WHETHER, frame))
         if not signals:
-            reception = Reception(self._snow(frame), 0, FrameKind.SNOW)
+            reception = Reception(self._snow(dice), 0, FrameKind.SNOW)
         elif len(signals) == 1 or self._air.interference == 0:
             nearest = min(signals, key=lambda signal: signal.distance_m)
-            reception = replace(self._receive_one(nearest, frame, self._tuned_frame), transmitters=len(signals))
+            reception = replace(self._receive_one(nearest, frame, self._tuned_frame, dice), transmitters=len(signals))
         else:
-            reception = Reception(self._garbage(signals, frame), len(signals), FrameKind.GARBAGE)
+            reception = Reception(self._garbage(signals, frame, dice), len(signals), FrameKind.GARBAGE)
         self._last = reception.picture.copy()  # who gets the picture may paint on it
         return reception
 
-    def _receive_one(self, signal: Signal, frame: int, tuned_frame: int) -> Reception:
+    def _receive_one(self, signal: Signal, frame: int, tuned_frame: int, dice: _Dice) -> Reception:
         air = self._air
         away_m = counted_distance_m(signal.distance_m, air.weak_signal)
         strength_db = snr_db(away_m)
@@ -170,19 +189,13 @@ class Receiver:
             contrast = max(0.0, strength_db / WEAK_DB)
             picture = np.asarray(cv2.convertScaleAbs(picture, None, contrast, 128.0 * (1.0 - contrast)), np.uint8)
         power, depth = self._fade(signal.robot, away_m, frame)
-        picture = self._with_noise(picture, strength_db + 10 * math.log10(power), frame)
-        tears = air.noise * air.tears * (STRAY_TEARS + TEARS * signal.motors)
-        if tears > 0:
-            rng = self._random(_Effect.TEARS, frame)
-            if count := int(rng.poisson(tears)):
-                picture, kind = _with_tears(picture, count, rng), FrameKind.TORN
+        picture = self._with_noise(picture, strength_db + 10 * math.log10(power), dice)
+        if tears := dice.tears(air.noise * air.tears * (STRAY_TEARS + TEARS * signal.motors)):
+            picture, kind = _with_tears(picture, tears, self._random(_Effect.TEARS, frame)), FrameKind.TORN
         if depth > 0:
             picture, kind = _slipping(picture, depth, self._random(_Effect.SLIP, frame)), FrameKind.FADED
-        partial = air.noise * air.partial_frames * (PARTIAL_IN_FADE if depth > 0 else PARTIAL)
-        if partial > 0:
-            rng = self._random(_Effect.PARTIAL, frame)
-            if rng.random() < partial:
-                picture, kind = self._partial(picture, frame, rng), FrameKind.PARTIAL
+        if dice.partial < air.noise * air.partial_frames * (PARTIAL_IN_FADE if depth > 0 else PARTIAL):
+            picture, kind = self._partial(picture, dice, self._random(_Effect.PARTIAL, frame)), FrameKind.PARTIAL
         settled_frames = frame - max(tuned_frame, signal.on_since_frame)
         if 0 <= settled_frames < self._settling_frames:
             unlocked = 1.0 - settled_frames / self._settling_frames
@@ -215,19 +228,19 @@ class Receiver:
             course = courses[robot] = Fading((*self._key, key_of(robot), effect))
         return course
 
-    def _with_noise(self, picture: Picture, strength_db: float, frame: int) -> Picture:
+    def _with_noise(self, picture: Picture, strength_db: float, dice: _Dice) -> Picture:
         levels = self._air.noise * self._air.white_noise * 255.0 / 10 ** (strength_db / 20)
         if levels < FAINTEST_LEVELS:
             return picture
-        return _add(picture, _window(min(levels, SNOW_LEVELS), self._random(_Effect.WINDOW, frame)))
+        return _add(picture, dice.window(min(levels, SNOW_LEVELS)))
 
-    def _snow(self, frame: int) -> Picture:
+    def _snow(self, dice: _Dice) -> Picture:
         gray = np.full((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), 128, np.uint8)
         if self._air.snow == 0:
             return gray
-        return _add(gray, _window(SNOW_LEVELS * self._air.snow, self._random(_Effect.WINDOW, frame)))
+        return _add(gray, dice.window(SNOW_LEVELS * self._air.snow))
 
-    def _partial(self, picture: Picture, frame: int, rng: np.random.Generator) -> Picture:
+    def _partial(self, picture: Picture, dice: _Dice, rng: np.random.Generator) -> Picture:
         """Return the picture whose lower rows are an older one's, black, or noise."""
         first_row = int(rng.integers(8, PICTURE_HEIGHT_PX - 8))
         partial = picture.copy()
@@ -238,10 +251,10 @@ class Receiver:
                 partial[first_row:] = 0
             case _:
                 gray = np.full_like(picture, 128)
-                partial[first_row:] = _add(gray, _window(SNOW_LEVELS, self._random(_Effect.WINDOW, frame)))[first_row:]
+                partial[first_row:] = _add(gray, dice.window(SNOW_LEVELS))[first_row:]
         return partial
 
-    def _garbage(self, signals: Sequence[Signal], frame: int) -> Picture:
+    def _garbage(self, signals: Sequence[Signal], frame: int, dice: _Dice) -> Picture:
         """Return a picture whose rows come from any of the transmitters, each torn sideways."""
         rng = self._random(_Effect.GARBAGE, frame)
         nearest = min(signals, key=lambda signal: signal.distance_m)
@@ -254,7 +267,7 @@ class Receiver:
         for row in np.flatnonzero(spoiled).tolist():
             shift_px = int(shifts_px[row])
             mixed[row] = endless[sources[row]][row, shift_px : shift_px + PICTURE_WIDTH_PX]
-        return _add(mixed, _window(SNOW_LEVELS / 2 * self._air.interference, self._random(_Effect.WINDOW, frame)))
+        return _add(mixed, dice.window(SNOW_LEVELS / 2 * self._air.interference))
 
 
 def _check(signal: Signal) -> None:
@@ -280,13 +293,6 @@ def _grain() -> NDArray[np.float32]:
 @functools.lru_cache(64)
 def _bank(level_db: int) -> NDArray[np.int16]:
     return np.asarray(np.rint(math.pow(10, level_db / 20) * _grain()), np.int16)
-
-
-def _window(levels: float, rng: np.random.Generator) -> NDArray[np.int16]:
-    """Return noise of about this standard deviation, in steps of 1 dB: few banks serve all strengths."""
-    bank = _bank(round(20 * math.log10(max(levels, FAINTEST_LEVELS))))
-    top, left = rng.integers(0, _BANK_MARGIN_PX, 2)
-    return bank[top : top + PICTURE_HEIGHT_PX, left : left + PICTURE_WIDTH_PX]
 
 
 def _add(picture: Picture, noise: NDArray[np.int16]) -> Picture:
