@@ -1,8 +1,9 @@
-"""A robot of another kind, as somebody else would add it: four numbers in a packet, three wheels, no jump."""
+"""A robot of another kind, as somebody else would add it: a box on two wheels that hears the Scouts' packets."""
 
 from __future__ import annotations
 
-import struct
+from scout_model import radio_link
+from scout_model.errors import MalformedPacket
 
 RADIUS_M = 0.05
 
@@ -51,9 +52,22 @@ class Rover:
         return min(1.0, max(map(abs, self._speeds_rad_s)) / 10.0)
 
     def hear(self, payload: bytes, now_s: float) -> None:
+        try:
+            packet = radio_link.decode(payload)
+        except MalformedPacket:
+            return
         self._heard += 1
-        self._speeds_rad_s = struct.unpack("!ff", payload)
-        self._frequency = "video7"
+        match packet:
+            case radio_link.Drive(left_rad_s, right_rad_s):
+                self._speeds_rad_s = left_rad_s, right_rad_s
+            case radio_link.TransmitterOn(frequency):
+                self._frequency = frequency
+            case radio_link.TransmitterOff():
+                self._frequency = ""
+            case radio_link.Halt() | radio_link.Jump():  # it has no foot to jump with
+                self._speeds_rad_s = 0.0, 0.0
+            case radio_link.Safe():
+                self._speeds_rad_s, self._frequency = (0.0, 0.0), ""
 
     def controls(self, now_s: float) -> dict[str, float]:
         return dict(zip(("left", "right"), self._speeds_rad_s, strict=True))

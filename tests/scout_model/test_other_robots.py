@@ -1,18 +1,19 @@
-"""Another kind of robot is one MJCF, one class, and its class path in the description."""
+"""Another kind of robot is one MJCF, one class, and its class path in the mission file."""
 
-import struct
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from backbone.mission.reader import read_mission
 from scout_model import radio_link
 from scout_model.camera import Camera
 from scout_model.description import SCOUT, ScoutPlace, WorldDescription
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.robot import Robot, robot_class
-from scout_model.scout import Scout
+from scout_model.scout import Scout, Spring
 from scout_model.world import World
 
 
@@ -40,7 +41,7 @@ def test_the_scout_is_one_kind_among_others() -> None:
 def test_a_rover_hears_its_packets_drives_and_stops_beside_scouts() -> None:
     room = world()
     for frame in range(60):
-        room.hear(1, struct.pack("!ff", 4.0, 4.0))
+        room.hear(1, radio_link.encode_drive(4.0, 4.0))
         if frame % 5 == 0:
             room.hear(2, radio_link.encode_drive(10.0, 10.0))
         room.step_frame()
@@ -51,7 +52,7 @@ def test_a_rover_hears_its_packets_drives_and_stops_beside_scouts() -> None:
     assert room.pose("scout1")[0] > 5.3
     assert room.pose("rover2")[0] == pytest.approx(3.0, abs=0.01)
     assert room.is_asleep("rover2")
-    room.hear(1, struct.pack("!ff", 0.0, 0.0))
+    room.hear(1, radio_link.encode_halt())
     for _ in range(90):
         room.step_frame()
     assert room.is_asleep("rover1")
@@ -59,13 +60,30 @@ def test_a_rover_hears_its_packets_drives_and_stops_beside_scouts() -> None:
 
 def test_a_rovers_transmitter_and_camera_are_the_worlds() -> None:
     room = world()
-    room.hear(1, struct.pack("!ff", 0.0, 0.0))
+    room.hear(1, radio_link.encode_transmitter_on("video7"))
+    room.hear(1, b"noise")
     room.step_frame()
     assert room.transmitting() == {"rover1": "video7"}
     with Camera(room.mjcf, "paint") as camera:
         empty = camera.picture("rover2")
         assert camera.picture("rover1").std() > 10
         assert (camera.picture("rover1") != empty).any()
+
+
+def test_in_a_mission_file_it_is_one_attribute(tmp_path: Path) -> None:
+    small = Path(__file__).parents[1] / "backbone" / "mission" / "small.xml"
+    mission = tmp_path / "mission.xml"
+    mission.write_text(small.read_text().replace('<scout name="scout1"', '<scout name="scout1" class="rover:Rover"', 1))
+    [component] = read_mission(mission).components
+    room = World(msgspec.convert(component.parameters["world"], WorldDescription))
+    before = room.pose("scout1")
+    for _ in range(30):
+        room.hear(1, radio_link.encode_drive(-4.0, -4.0))
+        room.step_frame()
+    assert room.pose("scout1") != pytest.approx(before, abs=0.1)
+    with pytest.raises(UnknownBody):
+        room.spring("scout1")
+    assert room.spring("scout2") is Spring.WOUND
 
 
 def test_what_only_scouts_have_is_refused_of_a_rover() -> None:
