@@ -1,0 +1,151 @@
+"""A real terminal session, key by key: a console in tmux on a running mission, from attach to release."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running_mission import BIN, RunningMission, mission_up
+
+pytestmark = [
+    pytest.mark.processes,
+    pytest.mark.timeout(300),
+    pytest.mark.skipif(shutil.which("tmux") is None, reason="tmux is not installed: there is no terminal to type in"),
+]
+
+SHOWN_WITHIN_S = 20.0
+COLUMNS, LINES = 130, 40
+
+
+class Terminal:
+    """A terminal that a person could sit at.
+
+    Args:
+        socket: Of a tmux server of its own.
+        mission: What the command talks to.
+    """
+
+    def __init__(self, socket: Path, mission: RunningMission) -> None:
+        self._socket, self._mission = socket, mission
+
+    def tmux(self, *words: str) -> str:
+        done = subprocess.run(
+            ["tmux", "-S", str(self._socket), "-f", "/dev/null", *words],
+            env={**self._mission.environment, "TERM": "xterm-256color"},
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=False,
+        )
+        return done.stdout
+
+    def open(self, *command: str) -> None:
+        words = " ".join([str(BIN / command[0]), *command[1:]])
+        self.tmux("new-session", "-d", "-x", str(COLUMNS), "-y", str(LINES), f"{words}; echo ENDED WITH $?; cat")
+
+    def press(self, *keys: str) -> None:
+        self.tmux("send-keys", *keys)
+
+    def screen(self) -> str:
+        return self.tmux("capture-pane", "-p")
+
+    def shows(self, pattern: str, within_s: float = SHOWN_WITHIN_S) -> str:
+        """Return the screen once it shows this."""
+        deadline = time.monotonic() + within_s
+        while time.monotonic() < deadline:
+            shown = self.screen()
+            if re.search(pattern, shown):
+                return shown
+            time.sleep(0.1)
+        raise AssertionError(f"{pattern!r} is not shown\n{self.screen()}\n{self._mission.story()}")
+
+
+@contextlib.contextmanager
+def terminal(mission: RunningMission, folder: Path) -> Iterator[Terminal]:
+    made = Terminal(folder / "tmux", mission)
+    try:
+        yield made
+    finally:
+        made.tmux("kill-server")
+
+
+@pytest.fixture(scope="module")
+def mission() -> Iterator[RunningMission]:
+    with mission_up() as running:
+        yield running
+
+
+def holder(mission: RunningMission, robot: str) -> str:
+    found: dict[str, Any] = next(rc for rc in mission.status()["rcs"] if rc["rc"] == robot)
+    return found["holders"][0]["arc"] if found["holders"] else ""
+
+
+def test_from_attach_to_release_key_by_key(mission: RunningMission, tmp_path: Path) -> None:
+    with terminal(mission, tmp_path) as screen:
+        screen.open("scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name)
+        screen.shows(r"you hold scout3")
+        screen.shows(r"▀▀▀▀▀▀")
+        assert holder(mission, "scout3").startswith("console-")
+        screen.press("a", "a", "a")
+        screen.press("y")
+        screen.shows(r"why scout1\?")
+        screen.press("q")
+        screen.press("Tab", "Tab", "Tab", "Tab", "Tab")
+        screen.shows(r"commands to scout3")
+        screen.press("x")
+        screen.shows(r"scout3 is STOPPED by anna")
+        screen.press("c")
+        screen.shows(r"you hold scout3")
+        screen.press("2")
+        screen.shows(r"you hold scout2")
+        assert holder(mission, "scout2").startswith("console-")
+        assert not holder(mission, "scout3").startswith("console-")
+        screen.press("r")
+        screen.shows(r"you hold no robot")
+        screen.press("q")
+        screen.shows(r"ENDED WITH 0")
+    told = "\n".join(mission.lines)
+    for line in ("scout3: was taken over by anna", "was stopped", "may move again", "scout3: was given back by anna"):
+        assert line in told, mission.story()
+
+
+def test_a_monitor_holds_nothing_asks_for_nothing_and_can_still_stop_all_robots(
+    mission: RunningMission, tmp_path: Path
+) -> None:
+    with terminal(mission, tmp_path) as screen:
+        screen.open("scout-console", "monitor", "--user", "ben", "--mission", mission.name)
+        screen.shows(r"watching; you hold no robot")
+        screen.shows(r"timeline")
+        screen.press("t", "w", "r")
+        requests = mission.status()["requests"]
+        assert not [one for one in requests if one["owner"].startswith("ui_console/")]
+        screen.press("X")
+        screen.shows(r"STOPPED by ben")
+        screen.press("BTab", "BTab", "BTab")
+        for _robot in range(3):
+            screen.press("c")
+            screen.press("]")
+            time.sleep(0.5)
+        deadline = time.monotonic() + SHOWN_WITHIN_S
+        while "STOPPED" in screen.screen() and time.monotonic() < deadline:
+            time.sleep(0.2)
+        assert "STOPPED" not in screen.screen()
+        screen.press("q")
+        screen.shows(r"ENDED WITH 0")
+
+
+def test_a_monitor_without_a_screen_tells_the_same_as_json_lines(mission: RunningMission) -> None:
+    command = [str(BIN / "scout-console"), "monitor", "--json", "--mission", mission.name]
+    with subprocess.Popen(command, env=mission.environment, stdout=subprocess.PIPE, text=True) as watching:
+        assert watching.stdout is not None
+        words = {json.loads(watching.stdout.readline())["event"] for _line in range(5)}
+        watching.terminate()
+    assert "schedule" in words
