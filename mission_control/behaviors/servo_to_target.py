@@ -85,6 +85,7 @@ class Servo(Driver[S]):
         self._fresh = asyncio.Event()
         self._unusable: UnusablePicture | None = None
         self._acquisitions = 0
+        self._counted_rad = 0.0
         self._phase = Phase.ACQUIRING
 
     @property
@@ -94,9 +95,7 @@ class Servo(Driver[S]):
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera will do
         """Acquire the target anew; see ``Behavior.resumed``."""
-        self._servo.resumed()
-        self._step, self._seen_s, self._phase = None, None, Phase.ACQUIRING
-        self._fresh.clear()
+        self.look_anew()
 
     def see(self, frame: Frame) -> None:
         """Work out what this picture leads to; ``drive_on`` carries it out."""
@@ -122,6 +121,12 @@ class Servo(Driver[S]):
         mine = {"acquisitions": self._acquisitions, "approaches": self._servo.approaches}
         return {**super().statistics(), **mine}
 
+    def look_anew(self) -> None:
+        """Begin again with acquisition: the robot stands still, perhaps elsewhere."""
+        self._servo.resumed()
+        self._step, self._seen_s, self._phase = None, None, Phase.ACQUIRING
+        self._fresh.clear()
+
     async def next_step(self) -> Step:
         """Return what the newest picture led to, when there is a newer one than the last time.
 
@@ -142,7 +147,12 @@ class Servo(Driver[S]):
 
     def has_searched(self, turns: float) -> bool:
         """Return True if the robot has turned round so often without a sight of the target; never for 0."""
-        return turns > 0 and self._servo.searched_rad >= 2 * math.pi * turns
+        self._counted_rad = min(self._counted_rad, self._servo.searched_rad)  # a sight begins the count anew
+        return turns > 0 and self._servo.searched_rad - self._counted_rad >= 2 * math.pi * turns
+
+    def search_anew(self) -> None:
+        """Count turns in search of the target from here on."""
+        self._counted_rad = self._servo.searched_rad
 
     def arrived(self) -> None:
         """Succeed, with where the robot stands before the target."""

@@ -37,8 +37,8 @@ def assert_at_its_place(at: Pose) -> None:
     assert abs(at.heading_rad - PLACE[2]) < math.radians(10.0)
 
 
-@settings(max_examples=2, phases=[Phase.generate], derandomize=True, deadline=None)
-@given(st.lists(st.tuples(st.floats(0.0, 15.0), st.floats(0.2, 2.0), st.sampled_from([-1, 1])), min_size=1, max_size=2))
+@settings(max_examples=1, phases=[Phase.generate], derandomize=True, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.0, 15.0), st.floats(0.2, 2.0), st.sampled_from([-1, 1])), min_size=2, max_size=2))
 def test_taken_over_and_turned_away_at_any_moment_it_still_arrives(
     disturbances: list[tuple[float, float, int]],
 ) -> None:

@@ -1,0 +1,117 @@
+"""Return to pickup: bring a robot back to the marked place where it is picked up.
+
+From anywhere in the room it first drives, tracked from above, to where the mark can be seen; then it servoes to the
+mark. Whoever takes the robot over and leaves it at the other end of the room has it come back from there.
+
+In mission.xml: an ARC of kind ``capture`` at the camera's full rate, with a period as short as a picture's; the
+tracker's name as ``localizer``; a place before the mark as ``near``.
+
+Source: IROS 2001, "Visual Servoing": Scouts find their way back to where they can be picked up.
+"""
+
+from __future__ import annotations
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.launch import Launch
+from mission_control.behaviors.driver import DECIDE_EVERY_S
+from mission_control.behaviors.motion import MOST_M_S, read_places
+from mission_control.behaviors.pickup_route import PickupRoute, Stage
+from mission_control.behaviors.servo_to_target import Servo, ServoParameters, TargetNotFound
+from mission_control.vision.servo_law import Stage as Approach
+from resource_pool.arc_client import Frame
+
+
+class PickupParameters(ServoParameters, frozen=True, kw_only=True):
+    """Parameters of ``ReturnToPickup``, besides those of ``ServoToTarget``.
+
+    Attributes:
+        near: Where to go first, ``x,y`` in meters: best 1 to 2 m straight before the mark.
+        localizer: Component that says where a robot is: its name if it is in the resource pool, else its address.
+        speed_m_s: On the way there, above 0, at most 0.3.
+        search_turns: So many turns it looks for the mark before that counts as in vain, above 0.
+        attempts: After so many times in vain it fails, at least 1.
+    """
+
+    near: str
+    localizer: str
+    speed_m_s: float = 0.2
+    search_turns: float = 1.25
+    attempts: int = 3
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(read_places(self.near)) != 1:
+            raise ValueError(f"near is {self.near!r}: write one place, x,y in meters")
+        if not self.localizer:
+            raise ValueError("localizer is empty: name the component that sees where robots are")
+        if not 0 < self.speed_m_s <= MOST_M_S:
+            raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
+        if self.search_turns <= 0:
+            raise ValueError(f"search_turns is {self.search_turns}: it must be above 0")
+        if self.attempts < 1:
+            raise ValueError(f"attempts is {self.attempts}: it must be at least 1")
+
+
+class ReturnToPickup(Servo[PickupParameters]):
+    """Succeeds at its place before the mark, wherever it begins; fails if the mark is not to be found."""
+
+    parameters_type = PickupParameters
+
+    def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
+        super().__init__(launch, bus, clock)
+        given = self.parameters
+        [near] = read_places(given.near)
+        self._route = PickupRoute(near, speed_m_s=given.speed_m_s, attempts=given.attempts)
+
+    @property
+    def route(self) -> PickupRoute:
+        """How far it is; read only."""
+        return self._route
+
+    def see(self, frame: Frame) -> None:
+        """Look for the mark, and follow it, as soon as the robot goes by sight."""
+        if self._route.stage is Stage.BY_SIGHT:
+            super().see(frame)
+
+    async def drive_on(self, robot: str) -> None:
+        """Go to where the mark can be seen, then by sight; see ``Driver.drive_on``."""
+        while self._route.stage is not Stage.FAILED:
+            if self._route.stage is Stage.BY_SIGHT:
+                if await self._go_by_sight(robot):
+                    return
+            else:
+                await self._travel(robot)
+        await self.held.halt()
+        self.give_up(TargetNotFound(f"{robot} looked for the mark {self._route.in_vain} times"))
+
+    async def suspended(self, reason: str, by: str) -> None:
+        """Keep what was tried; see ``Behavior.suspended``."""
+        self._route.interrupt()
+        await super().suspended(reason, by)
+
+    def statistics(self) -> dict[str, float]:
+        """Return the base's counters, and how often the mark was looked for in vain."""
+        return {**super().statistics(), "searched_in_vain": self._route.in_vain}
+
+    async def _travel(self, robot: str) -> None:
+        position = await self.locate(self.parameters.localizer, robot)
+        await self.move(self._route.decide(position, self.clock.now_s()))
+        self.report(f"{robot} {self._route.stage}")
+        if self._route.stage is Stage.BY_SIGHT:
+            self.look_anew()
+        else:
+            await self.clock.sleep_s(DECIDE_EVERY_S)
+
+    async def _go_by_sight(self, robot: str) -> bool:
+        """Do what the next picture leads to; return True at the mark."""
+        step = await self.next_step()
+        if self.has_searched(self.parameters.search_turns):
+            self._route.not_found()
+            self.search_anew()
+            return False
+        await self.follow(robot, step)
+        if step.stage is not Approach.ARRIVED:
+            return False
+        await self.held.halt()
+        self.arrived()
+        return True

@@ -1,0 +1,104 @@
+"""Returning to the marked place: the way there with a played robot, then all of it in the simulated world."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import pytest
+from behaviors_at_work import Person, at_work, driving, example, pose, wait_until
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backbone.bus.clock import run_virtual
+from mission_control.behaviors.motion import Motion, Place, Position
+from mission_control.behaviors.pickup_route import AWAY_M, NEAR_M, PickupRoute, Stage
+from mission_control.behaviors.return_to_pickup import PickupParameters, ReturnToPickup
+from mission_control.messages import BehaviorStatus
+
+NAME, ROBOT = "return-scout5", "scout5"
+NEAR = Place(2.0, 2.0)
+positions = st.builds(Position, st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-math.pi, math.pi))
+
+
+def pickup_route(attempts: int = 2) -> PickupRoute:
+    return PickupRoute(NEAR, speed_m_s=0.2, attempts=attempts)
+
+
+@given(positions)
+def test_far_from_the_mark_it_travels_first_and_near_it_goes_by_sight_at_once(position: Position) -> None:
+    route = pickup_route()
+    motion = route.decide(position, 0.0)
+    if NEAR.distance_m(position) > AWAY_M:
+        assert route.stage is Stage.TRAVEL
+        assert motion != Motion()
+    else:
+        assert route.stage is Stage.BY_SIGHT
+        assert motion == Motion()
+
+
+@given(positions, positions)
+def test_wherever_it_was_left_after_a_suspension_it_goes_on_from_there(before: Position, after: Position) -> None:
+    route = pickup_route()
+    route.decide(before, 0.0)
+    route.interrupt()
+    assert route.stage is Stage.UNKNOWN
+    route.decide(after, 100.0)
+    assert (route.stage is Stage.TRAVEL) == (NEAR.distance_m(after) > AWAY_M)
+
+
+def test_it_travels_until_it_is_near_and_is_freed_when_it_does_not_get_on() -> None:
+    route, stuck = pickup_route(), Position(5.0, 2.0, math.pi)
+    motions = [route.decide(stuck, tenth / 10) for tenth in range(60)]
+    assert Motion(-0.35) in motions
+    assert route.decide(Position(2.0 + NEAR_M / 2, 2.0, 0.0), 6.0) == Motion()
+    assert route.stage is Stage.BY_SIGHT
+
+
+def test_what_was_looked_for_in_vain_is_remembered_over_a_suspension() -> None:
+    route = pickup_route(attempts=2)
+    route.decide(Position(2.0, 2.0, 0.0), 0.0)
+    route.not_found()
+    assert route.stage is Stage.TRAVEL
+    route.interrupt()
+    assert route.in_vain == 1
+    route.decide(Position(2.0, 2.0, 0.0), 50.0)
+    route.not_found()
+    assert route.stage is Stage.FAILED
+    route.interrupt()
+    assert route.stage is Stage.FAILED
+
+
+def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark() -> None:
+    async def scene() -> None:
+        person = Person()
+        async with at_work(example(NAME), person) as running:
+            behavior = running.component(NAME)
+            assert isinstance(behavior, ReturnToPickup)
+            await wait_until(running, lambda: behavior.route.stage is Stage.BY_SIGHT, 30.0)
+            await person.take_over(ROBOT, driving(-12.0, -13.0, 6.0))
+            await wait_until(running, lambda: behavior.status.is_final, 120.0)
+            assert behavior.status is BehaviorStatus.SUCCESS, behavior.payload
+            assert behavior.statistics()["times_suspended"] >= 1
+            at = await pose(running, ROBOT)
+            assert math.hypot(at.x_m - (0.2 + 0.45), at.y_m - 4.5) < 0.05
+            assert abs(abs(at.heading_rad) - math.pi) < math.radians(10.0)
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [
+        ({"near": "1"}, "is no place"),
+        ({"near": "1,1 2,2"}, "write one place"),
+        ({"localizer": ""}, "localizer is empty"),
+        ({"speed_m_s": 0.0}, "above 0"),
+        ({"search_turns": 0.0}, "must be above 0"),
+        ({"attempts": 0}, "at least 1"),
+        ({"stop_m": 0.0}, "0.4 to 1.2"),
+    ],
+)
+def test_parameters_that_mean_nothing_are_refused_with_the_remedy(given: dict[str, object], complaint: str) -> None:
+    with pytest.raises(msgspec.ValidationError, match=complaint):
+        msgspec.convert({"near": "1,1", "localizer": "world", **given}, PickupParameters)
