@@ -71,6 +71,7 @@ class ConsoleModel:
         self.applied: CommandApplied | None = None
         self._sees = sees
         self._pictures: dict[str, deque[PictureSeen]] = {}
+        self._blind = ""  # robot that is held without pictures to drive by
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: ConsoleEvent) -> None:
@@ -84,13 +85,13 @@ class ConsoleModel:
         """Find out what only time can tell; right before a view is taken."""
         self.team.look(now_s)
         stale = self._stale_line(now_s)
-        robot = self.robot
-        for alarmed in {robot, *self._pictures}:
-            if stale and alarmed == robot:
-                remedy = "Stop; do not drive by an old picture."
-                self.team.alarms.begin(AlarmKind.STALE_VIDEO, alarmed, stale, now_s, remedy)
-            else:
-                self.team.alarms.end(AlarmKind.STALE_VIDEO, alarmed, now_s)
+        blind = self.robot if stale else ""
+        if self._blind not in ("", blind):  # others who share the team model may be blind to other robots
+            self.team.alarms.end(AlarmKind.STALE_VIDEO, self._blind, now_s)
+        self._blind = blind
+        if blind:
+            remedy = "Stop; do not drive by an old picture."
+            self.team.alarms.begin(AlarmKind.STALE_VIDEO, blind, stale, now_s, remedy)
 
     def acknowledge(self, key: str = "") -> int:
         """Note that this console's user has seen one alarm, or with an empty key all; return how many."""

@@ -37,6 +37,7 @@ class AlarmKind(StrEnum):
     TAKEN = "taken"  # this console's robot went to somebody else
     REFUSED = "refused"  # somebody said no to this console
     NO_ANSWER = "no_answer"  # somebody did not answer this console
+    VISITOR = "visitor"  # somebody who was not let in, or misbehaves, at the web console
 
 
 class WaitingView(msgspec.Struct, frozen=True):
