@@ -44,6 +44,7 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
+EXPERIMENTS = "mission_control.experiments.cli"
 SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
 PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
 
@@ -386,6 +387,12 @@ def simulate(
         for line in outcome.finding.lines():
             say(line)
         raise typer.Exit(int(ExitCode.MISSION_FAILED))
+
+
+@app.command(add_help_option=False, context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def experiment(context: typer.Context) -> None:
+    """Run the papers' experiments on simulated robots: 'surveillance', 'load'; see 'experiment --help'."""
+    import_module(EXPERIMENTS).run(context.args)
 
 
 def _parameter(given: str) -> tuple[str, Any]:

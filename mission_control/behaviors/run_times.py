@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-GRAIN_S = 0.1  # chosen: finer differences of run times change nothing
+GRAIN_S = 0.5  # chosen: times of views are guesses, and run times that hardly differ make schedules nobody can read
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,9 @@ def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect
 
     Example:
         >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
-        RunTimes(minimum_s=2.4, maximum_s=3.2)
+        RunTimes(minimum_s=2.5, maximum_s=3.5)
         >>> useful_run_times(view_s=2.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
-        RunTimes(minimum_s=5.0, maximum_s=5.8)
+        RunTimes(minimum_s=5.0, maximum_s=6.0)
 
     Raises:
         ValueError: A time is negative or not finite, or ``detect_s`` or ``given_s`` is 0.

@@ -1,0 +1,1 @@
+"""The papers' experiments on simulated robots: many trials, in lock step, from a seed."""

@@ -1,0 +1,166 @@
+"""Conditions of the surveillance experiment, and which of them the papers measured. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import msgspec
+
+from backbone.errors import Refusal
+from mission_control.experiments.geometry import EXTRAS, PASSAGES, SLICE_S, WATCHERS, Passage
+
+Policy = Literal["paper", "adaptive"]
+Order = Literal["active-first", "extra-first", "interleaved"]
+
+MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
+
+
+class ImpossibleCondition(Refusal):
+    """No such experiment can be made."""
+
+    code = "experiment.condition"
+    remedy = "See 'scout-backbone experiment surveillance --help' for what is possible."
+
+
+class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What differs between runs; all else is the one geometry.
+
+    Attributes:
+        active: Scouts that watch.
+        extra: Scouts that consoles hold, of the mission's own priority.
+        channels: Video frequencies, each with a framegrabber.
+        policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers work out their run times and ask
+            for more on a glimpse, equals get equal time, and consoles want no air while nobody drives.
+        target: ``pioneer`` or ``person``.
+        speed_m_s: Of the target; 0: that of the papers.
+        slice_s: Run time that watchers and consoles are given, seconds.
+        order: In which order watchers and consoles come, and so have their turns.
+        driven: Share of the time in which somebody drives at each console.
+        noise: Of the picture: 0 none, 1 as the papers tell.
+        frames_wanted: Certain pictures of one slice before a watcher tells.
+    """
+
+    active: Annotated[int, msgspec.Meta(ge=1, le=len(WATCHERS))] = 2
+    extra: Annotated[int, msgspec.Meta(ge=0, le=len(EXTRAS))] = 0
+    channels: Annotated[int, msgspec.Meta(ge=1, le=MOST_CHANNELS)] = 1
+    policy: Policy = "paper"
+    target: Literal["pioneer", "person"] = "pioneer"
+    speed_m_s: Annotated[float, msgspec.Meta(ge=0, le=10)] = 0.0
+    slice_s: Annotated[float, msgspec.Meta(gt=0, le=600)] = SLICE_S
+    order: Order = "active-first"
+    driven: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0
+    noise: Annotated[float, msgspec.Meta(ge=0, le=10)] = 1.0
+    frames_wanted: Annotated[int, msgspec.Meta(ge=1, le=100)] = 6
+
+    @property
+    def passage(self) -> Passage:
+        """What passes, at the speed of this condition."""
+        usual = PASSAGES[self.target]
+        if not self.speed_m_s:
+            return usual
+        return Passage(usual.shape, self.speed_m_s, usual.there_and_back, usual.radius_m)
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """Names of all Scouts: those that watch first."""
+        return tuple(f"scout{number}" for number in range(1, self.active + self.extra + 1))
+
+    @property
+    def watching(self) -> tuple[str, ...]:
+        """Names of those that watch."""
+        return self.robots[: self.active]
+
+    @property
+    def driven_robots(self) -> tuple[str, ...]:
+        """Names of those that consoles hold."""
+        return self.robots[self.active :]
+
+    @property
+    def in_turn(self) -> tuple[str, ...]:
+        """Names of all in the order of their first turns.
+
+        Example:
+            >>> Condition(active=2, extra=2, order="interleaved").in_turn
+            ('scout1', 'scout3', 'scout2', 'scout4')
+        """
+        match self.order:
+            case "active-first":
+                return self.robots
+            case "extra-first":
+                return (*self.driven_robots, *self.watching)
+            case "interleaved":
+                most = max(self.active, self.extra)
+                return tuple(
+                    robot
+                    for number in range(most)
+                    for robot in (*self.watching[number : number + 1], *self.driven_robots[number : number + 1])
+                )
+
+    def title(self) -> str:
+        """Return what is said of it in one line."""
+        words = [f"{self.active} active, {self.extra} extra, {self.target} {self.passage.speed_m_s:g} m/s"]
+        words += [f"{self.channels} channels"] * (self.channels > 1)
+        words += [f"driven {self.driven:.0%}"] * (self.extra > 0 and self.driven < 1)
+        words += [f"slices {self.slice_s:g} s"] * (self.slice_s != SLICE_S)
+        words += [f"order {self.order}"] * (self.order != "active-first")
+        words += ["no noise" if not self.noise else f"noise x {self.noise:g}"] * (self.noise != 1)
+        words += [f"{self.frames_wanted} frames"] * (self.frames_wanted != Condition().frames_wanted)
+        return ", ".join(words)
+
+
+def checked(**wanted: object) -> Condition:
+    """Return the condition of these values.
+
+    Raises:
+        ImpossibleCondition: One of them is not possible; the text says which and why.
+    """
+    try:
+        return msgspec.convert(wanted, Condition)
+    except msgspec.ValidationError as error:
+        raise ImpossibleCondition(str(error)) from None
+
+
+class Published(msgspec.Struct, frozen=True):
+    """What a paper measured under a condition.
+
+    Attributes:
+        source: Where.
+        detected: Trials in which the target was detected.
+        trials: Of so many; 0: the paper gives no count.
+        said: As the paper says it.
+    """
+
+    source: str
+    detected: int
+    trials: int
+    said: str
+
+
+IROS = "IROS 2001, figure 4"
+RAM = "RAM 2002"
+
+PUBLISHED: dict[Condition, Published] = {
+    Condition(extra=0): Published(IROS, 16, 20, "80 %"),
+    Condition(extra=1): Published(IROS, 15, 20, "75 %"),
+    Condition(extra=2): Published(IROS, 12, 20, "60 %"),
+    Condition(extra=3): Published(IROS, 10, 20, "50 %"),
+    Condition(target="person"): Published(RAM, 18, 22, "81 %"),
+    Condition(target="person", extra=2): Published(RAM, 12, 22, "below 57 %"),
+    Condition(channels=2, noise=0.0): Published("IROS 2001, preliminary", 0, 0, "100 %"),
+}
+"""18 of 22 is the nearest to the 81 % of RAM 2002 that 22 trials can give, 12 of 22 the most that is below 57 %."""
+
+PAPERS: Sequence[Condition] = tuple(PUBLISHED)
+QUARTER: Sequence[Condition] = tuple(Condition(extra=extra, policy="adaptive", driven=0.25) for extra in range(4))
+ALWAYS: Sequence[Condition] = tuple(Condition(extra=extra, policy="adaptive") for extra in range(1, 4))
+SPEEDS_M_S = (0.35, 0.5, 0.9)
+"""Fixed periods resonate with a target's timing; so policies are compared over a range of speeds."""
+BESIDE: Sequence[Condition] = tuple(
+    Condition(extra=2, policy=policy, speed_m_s=speed_m_s)
+    for speed_m_s in SPEEDS_M_S
+    if speed_m_s != PASSAGES["pioneer"].speed_m_s
+    for policy in ("paper", "adaptive")
+)
+EVERYTHING: Sequence[Condition] = (*PAPERS, *QUARTER, *ALWAYS, *BESIDE)
+"""What is measured without further options."""

@@ -1,0 +1,55 @@
+"""Many trials on all cores: the same trials give the same results, however many processes share them."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import TypeVar
+
+Order = TypeVar("Order")
+Result = TypeVar("Result")
+
+BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and pictures once drawn are used again
+
+Progress = Callable[[int, int], None]
+"""Called with how many are done, and how many there are."""
+
+
+def run_all(
+    work: Callable[[Order], Result],
+    orders: Sequence[Order],
+    *,
+    jobs: int = 0,
+    progress: Progress | None = None,
+) -> list[Result]:
+    """Do all the work and return its results in the order of the orders.
+
+    Args:
+        work: A function of a module, which other processes can import; what it returns depends on its order alone.
+        orders: One for each result; they and the results can be pickled.
+        jobs: Processes; 0: one a core; 1: this one.
+        progress: Told after each result.
+
+    Raises:
+        Exception: Whatever the work raised first; nothing more is begun.
+    """
+    results: list[Result] = []
+    for result in _results(work, orders, jobs or os.cpu_count() or 1):
+        results.append(result)
+        if progress is not None:
+            progress(len(results), len(orders))
+    return results
+
+
+def _results(work: Callable[[Order], Result], orders: Sequence[Order], jobs: int) -> Iterator[Result]:
+    if jobs == 1 or len(orders) <= 1:
+        yield from map(work, orders)
+        return
+    # Spawned, not forked: a fork of a process with threads of its own may hang.
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        try:
+            yield from pool.map(work, orders, chunksize=BATCH)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)

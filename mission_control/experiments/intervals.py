@@ -1,0 +1,46 @@
+"""How sure a rate is that was counted: Wilson's interval and standard errors. Pure."""
+
+from __future__ import annotations
+
+import math
+
+Z95 = 1.959963984540054  # the normal distribution's 97.5 % point
+
+
+def wilson(detected: int, trials: int, z: float = Z95) -> tuple[float, float]:
+    """Return the interval in which the true rate lies, by Wilson's score.
+
+    Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927.
+
+    Args:
+        detected: Successes, 0 to ``trials``.
+        trials: Above 0.
+        z: How many standard deviations; the default gives 95 %.
+
+    Raises:
+        ValueError: The numbers are no count of successes.
+
+    Example:
+        >>> [round(bound, 2) for bound in wilson(16, 20)]
+        [0.58, 0.92]
+    """
+    if not 0 <= detected <= trials or not trials:
+        raise ValueError(f"{detected} of {trials} is no rate")
+    rate, square = detected / trials, z * z
+    middle = (rate + square / (2 * trials)) / (1 + square / trials)
+    half = z / (1 + square / trials) * math.sqrt(rate * (1 - rate) / trials + square / (4 * trials**2))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def standard_errors_apart(detected: int, trials: int, predicted: float) -> float:
+    """Return how many standard errors a counted rate is from a predicted one.
+
+    The error is that of the prediction if it were true, but at least that of half a success, so that a prediction
+    of 0 or 1 can be missed by one.
+
+    Example:
+        >>> standard_errors_apart(60, 100, 0.5)
+        2.0
+    """
+    rate = min(1 - 0.5 / trials, max(0.5 / trials, predicted))
+    return (detected / trials - predicted) / math.sqrt(rate * (1 - rate) / trials)

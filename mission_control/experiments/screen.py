@@ -1,0 +1,89 @@
+"""What the terminal shows of an experiment: tables and a progress bar."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from mission_control.experiments.conditions import PUBLISHED
+from mission_control.experiments.harness import Progress as Told
+from mission_control.experiments.intervals import wilson
+from mission_control.experiments.surveillance import Outcome, Row
+
+AGREES_WITHIN = 3.0
+"""Standard errors between rate and prediction that are no disagreement."""
+
+
+def table(outcome: Outcome, title: str) -> Table:
+    """Return the rows as a table: ours, the prediction, and what the papers say beside it."""
+    found = Table(title=title, title_justify="left")
+    for heading in ("condition", "policy"):
+        found.add_column(heading)
+    for heading in (
+        "detected",
+        "rate",
+        "95 %",
+        "predicted",
+        "off by",
+        "paper",
+        "paper's 95 %",
+        "false alarms",
+        "sound",
+    ):
+        found.add_column(heading, justify="right")
+    for row in outcome.rows:
+        found.add_row(*_cells(row))
+    return found
+
+
+def summary(outcome: Outcome) -> str:
+    """Return how long it took and whether grants and transmitters agreed, one line."""
+    switches = sum(row.switches for row in outcome.rows)
+    wrong = sum(len(row.disagreements) for row in outcome.rows)
+    jammed = sum(row.jammed_frames for row in outcome.rows)
+    stale = sum(row.stale_packets for row in outcome.rows)
+    speed = outcome.simulated_s / outcome.wall_s if outcome.wall_s else 0.0
+    return (
+        f"{outcome.simulated_s:.0f} s simulated in {outcome.wall_s:.0f} s ({speed:.0f} times real time), seed "
+        f"{outcome.seed}; grants and transmitters compared at {switches} switches: {wrong} disagreements, "
+        f"{jammed} frames with two transmitters, {stale} packets of past grants"
+    )
+
+
+@contextmanager
+def progress_bar(console: Console, what: str) -> Iterator[Told]:
+    """Give a function to be told of progress, which the console shows until the end of the block."""
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, of: bar.update(task, completed=done, total=of)
+
+
+def _cells(row: Row) -> list[str]:
+    given = PUBLISHED.get(row.condition)
+    paper, paper95 = "", ""
+    if given is not None:
+        paper = given.said
+        paper95 = _interval(wilson(given.detected, given.trials)) if given.trials else "-"
+    off = row.errors_from_predicted
+    return [
+        row.condition.title(),
+        row.condition.policy,
+        f"{row.detected}/{row.trials}",
+        f"{row.rate:.1%}",
+        _interval(row.interval95),
+        f"{row.predicted:.1%}",
+        f"{off:+.1f} s.e.{' !' if abs(off) > AGREES_WITHIN else ''}",
+        paper,
+        paper95,
+        str(row.false_alarms),
+        "yes" if row.is_sound else "NO",
+    ]
+
+
+def _interval(bounds: tuple[float, float]) -> str:
+    return f"{bounds[0]:.0%} - {bounds[1]:.0%}"

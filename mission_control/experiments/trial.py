@@ -1,0 +1,240 @@
+"""One trial of the surveillance experiment: a whole mission on a virtual clock, and what passes through its room."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import msgspec
+
+from backbone.bus.clock import run_virtual
+from backbone.keys import Conversation
+from backbone.mission.behavior_orders import behavior_orders
+from backbone.naming import Subsystem, address
+from backbone.placer.messages import Start
+from backbone.wire import Envelope
+from mission_control.experiments.audit import Transmitting, agreement
+from mission_control.experiments.conditions import Condition
+from mission_control.experiments.geometry import FRAMES_PER_S, SETTLING_S, WATCHERS, is_in_view
+from mission_control.experiments.mission_file import (
+    MISSION_PRIORITY,
+    PACKET_TIME_S,
+    PERIOD_S,
+    WORLD,
+    mission_of_trial,
+    watcher_of,
+)
+from mission_control.experiments.operator import Operator
+from mission_control.messages import MotionSeen
+from resource_pool.messages import WorldState
+from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
+
+CLAIMS_FROM_FRAME = 15  # chosen: half a second in which the Scouts come to rest on the floor
+AFTERWARDS_S = 0.5  # chosen: pictures are on their way for less
+SWITCH_S = 0.002  # measured: a last packet on the radio ends a hold
+
+
+class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What came of one trial.
+
+    Attributes:
+        number: Of the trial, from 0.
+        detected: Whether a watcher told of motion while the target was in its view.
+        detected_s: Seconds after the target's departure at which the first such picture was taken; -1: none was.
+        seen_by: Scout that saw it; empty: none.
+        false_alarms: How often a watcher told of motion while the target was not in its view.
+        switches: Grants and ends of holds compared with the transmitters.
+        disagreements: What of that was not so.
+        jammed_frames: Frames with two transmitters on one frequency.
+        stale_packets: Packets on the air of an epoch that was over.
+        simulated_s: Mission time it took.
+        digest: Fingerprint of all decisions of the RC manager and all that was seen.
+    """
+
+    number: int
+    detected: bool
+    detected_s: float
+    seen_by: str
+    false_alarms: int
+    switches: int
+    disagreements: list[str]
+    jammed_frames: int
+    stale_packets: int
+    simulated_s: float
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """What is random about a trial.
+
+    Attributes:
+        first: Which of those in turn has the first slice.
+        departs_frame: Frames from the first connection to the target's departure.
+        world_seed: Of the world and its air.
+    """
+
+    first: int
+    departs_frame: int
+    world_seed: int
+
+
+def draw(condition: Condition, seed: int, number: int) -> Draw:
+    """Return what is random about this trial: the same for the same arguments.
+
+    The phase between the target's departure and the schedule is uniform over a round. With one frequency it is
+    made of whole turns, which are a matter of who begins, and the rest of one, which is waited for.
+    """
+    dice = Random(f"{seed} trial {number}")
+    turn_s = condition.slice_s + SETTLING_S + SWITCH_S
+    turns = len(condition.robots)
+    phase = dice.random() * turns
+    world_seed = dice.randrange(2**31)
+    if condition.channels > 1 or condition.policy != "paper":
+        return Draw(0, round(phase * turn_s * FRAMES_PER_S), world_seed)
+    return Draw(int(phase), round(phase % 1.0 * turn_s * FRAMES_PER_S), world_seed)
+
+
+def run_trial(
+    condition: Condition, seed: int, number: int, *, to_the_end: bool = False, trace: Path | None = None
+) -> Trial:
+    """Run one trial from its beginning to the detection, or until the target has passed.
+
+    Args:
+        condition: What is tried.
+        seed: Of the experiment.
+        number: Of the trial.
+        to_the_end: True: it goes on after the detection.
+        trace: File for its schedule trace, JSON lines.
+    """
+    return run_virtual(_Trial(condition, seed, number, to_the_end=to_the_end).run(trace))
+
+
+class _Trial:
+    def __init__(self, condition: Condition, seed: int, number: int, *, to_the_end: bool) -> None:
+        self._condition, self._number, self._to_the_end = condition, number, to_the_end
+        self._draw = draw(condition, seed, number)
+        self._departs_s = (CLAIMS_FROM_FRAME + self._draw.departs_frame) / FRAMES_PER_S
+        self._mission = mission_of_trial(condition, self._draw.world_seed, self._departs_s)
+        self._places = dict(zip(condition.watching, WATCHERS, strict=False))
+        self._world_began_s = 0.0
+        self._frame = 0
+        self._samples: list[Transmitting] = []
+        self._seen: list[tuple[float, str, bool]] = []
+        self._waits_for: tuple[int, asyncio.Event] | None = None
+        self._requested: dict[str, asyncio.Event] = {}
+        self._detected = asyncio.Event()
+
+    async def run(self, trace: Path | None) -> Trial:
+        bare = self._mission.model_copy(update={"behaviors": ()})
+        consoles = {"operator": Operator}
+        async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
+            running.bus.subscribe(
+                address(Subsystem.RESOURCE_POOL, WORLD), Conversation.TELEMETRY, WorldState, self._world_moved
+            )
+            running.bus.subscribe(f"{Subsystem.MISSION_CONTROL}/*", Conversation.EVENTS, MotionSeen, self._motion_seen)
+            await self._frame_number(CLAIMS_FROM_FRAME)
+            await self._claim(running)
+            await self._until_passed_or_detected()
+            over_s = running.clock.now_s()
+            world = await running.statistics(WORLD)
+            lines = list(running.trace)
+        if trace is not None:
+            end = {"ev": "end", "t": over_s}
+            trace.write_text("".join(f"{json.dumps(line)}\n" for line in (*lines, end)), encoding="utf-8")
+        return self._judge(lines, world, over_s)
+
+    # ------------------------------------------------------------------ what happens
+    async def _claim(self, running: RunningMission) -> None:
+        """Let watchers and consoles claim in their order, each after the one before has asked."""
+        condition = self._condition
+        watchers = {order.name: order for order in behavior_orders(self._mission)}
+        turns = condition.in_turn
+        for place in range(len(turns)):
+            robot = turns[(self._draw.first + place) % len(turns)]
+            if robot in condition.watching:
+                order, arc = watchers[watcher_of(robot)], f"{watcher_of(robot)}-capture"
+            else:
+                order, arc = self._console(robot), f"console-{robot}-video_drive"
+            asked = self._requested[arc] = asyncio.Event()
+            await running.start(order)
+            await asked.wait()
+
+    def _console(self, robot: str) -> Start:
+        condition = self._condition
+        parameters = {
+            "robot": robot,
+            "priority": MISSION_PRIORITY,
+            "minimum_runtime_s": condition.slice_s,
+            "period_s": PERIOD_S,
+            "packet_time_s": PACKET_TIME_S,
+            "driven": condition.driven,
+            "yields": condition.policy == "adaptive",
+            "seed": self._draw.world_seed + int(robot.removeprefix("scout")),
+        }
+        return Start("operator", f"console-{robot}", parameters)
+
+    async def _until_passed_or_detected(self) -> None:
+        passed = self._departs_s + self._condition.passage.lasts_s + AFTERWARDS_S
+        passing = asyncio.create_task(self._frame_number(round(passed * FRAMES_PER_S)), name="passing")
+        detecting = asyncio.create_task(self._detected.wait(), name="detecting")
+        try:
+            await asyncio.wait({passing, detecting}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (passing, detecting):
+                task.cancel()
+            await asyncio.wait({passing, detecting})
+
+    async def _frame_number(self, number: int) -> None:
+        """Return when the world has told of this frame."""
+        if self._frame < number:
+            event = asyncio.Event()
+            self._waits_for = number, event
+            await event.wait()
+
+    # ------------------------------------------------------------------ what is heard
+    def _decided(self, line: dict[str, Any]) -> None:
+        if line["ev"] == "request" and line["arc"] in self._requested:
+            self._requested[line["arc"]].set()
+
+    def _world_moved(self, envelope: Envelope[Any]) -> None:
+        state: WorldState = envelope.body
+        self._frame, self._world_began_s = state.frame, state.at_s - state.frame / FRAMES_PER_S
+        if not self._samples or self._samples[-1].on != state.transmitting:
+            self._samples.append(Transmitting(state.at_s, dict(state.transmitting)))
+        if self._waits_for is not None and state.frame >= self._waits_for[0]:
+            self._waits_for[1].set()
+            self._waits_for = None
+
+    def _motion_seen(self, envelope: Envelope[Any]) -> None:
+        seen: MotionSeen = envelope.body
+        since_s = seen.at_s - self._world_began_s - self._departs_s
+        is_true = is_in_view(self._condition.passage, self._places[seen.robot], since_s)
+        self._seen.append((since_s, seen.robot, is_true))
+        if is_true and not self._to_the_end:
+            self._detected.set()
+
+    # ------------------------------------------------------------------ what comes of it
+    def _judge(self, trace: list[dict[str, Any]], world: dict[str, float], over_s: float) -> Trial:
+        frequencies = [f"video{channel}" for channel in range(1, self._condition.channels + 1)]
+        agreed = agreement(trace, self._samples, self._condition.robots, frequencies, over_s)
+        true = [(since_s, robot) for since_s, robot, is_true in self._seen if is_true]
+        everything = json.dumps([trace, self._seen], sort_keys=True)
+        return Trial(
+            number=self._number,
+            detected=bool(true),
+            detected_s=round(true[0][0], 6) if true else -1.0,
+            seen_by=true[0][1] if true else "",
+            false_alarms=len(self._seen) - len(true),
+            switches=agreed.switches,
+            disagreements=list(agreed.broken),
+            jammed_frames=agreed.jammed + int(world["jammed_frames"]),
+            stale_packets=int(world["stale_packets"]),
+            simulated_s=over_s,
+            digest=hashlib.sha256(everything.encode()).hexdigest(),
+        )
