@@ -103,8 +103,9 @@ class Fading:
 
     def __init__(self, key: Sequence[int]) -> None:
         rng = np.random.default_rng(key)
-        directions = rng.uniform(0.0, 2 * math.pi, WAVES)
-        self._turns_rad_s: NDArray[np.float64] = 2 * math.pi * _DOPPLER_HZ * np.cos(directions)
+        # Half a circle has all shifts of a whole one; one wave from each part of it keeps runs alike.
+        directions_rad = math.pi * (np.arange(WAVES) + rng.random(WAVES)) / WAVES
+        self._turns_rad_s: NDArray[np.float64] = 2 * math.pi * _DOPPLER_HZ * np.cos(directions_rad)
         self._phases_rad: NDArray[np.float64] = rng.uniform(0.0, 2 * math.pi, WAVES)
 
     def power(self, time_s: float) -> float:

@@ -28,7 +28,7 @@ from scout_model.dimensions import FRAMES_PER_S, PICTURE_HEIGHT_PX, PICTURE_WIDT
 
 Picture = NDArray[np.uint8]
 
-SETTLING_S = 0.3  # chosen: nine frames until receiver and framegrabber have locked to a picture
+SETTLING_S = 0.25  # chosen: with the 0.3 s a mission gives a frequency to connect, the first picture used is still
 SNOW_LEVELS = 70.0  # chosen: standard deviation in grey levels; black and white specks all over
 FAINTEST_LEVELS = 0.1  # chosen: a weaker grain is rounded away
 WEAK_DB = 16.0  # chosen: below, contrast fades towards gray

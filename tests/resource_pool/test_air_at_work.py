@@ -22,6 +22,8 @@ from resource_pool.messages import Applied, Tune
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model import radio_link
 from scout_model.description import CLEAN_AIR, AirDescription, ScoutPlace, WorldDescription
+from scout_model.dimensions import FRAMES_PER_S
+from scout_model.video_link import SETTLING_S
 
 ROOM = WorldDescription(
     8.0,
@@ -31,6 +33,7 @@ ROOM = WorldDescription(
     air=CLEAN_AIR,
 )
 DRIVE, HALT = radio_link.encode_drive(10.0, 10.0), radio_link.encode_halt()
+SETTLED = round(SETTLING_S * FRAMES_PER_S)
 STILL_M = 0.001  # while a world begins its robots settle on the floor
 
 
@@ -169,8 +172,8 @@ def test_a_picture_settles_after_the_transmitter_comes_on_and_again_after_the_re
             radio = SimulatedRadio(here.site("radio"))
             for _ in range(2):  # the second time only the receiver is new
                 kinds = [picture.kind for picture in await watched(here, radio, 1.0) if picture.transmitters]
-                assert kinds[:9] == ["settling"] * 9
-                assert set(kinds[9:]) == {"clean"}
+                assert kinds[:SETTLED] == ["settling"] * SETTLED
+                assert set(kinds[SETTLED:]) == {"clean"}
 
     run_virtual(main())
 
