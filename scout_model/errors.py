@@ -35,6 +35,13 @@ class InvalidWorld(ScoutModelError, ValueError):
     remedy = "Correct the description of the world."
 
 
+class InvalidRoom(InvalidWorld):
+    """The MJCF of a room of one's own cannot be used."""
+
+    code = "world.room"
+    remedy = "Mend the room's MJCF file; 'python -m mujoco.viewer --mjcf=FILE' shows what MuJoCo makes of it."
+
+
 class MalformedPacket(ScoutModelError, ValueError):
     """These bytes, or these values, are no packet of the command radio."""
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import mujoco
 
-from scout_model.errors import InvalidWorld
+from scout_model.errors import InvalidRoom
 
 _SHOWN = {
     mujoco.mjtGeom.mjGEOM_PLANE,
@@ -33,20 +33,24 @@ def add_room(spec: Any, mjcf: str) -> None:
         mjcf: The room; every file it needs must stand in it.
 
     Raises:
-        InvalidWorld: MuJoCo cannot read it, or it has shapes that no camera draws.
+        InvalidRoom: MuJoCo cannot read or build it, or it has shapes that no camera draws.
     """
     if "<mujoco" not in mjcf:
-        raise InvalidWorld("the room's file is no MJCF: it has no <mujoco>")
+        raise InvalidRoom("the room's file is no MJCF: it has no <mujoco>")
     try:
         room = mujoco.MjSpec.from_string(mjcf)
     except ValueError as error:
-        raise InvalidWorld(f"MuJoCo cannot read the room's MJCF: {error}") from error
+        raise InvalidRoom(f"MuJoCo cannot read the room's MJCF: {error}") from error
     for mesh in (*room.meshes, *room.textures, *room.hfields, *room.skins):
         if getattr(mesh, "file", ""):
-            raise InvalidWorld(f"the room's MJCF needs the file {mesh.file!r}; write what is in it into the MJCF")
+            raise InvalidRoom(f"the room's MJCF needs the file {mesh.file!r}; write what is in it into the MJCF")
+    try:
+        room.copy().compile()
+    except ValueError as error:
+        raise InvalidRoom(f"MuJoCo cannot build the room: {error}") from error
     for geom in room.geoms:
         if geom.type not in _SHOWN:
-            raise InvalidWorld(f"no camera draws the room's geom {geom.name!r}; use boxes, cylinders or meshes")
+            raise InvalidRoom(f"no camera draws the room's geom {geom.name!r}; use boxes, cylinders or meshes")
         # What a file does not say is in MuJoCo's group 0, which is painted behind everything.
         if geom.group == _ROOM and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
             geom.group = _THINGS
