@@ -31,7 +31,7 @@ from mission_control.vision.target_acquisition import acquire
 REACH_COLUMNS_PX = 16  # measured: 0.9 rad/s moves the picture by 13 pixels from frame to frame
 REACH_ROWS_PX = 20  # measured: the pitch of a starting or stopping body moves the picture by up to 18
 SEARCH_FRAMES = 8  # chosen: 0.27 s, longer than nearly every burst of bad pictures (0.15 s on average)
-STEADY_PX, STEADY_SHARE = 0.75, 0.08  # chosen: of the pitch; three times the noise, and the growth of an approach
+STEADY_PX, STEADY_SHARE = 0.5, 0.05  # chosen: of the pitch; twice the noise, and the growth of an approach
 
 
 class Phase(StrEnum):
@@ -184,9 +184,10 @@ def _placed(frame: Picture, model: TargetModel, blobs_px: Floats) -> Sighting | 
 
 
 def steadied(placed_px: Floats, expected_px: Floats) -> Floats:
-    """Return the blobs, those that left the target's shape put back into it.
+    """Return the blobs, each as near to where it seems to be as the target's shape may have changed.
 
     A torn row pulls single discs away, while the target's shape changes little from picture to picture.
+    A shape that was wrong at the beginning comes right within a few pictures.
 
     Args:
         placed_px: Where the discs seem to be, as ``Sighting.blobs_px``.
@@ -195,5 +196,4 @@ def steadied(placed_px: Floats, expected_px: Floats) -> Floats:
     moved_px = placed_px - expected_px
     usual_px = np.median(moved_px, axis=0)
     slack_px = STEADY_PX + STEADY_SHARE * float(expected_px[Disc.STEM, 1] - expected_px[Disc.MIDDLE, 1])
-    is_steady = np.abs(moved_px - usual_px).max(axis=1) <= slack_px
-    return np.where(is_steady[:, np.newaxis], placed_px, expected_px + usual_px)
+    return np.asarray(expected_px + usual_px + np.clip(moved_px - usual_px, -slack_px, slack_px))

@@ -9,16 +9,22 @@ a pattern consistent with the known target geometry.
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 
-from mission_control.vision.landmark import Floats, Picture, Sighting
+from mission_control.vision.landmark import DISC_DIAMETER_M, PITCH_M, Floats, Picture, Sighting
 from mission_control.vision.skeleton_model import TargetModel, centred, is_match, landmark_match, plausible
 
 THRESHOLD = 62  # measured: at 85 the floor's grey passes and is taken for a disc
 LEAST_AREA_PX = 5  # chosen: a disc seen from 2.5 m away and 45 degrees aside has 20 pixels, noise takes some
 MOST_AREA_PX = 4000  # chosen: a disc seen from 0.3 m away has 2700
-MOST_REGIONS = 60  # chosen: a torn picture has hundreds of regions and is not worth the search
+MOST_REGIONS = 60  # chosen: the largest; a room has 10, and the discs are larger than noise
+LEAST_PITCH_PX = 4.0  # chosen: a disc of three pixels
+DISC_SHARE = math.pi / 4 * (DISC_DIAMETER_M / PITCH_M) ** 2  # of a square of one pitch
+LEAST_SHARE, MOST_SHARE = 0.35, 2.0  # chosen: of that; at 2.5 m a pixel more or less around a disc is half of it
+LIKE = 3.0  # chosen: no disc looks larger than another by more, near, aside and noisy
 
 
 def acquire(frame: Picture) -> Sighting | None:
@@ -33,39 +39,42 @@ def acquire(frame: Picture) -> Sighting | None:
     if frame.ndim != 2 or frame.dtype != np.uint8:
         raise ValueError(f"a grey picture has shape (height, width) and bytes, not {frame.shape} of {frame.dtype}")
     best: Sighting | None = None
-    for blobs_px in _tees(_dark_regions(frame)):
+    for blobs_px in _tees(*_dark_regions(frame)):
         found = _confirmed(frame, blobs_px)
         if found is not None and (best is None or found.match > best.match):
             best = found
     return best
 
 
-def _dark_regions(frame: Picture) -> Floats:
-    """Return the middles of regions that could be discs: column and row, shape (n, 2), n up to ``MOST_REGIONS``."""
+def _dark_regions(frame: Picture) -> tuple[Floats, Floats]:
+    """Return what could be discs: middles (column and row), shape (n, 2), and areas, (n,); the largest first."""
     _, binary = cv2.threshold(frame, THRESHOLD, 255, cv2.THRESH_BINARY_INV)
     _, _, stats, middles = cv2.connectedComponentsWithStats(binary, connectivity=4)
     width, height, area = (stats[1:, column] for column in (cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT, cv2.CC_STAT_AREA))
     is_disc = (area >= LEAST_AREA_PX) & (area <= MOST_AREA_PX)
     is_disc &= (width <= 1.6 * height + 1) & (height <= 3.0 * width + 2) & (area >= 0.45 * width * height)
-    kept: Floats = np.asarray(middles[1:][is_disc], np.float64)
-    return kept[np.argsort(-area[is_disc], kind="stable")[:MOST_REGIONS]]
+    kept: Floats = middles[1:][is_disc].astype(np.float64)
+    areas: Floats = area[is_disc].astype(np.float64)
+    order = np.argsort(-areas, kind="stable")[:MOST_REGIONS]
+    return kept[order], areas[order]
 
 
-def _tees(middles: Floats) -> list[Floats]:
-    """Return every four of the regions that make the T, each of shape (4, 2)."""
+def _tees(middles: Floats, areas: Floats) -> list[Floats]:
+    """Return every four of the regions that make the T and are as large as its discs, each of shape (4, 2)."""
     found: list[Floats] = []
-    places = middles.tolist()
-    for middle, (x, y) in enumerate(places):
-        below = [n for n, (nx, ny) in enumerate(places) if ny - y >= 4 and abs(nx - x) <= 0.25 * (ny - y) + 1]
-        for stem in below:
-            down = places[stem][1] - y
-            lefts = [n for n, (nx, ny) in enumerate(places) if 0 < x - nx < 1.4 * down and abs(ny - y) < 0.4 * down]
-            rights = [n for n, (nx, ny) in enumerate(places) if 0 < nx - x < 1.4 * down and abs(ny - y) < 0.4 * down]
-            for left in lefts:
-                for right in rights:
-                    blobs_px = middles[[left, middle, right, stem]]
-                    if plausible(blobs_px):
-                        found.append(blobs_px)
+    right_px, down_px = (middles[np.newaxis, :, axis] - middles[:, np.newaxis, axis] for axis in (0, 1))
+    is_stem = (down_px >= LEAST_PITCH_PX) & (np.abs(right_px) <= 0.25 * down_px + 1)
+    is_stem &= (areas < LIKE * areas[:, np.newaxis]) & (areas[:, np.newaxis] < LIKE * areas)
+    for middle, stem in np.argwhere(is_stem).tolist():
+        down, aside = float(down_px[middle, stem]), np.abs(right_px[middle])
+        share = areas / (DISC_SHARE * down * np.maximum(aside, 1.0))
+        is_beside = (aside < 1.4 * down) & (np.abs(down_px[middle]) < 0.4 * down)
+        is_beside &= (share > LEAST_SHARE) & (share < MOST_SHARE)
+        for left in np.flatnonzero(is_beside & (right_px[middle] < 0)).tolist():
+            for right in np.flatnonzero(is_beside & (right_px[middle] > 0)).tolist():
+                blobs_px = middles[[left, middle, right, stem]]
+                if plausible(blobs_px):
+                    found.append(blobs_px)
     return found
 
 

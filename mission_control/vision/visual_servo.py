@@ -61,6 +61,7 @@ class VisualServo:
         self._latency_s = latency_s
         self._sent: deque[tuple[float, Command]] = deque()
         self._now_s = 0.0
+        self._is_fresh = True
 
     @property
     def stage(self) -> Stage:
@@ -87,13 +88,16 @@ class VisualServo:
 
         Args:
             frame: Grey levels 0 to 255, shape (240, 320), row 0 on top.
-            elapsed_s: Since the picture before, 0 for the first.
+            elapsed_s: Since the picture before; of no meaning for the first, and the first after ``resumed``.
 
         Raises:
             ValueError: It is no grey picture, or time runs backwards.
         """
         if elapsed_s < 0:
             raise ValueError(f"a picture comes {-elapsed_s} s before the one before it")
+        if self._is_fresh:
+            # What passed while somebody else had the robot is no time in which it looked or drove.
+            self._is_fresh, elapsed_s = False, 0.0
         self._dead_reckon(elapsed_s)
         track = self._tracker.look(frame)
         pose = None if track.sighting is None else self._filter.saw(track.sighting)
@@ -107,6 +111,7 @@ class VisualServo:
         self._filter.forget()
         self._approach.resumed()
         self._sent.clear()
+        self._is_fresh = True
 
     def _dead_reckon(self, elapsed_s: float) -> None:
         """Move the pose by what the wheels did between the two pictures."""
