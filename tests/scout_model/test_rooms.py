@@ -6,6 +6,8 @@ import cv2
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from scout_model import dimensions, radio_link
@@ -246,3 +248,35 @@ def test_a_target_passes_the_same_places_at_the_same_times_in_every_world(shape:
     assert ways[0] == ways[1]
     speeds_m_s = np.diff([x_m for x_m, _, _ in ways[0]])[20:] * dimensions.FRAMES_PER_S
     assert speeds_m_s == pytest.approx(0.5, abs=1e-9)
+
+
+# ---------------------------------------------------------------------- anything that may be described
+sizes_m = st.floats(0.11, 2.0)
+places_m = st.tuples(st.floats(0.5, 8.5), st.floats(0.5, 5.5))
+turns_rad = st.floats(-math.pi, math.pi)
+
+
+@st.composite
+def rooms(draw: st.DrawFn) -> WorldDescription:
+    places = iter(draw(st.lists(places_m, min_size=6, max_size=6)))
+    shapes = draw(st.lists(st.sampled_from(["box", "table"]), min_size=2, max_size=2))
+    return described(
+        scouts=[scout(*next(places), draw(turns_rad))],
+        furniture=[
+            Furniture(f"f{number}", *next(places), draw(sizes_m), draw(sizes_m), draw(sizes_m), shape)
+            for number, shape in enumerate(shapes)
+        ],
+        ramps=[Ramp("ramp", *next(places), draw(sizes_m), draw(sizes_m), draw(sizes_m), draw(turns_rad))],
+        landmarks=[Landmark("home", *next(places), draw(turns_rad))],
+        dark_places=[DarkPlace("dark", *next(places), draw(sizes_m), draw(sizes_m), draw(sizes_m))],
+    )
+
+
+@given(rooms())
+@settings(max_examples=15, deadline=None)
+def test_whatever_may_be_described_is_built_stepped_and_seen(description: WorldDescription) -> None:
+    world = World(description)
+    assert world.mjcf == World(description).mjcf
+    world.step_frame()
+    assert np.isfinite(world.state()).all()
+    assert view(world).shape == (240, 320)
