@@ -81,8 +81,8 @@ def levels_at(frame: Picture, pixels: NDArray[np.intp]) -> tuple[NDArray[np.int1
     height, width = frame.shape
     columns, rows = pixels[:, 0], pixels[:, 1]
     is_inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-    levels = frame[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)].astype(np.int16)
-    levels[~is_inside] = 0
+    levels = np.zeros(len(pixels), np.int16)
+    levels[is_inside] = frame[rows[is_inside], columns[is_inside]]
     return levels, is_inside
 
 
@@ -92,7 +92,14 @@ def contrast(levels: NDArray[np.int16]) -> float:
     Args:
         levels: Of the skeleton, shape (17,).
     """
-    return float(levels[_DISCS:].mean() - levels[:_DISCS].mean())
+    black, white = _black_and_white(levels)
+    return white - black
+
+
+def _black_and_white(levels: NDArray[np.int16]) -> tuple[float, float]:
+    """Return the mean grey levels of the skeleton's discs and gaps."""
+    each = levels.tolist()
+    return sum(each[:_DISCS]) / _DISCS, sum(each[_DISCS:]) / len(_GAPS)
 
 
 def landmark_match(frame: Picture, blobs_px: Floats) -> float:
@@ -102,7 +109,7 @@ def landmark_match(frame: Picture, blobs_px: Floats) -> float:
         0 to 1; 0 if it is no landmark at all, see ``TargetModel.match``.
     """
     levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
-    middle = float(levels[:_DISCS].mean() + levels[_DISCS:].mean()) / 2
+    middle = sum(_black_and_white(levels)) / 2
     return _share(levels, is_inside, middle, _IS_GAP)
 
 
@@ -134,7 +141,7 @@ class TargetModel:
     @property
     def middle_level(self) -> float:
         """Between the target's black and white."""
-        return float(self.levels[:_DISCS].mean() + self.levels[_DISCS:].mean()) / 2
+        return sum(_black_and_white(self.levels)) / 2
 
     @classmethod
     def seen(cls, frame: Picture, blobs_px: Floats) -> TargetModel:
@@ -155,7 +162,8 @@ class TargetModel:
         ``LEAST_CONTRAST``.
         """
         levels, is_inside = levels_at(frame, skeleton_px(blobs_px))
-        return _share(levels, is_inside, self.middle_level, self.levels > self.middle_level)
+        middle = self.middle_level
+        return _share(levels, is_inside, middle, self.levels > middle)
 
     def subimage_match(self, frame: Picture, blobs_px: Floats) -> float:
         """Return how well the subimage correlates with the picture if the discs are here, -1 to 1.
@@ -247,8 +255,11 @@ def centred(frame: Picture, blobs_px: Floats, middle_level: float) -> Floats:
 def _cut(frame: Picture, blobs_px: Floats) -> tuple[Picture, tuple[int, int]]:
     """Return a copy of the part of the picture that holds the discs and some white, and its upper left pixel."""
     sighting = Sighting(blobs_px, 1.0)
-    margin = _MARGIN_PITCHES * np.array([abs(sighting.across_px[0]), abs(sighting.down_px[1])])
-    limits = np.array([frame.shape[1], frame.shape[0]])
-    low = np.clip(np.floor(blobs_px.min(axis=0) - margin), 0, limits - 1).astype(int)
-    high = np.clip(np.ceil(blobs_px.max(axis=0) + margin) + 1, low + 1, limits).astype(int)
-    return frame[low[1] : high[1], low[0] : high[0]].copy(), (int(low[0]), int(low[1]))
+    (left, top), (right, bottom) = blobs_px.min(axis=0).tolist(), blobs_px.max(axis=0).tolist()
+    beside, above = (_MARGIN_PITCHES * abs(float(extent)) for extent in (sighting.across_px[0], sighting.down_px[1]))
+    height, width = frame.shape
+    column, row = (
+        max(0, min(math.floor(low), size - 1)) for low, size in ((left - beside, width), (top - above, height))
+    )
+    end_column, end_row = max(column + 1, math.ceil(right + beside) + 1), max(row + 1, math.ceil(bottom + above) + 1)
+    return frame[row:end_row, column:end_column].copy(), (column, row)

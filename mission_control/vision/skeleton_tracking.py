@@ -194,6 +194,7 @@ def steadied(placed_px: Floats, expected_px: Floats) -> Floats:
         expected_px: The shape, somewhere near.
     """
     moved_px = placed_px - expected_px
-    usual_px = np.median(moved_px, axis=0)
+    # The median of four; numpy's own takes as long as the whole correlation.
+    usual_px = np.sort(moved_px, axis=0)[1:3].mean(axis=0)
     slack_px = STEADY_PX + STEADY_SHARE * float(expected_px[Disc.STEM, 1] - expected_px[Disc.MIDDLE, 1])
     return np.asarray(expected_px + usual_px + np.clip(moved_px - usual_px, -slack_px, slack_px))
