@@ -14,7 +14,7 @@ Interval = tuple[float, float]
 
 ROOM_M = (9.0, 6.0)
 PATH: tuple[Point, Point] = ((0.0, 3.0), (9.0, 3.0))
-WATCHERS: tuple[Point, ...] = ((0.72, 1.764), (7.20, 0.527), (4.02, 0.900), (5.50, 0.650), (2.40, 1.000))
+WATCHERS: tuple[Point, ...] = ((0.72, 1.764), (7.20, 0.527), (3.40, 2.050), (5.60, 2.050), (1.90, 2.050))
 """Where watching Scouts stand, all looking along +y; the first two are the papers'."""
 EXTRAS: tuple[Point, ...] = tuple((4.5 + 0.75 * column, row) for row in (1.2, 1.9) for column in (0, 1, -1, -2, -3))
 """Where Scouts stand that people drive: in nobody's view, and not in the target's way."""

@@ -112,7 +112,11 @@ def run_trial(
         to_the_end: True: it goes on after the detection.
         trace: File for its schedule trace, JSON lines.
     """
-    return run_virtual(_Trial(condition, seed, number, to_the_end=to_the_end).run(trace))
+    result, lines = run_virtual(_Trial(condition, seed, number, to_the_end=to_the_end).run())
+    if trace is not None:
+        end = {"ev": "end", "t": result.simulated_s}
+        trace.write_text("".join(f"{json.dumps(line)}\n" for line in (*lines, end)), encoding="utf-8")
+    return result
 
 
 class _Trial:
@@ -130,7 +134,7 @@ class _Trial:
         self._requested: dict[str, asyncio.Event] = {}
         self._detected = asyncio.Event()
 
-    async def run(self, trace: Path | None) -> Trial:
+    async def run(self) -> tuple[Trial, list[dict[str, Any]]]:
         bare = self._mission.model_copy(update={"behaviors": ()})
         consoles = {"operator": Operator}
         async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
@@ -144,10 +148,7 @@ class _Trial:
             over_s = running.clock.now_s()
             world = await running.statistics(WORLD)
             lines = list(running.trace)
-        if trace is not None:
-            end = {"ev": "end", "t": over_s}
-            trace.write_text("".join(f"{json.dumps(line)}\n" for line in (*lines, end)), encoding="utf-8")
-        return self._judge(lines, world, over_s)
+        return self._judge(lines, world, over_s), lines
 
     # ------------------------------------------------------------------ what happens
     async def _claim(self, running: RunningMission) -> None:

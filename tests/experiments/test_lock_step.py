@@ -1,0 +1,132 @@
+"""Trials of the surveillance experiment: real components, rendered cameras, a virtual clock."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mission_control.experiments.conditions import PAPERS, Condition
+from mission_control.experiments.harness import run_all
+from mission_control.experiments.surveillance import TrialOrder, run_order, run_surveillance
+from mission_control.experiments.trial import Trial, run_trial
+
+ROOT = Path(__file__).parents[2]
+
+
+def judge() -> Any:
+    path = Path(os.environ.get("SCOUT_TRACE_CHECK", ROOT.parent / "shared" / "trace" / "trace_check.py"))
+    if not path.is_file():
+        pytest.skip(f"the judge of traces is not at {path}; name it in SCOUT_TRACE_CHECK")
+    spec = importlib.util.spec_from_file_location("trace_check", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def sound(trial: Trial) -> Trial:
+    assert (trial.disagreements, trial.jammed_frames, trial.stale_packets) == ([], 0, 0)
+    assert trial.switches > 0
+    return trial
+
+
+def test_the_same_trial_gives_the_same_bytes() -> None:
+    condition = Condition(extra=1)
+    first, second = (sound(run_trial(condition, 1, 2)) for _ in range(2))
+    assert first == second
+
+
+def test_another_seed_is_another_trial() -> None:
+    condition = Condition(extra=1)
+    assert run_trial(condition, 1, 2).digest != run_trial(condition, 2, 2).digest
+
+
+def test_other_processes_come_to_the_same() -> None:
+    orders = [TrialOrder(Condition(noise=0.0), 1, number) for number in range(2)]
+    assert run_all(run_order, orders, jobs=2) == run_all(run_order, orders, jobs=1)
+
+
+def test_two_channels_without_noise_miss_nothing() -> None:
+    trials = [sound(run_trial(Condition(channels=2, noise=0.0), 1, number)) for number in range(6)]
+    assert all(trial.detected for trial in trials)
+
+
+def test_a_person_is_seen_on_the_way_there_or_back() -> None:
+    trial = sound(run_trial(Condition(target="person", noise=0.0), 1, 1, to_the_end=True))
+    assert trial.simulated_s > 15.0
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        Condition(extra=2),
+        Condition(extra=2, policy="adaptive"),
+        Condition(extra=3, policy="adaptive", driven=0.25),
+        Condition(extra=2, channels=2),
+        Condition(extra=1, order="interleaved"),
+    ],
+    ids=lambda condition: f"{condition.title()}, {condition.policy}",
+)
+def test_the_judge_finds_nothing_wrong_with_a_trial_s_decisions(condition: Condition, tmp_path: Path) -> None:
+    file = tmp_path / "trace.jsonl"
+    sound(run_trial(condition, 1, 0, to_the_end=True, trace=file))
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    assert judge().FullChecker().run(lines) == []
+
+
+def test_consoles_that_nobody_drives_leave_the_air_to_others(tmp_path: Path) -> None:
+    def turns(driven: float) -> int:
+        file = tmp_path / f"{driven}.jsonl"
+        run_trial(Condition(extra=1, policy="adaptive", driven=driven), 1, 0, to_the_end=True, trace=file)
+        lines = [json.loads(line) for line in file.read_text().splitlines()]
+        return sum(line["ev"] == "grant" and line["arc"].startswith("console") for line in lines)
+
+    assert turns(0.0) == 0 < turns(1.0)
+
+
+def test_watchers_of_the_adaptive_policy_ask_for_what_they_worked_out(tmp_path: Path) -> None:
+    file = tmp_path / "trace.jsonl"
+    run_trial(Condition(policy="adaptive"), 1, 0, trace=file)
+    lines = [json.loads(line) for line in file.read_text().splitlines()]
+    asked = {line["arc"]: (line["min_run"], line["max_run"]) for line in lines if line["ev"] == "request"}
+    assert asked == dict.fromkeys(("watch-scout1-capture", "watch-scout2-capture"), (2.5, 3.5))
+    assert lines[0]["discipline"] == "time"
+
+
+def test_a_small_table_is_what_its_trials_say() -> None:
+    conditions = [Condition(extra=0, noise=0.0), Condition(extra=3, noise=0.0)]
+    told: list[tuple[int, int]] = []
+    outcome = run_surveillance(conditions, trials=2, jobs=1, progress=lambda done, of: told.append((done, of)))
+    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    plain = outcome.to_json()
+    assert [row["extra"] for row in plain["conditions"]] == [0, 3]
+    assert plain["sound"] is True
+    for row in plain["conditions"]:
+        assert row["rate"] == row["detected"] / row["trials"]
+        assert 0 <= row["interval95"][0] <= row["rate"] <= row["interval95"][1] <= 1
+    json.dumps(plain)
+
+
+@pytest.mark.slow
+def test_the_papers_rates_are_met_and_the_prediction_agrees() -> None:
+    outcome = run_surveillance(PAPERS, trials=200)
+    assert outcome.is_sound
+    for row in outcome.rows:
+        assert abs(row.errors_from_predicted) <= 3.0, row.condition.title()
+    pioneer = [row.rate for row in outcome.rows[:4]]
+    assert pioneer[3] < pioneer[0] - 0.15
+    for row in outcome.rows:
+        paper = row.to_json()["published"]
+        if paper["trials"]:
+            from mission_control.experiments.intervals import wilson
+
+            low, high = wilson(paper["detected"], paper["trials"])
+            assert low <= row.rate <= high, row.condition.title()
+        else:
+            assert row.rate == 1.0
