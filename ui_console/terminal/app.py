@@ -249,7 +249,7 @@ class ConsoleApp(App[None]):
             with Vertical(id="side"):
                 yield Panel(PanelName.ROBOTS, most_lines=10)
                 yield Panel("turn")
-                yield Panel(PanelName.ALARMS, most_lines=7)
+                yield Panel(PanelName.ALARMS, most_lines=7, wraps=True)
                 yield DrivePad(lambda: self.speed_rad_s)
         yield Footer(compact=True)
 
@@ -274,7 +274,7 @@ class ConsoleApp(App[None]):
         now_s = self._session.now_s()
         view = self._view = self._session.model.view(now_s)
         speed_rad_s = self.speed_rad_s if self.drives else None
-        main.query_one("#status", Static).update(status_text(view, speed_rad_s, self._hint(view)))
+        main.query_one("#status", Static).update(status_text(view, speed_rad_s, self._hint(view)), layout=False)
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)

@@ -5,6 +5,7 @@ Pure: a view and a width in, rich texts out. A row that can be asked ``why`` nam
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 from rich.text import Text
@@ -261,4 +262,5 @@ def _bar(slices: list[SliceView], timeline: TimelineView, columns: int, colors: 
             cells[column] = (SLICE_MARKS[one.certainty], colors[one.who])
     now = min(columns - 1, int((timeline.now_s - timeline.from_s) * scale))
     cells[now] = ("│", "bold white")
-    return Text.assemble(*cells)
+    runs = [(mark * len(list(same)), style) for (mark, style), same in itertools.groupby(cells)]
+    return Text.assemble(*runs)

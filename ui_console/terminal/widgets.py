@@ -11,6 +11,7 @@ from rich.text import Text
 from textual import events
 from textual.message import Message
 from textual.strip import Strip
+from textual.timer import Timer
 from textual.widget import Widget
 from textual.widgets import Static
 
@@ -87,12 +88,14 @@ class Panel(Static):
     Args:
         name: What is above it, and its id.
         most_lines: As high as it grows; 0: as high as there is room.
+        wraps: True if long lines go on in the next one, so that its height is not known from their number.
     """
 
-    def __init__(self, name: str, *, most_lines: int = 0) -> None:
+    def __init__(self, name: str, *, most_lines: int = 0, wraps: bool = False) -> None:
         super().__init__(id=name, classes="panel")
         self.border_title = name
         self._most_lines = most_lines
+        self._keeps_height = not wraps
         self._rows: Sequence[Row] = ()
         self._key = ""
         self._is_chosen = False
@@ -137,9 +140,10 @@ class Panel(Static):
             shown.append(text)
         lines = Text("\n").join(shown).split("\n", allow_blank=True)[offset:] if shown else []
         drawn = Text("\n").join(lines) if shown else Text(nothing, style="dim")
-        if drawn != self._drawn or drawn.spans != (self._drawn.spans if self._drawn else None):
-            self._drawn = drawn
-            self.update(drawn)
+        before, self._drawn = self._drawn, drawn
+        if before is None or drawn != before or drawn.spans != before.spans:
+            grew = before is None or drawn.plain.count("\n") != before.plain.count("\n") or not self._keeps_height
+            self.update(drawn, layout=grew)
 
 
 class DrivePad(Widget):
@@ -165,16 +169,15 @@ class DrivePad(Widget):
         super().__init__(id="pad")
         self._speed_rad_s = speed_rad_s
         self._at: tuple[float, float] | None = None
-
-    def on_mount(self) -> None:
-        """Say again and again what is wanted while it is held."""
+        self._saying: Timer | None = None
         self.border_title = "drag to drive"
-        self.set_interval(SAY_EVERY_S, self._say)
 
     def on_mouse_down(self, event: events.MouseDown) -> None:
-        """Begin to drive."""
+        """Begin to drive, and say again and again what is wanted while it is held."""
         self.capture_mouse()
         self._drag(event)
+        if self._saying is None:
+            self._saying = self.set_interval(SAY_EVERY_S, self._say)
 
     def on_mouse_move(self, event: events.MouseMove) -> None:
         """Drive another way."""
@@ -215,6 +218,9 @@ class DrivePad(Widget):
             self.post_message(self.Held(drive_by_stick(*self._at, self._speed_rad_s())))
 
     def _let_go(self) -> None:
+        if self._saying is not None:
+            self._saying.stop()
+            self._saying = None
         if self._at is not None:
             self._at = None
             self.refresh()

@@ -1,0 +1,226 @@
+"""Two consoles of different priority take a patrolling robot over and give it back, at random."""
+
+from __future__ import annotations
+
+import asyncio
+import random
+import re
+import statistics
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from running_mission import MISSION_XML, RunningMission, mission_up, runtime_directory
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.companion import Companion
+from backbone.component.launch import Launch
+from backbone.component.messages import AskStatistics, ComponentState, Statistics
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.wire import Envelope
+from mission_control.messages import WaypointReached
+from ui_console.console_events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.driving import Drive
+from ui_console.teleoperation import Teleoperation
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
+
+DRIVEN_WITHIN_S = 0.150
+RESUMED_WITHIN_S = 0.300
+WAIT_S = 10.0
+PLACES = 4
+PATROL, WORLD = "mission_control/patrol", "resource_pool/world"
+TREE = re.search(r'<behavior type="surveillance".*</behavior>', MISSION_XML.read_text(), re.DOTALL)
+PATROLS = """<behavior type="patrol" name="patrol" priority="5">
+      <arc kind="drive" minimum-runtime-s="1"><wish type="scout" name="scout3"/></arc>
+      <parameter name="waypoints" value="4,1.4 5,1.4 5,2.2 4,2.2"/>
+      <parameter name="localizer" value="world"/>
+    </behavior>"""
+TYPE = '<type name="surveillance"'
+PATROL_TYPE = f'<type name="patrol" class="mission_control.behaviors.patrol:Patrol" subsystem="mission_control"/>{TYPE}'
+
+
+@pytest.fixture(scope="module")
+def mission() -> Iterator[RunningMission]:
+    assert TREE is not None
+    with mission_up(change={TREE.group(): PATROLS, TYPE: PATROL_TYPE}) as running:
+        yield running
+
+
+@dataclass
+class Watch:
+    """What is heard of the patrol: its way points, and what it says of itself, with the times it said so."""
+
+    reached: list[WaypointReached] = field(default_factory=list)
+    said: list[tuple[float, str]] = field(default_factory=list)
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def listen(self, bus: Bus) -> None:
+        bus.subscribe(PATROL, Conversation.EVENTS, WaypointReached, self._reached)
+        bus.subscribe(PATROL, Conversation.STATUS, ComponentState, self._said)
+
+    def _reached(self, envelope: Envelope[Any]) -> None:
+        self.reached.append(envelope.body)
+
+    def _said(self, envelope: Envelope[Any]) -> None:
+        self.said.append((envelope.stamp_s, envelope.body.feedback))
+        self.changed.set()
+
+    async def says(self, begins: str, since_s: float) -> tuple[float, str]:
+        """Return when, after a time, the patrol first said something that begins like this, and what."""
+        async with asyncio.timeout(WAIT_S):
+            while True:
+                for at_s, feedback in self.said:
+                    if at_s >= since_s and feedback.startswith(begins):
+                        return at_s, feedback
+                self.changed.clear()
+                await self.changed.wait()
+
+
+class Console:
+    """A person at a console."""
+
+    def __init__(self, name: str, priority: int, found: run_files.RunFile, clock: MissionClock) -> None:
+        self.name, self.clock, self.events = name, clock, list[ConsoleEvent]()
+        self.launch = Launch(
+            found.mission,
+            Subsystem.UI_CONSOLE,
+            name,
+            "console",
+            "ui_console.teleoperation:Teleoperation",
+            found.host,
+            found.endpoint,
+            found.clock_origin_monotonic_s,
+            found.clock_rate,
+            {"robot": "scout3", "kind": "drive", "priority": priority, "minimum_runtime_s": 0.1},
+        )
+        self.component: Teleoperation | None = None
+        self.heard = asyncio.Event()
+
+    def show(self, event: ConsoleEvent) -> None:
+        self.events.append(event)
+        self.heard.set()
+
+    async def hears(self, mark: int, kind: type[Any]) -> Any:
+        """Return the first event of this kind after the mark."""
+        async with asyncio.timeout(WAIT_S):
+            while not (found := self.since(mark, kind)):
+                self.heard.clear()
+                await self.heard.wait()
+        return found[0]
+
+    def since(self, mark: int, kind: type[Any]) -> list[Any]:
+        return [event for event in self.events[mark:] if isinstance(event, kind)]
+
+    async def take_and_drive(self, drive: Drive) -> float:
+        """Return how long it took from the wish to the first command applied."""
+        console = self.component
+        assert console is not None
+        mark = len(self.events)
+        console.take()
+        async with asyncio.timeout(WAIT_S):
+            await console.wait_granted()
+            assert await console.do(drive)
+        [asked], [applied] = self.since(mark, Asked), self.since(mark, CommandApplied)[:1]
+        assert isinstance(self.since(mark, Granted)[0], Granted)
+        return float(applied.at_s - asked.at_s)
+
+    async def give_back(self) -> float:
+        """Return when it began to give the robot back."""
+        assert self.component is not None
+        mark, began_s = len(self.events), self.clock.now_s()
+        await self.component.give_back()
+        assert self.since(mark, GivenBack)[0].confirmed
+        return began_s
+
+    def run(self, bus: Bus) -> asyncio.Task[None]:
+        self.component = Teleoperation(self.launch, bus, self.clock, show=self.show, takes=False, watches=False)
+        return asyncio.create_task(self.component.run(), name=self.name)
+
+
+@asynccontextmanager
+async def two_consoles(mission: RunningMission) -> AsyncIterator[tuple[Console, Console, Watch, Bus]]:
+    with runtime_directory(mission.environment["XDG_RUNTIME_DIR"]):
+        found = run_files.find(mission.name)
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    watch = Watch()
+    async with mission.bus("ui_console/onlooker") as bus:
+        watch.listen(bus)
+        consoles = [Console("console-low", 90, found, clock), Console("console-high", 100, found, clock)]
+        lives = []
+        for console in consoles:
+            own = await ZenohBus.open_when_up(
+                mission.name, console.launch.address, clock, client_config(found.endpoint)
+            )
+            lives.append(console.run(own))
+        for console in consoles:
+            companion = Companion(bus, console.launch.address)
+            await companion.wait_there()
+            companion.close()
+        try:
+            yield consoles[0], consoles[1], watch, bus
+        finally:
+            for console in consoles:
+                assert console.component is not None
+                console.component.end("the test is over")
+            await asyncio.gather(*lives)
+
+
+async def counted(bus: Bus, address: str) -> dict[str, float]:
+    return (await bus.ask(address, AskStatistics(), Statistics, within_s=2)).values
+
+
+async def at_random(mission: RunningMission, cycles: int, seed: int) -> tuple[float, float]:
+    """Return the longest time to control and to resumption; the rest of the rules is asserted here."""
+    dice = random.Random(seed)
+    driven: list[float] = []
+    resumed: list[float] = []
+    async with two_consoles(mission) as (low, high, watch, bus):
+        await watch.says("patrols", 0.0)
+        before = await counted(bus, PATROL)
+        for cycle in range(cycles):
+            first = dice.choice([low, high])
+            drive = Drive(dice.uniform(-6, 6), dice.uniform(-6, 6))
+            asked_s = first.clock.now_s()
+            driven.append(await first.take_and_drive(drive))
+            _at_s, why = await watch.says("suspended", asked_s)
+            assert f"higher by {first.name}-drive" in why, (cycle, why)
+            await asyncio.sleep(dice.uniform(0.0, 0.2))
+            if first is low and dice.random() < 0.5:
+                mark = len(low.events)
+                driven.append(await high.take_and_drive(drive))
+                assert (await low.hears(mark, Lost)).by == "console-high-drive"
+                assert low.component is not None
+                assert not await low.component.do(Drive(6, 6)), "commands of who lost the robot are refused"
+                await high.give_back()
+            began_s = await first.give_back()
+            again_s, _said = await watch.says("patrols", began_s)
+            resumed.append(again_s - began_s)
+            await asyncio.sleep(dice.uniform(0.0, 0.3))
+        after, world = await counted(bus, PATROL), await counted(bus, WORLD)
+    record = [(visit.number, visit.waypoint) for visit in watch.reached]
+    print(f"driven {statistics.median(driven) * 1e3:.0f} ms (median), {max(driven) * 1e3:.0f} ms (most)")
+    print(f"resumed {statistics.median(resumed) * 1e3:.0f} ms (median), {max(resumed) * 1e3:.0f} ms (most)")
+    print(f"{len(record)} way points")
+    assert world["stale_packets"] == 0
+    assert after["times_suspended"] - before["times_suspended"] >= cycles
+    first_number = record[0][0] if record else 1
+    assert record == [(number, (number - 1) % PLACES) for number in range(first_number, first_number + len(record))]
+    return max(driven), max(resumed)
+
+
+async def test_a_few_random_take_overs_by_two_consoles(mission: RunningMission) -> None:
+    await at_random(mission, 8, seed=1)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+async def test_two_hundred_random_take_overs_by_two_consoles(mission: RunningMission) -> None:
+    driven_s, resumed_s = await at_random(mission, 200, seed=2)
+    assert (driven_s < DRIVEN_WITHIN_S, resumed_s < RESUMED_WITHIN_S) == (True, True), mission.story()

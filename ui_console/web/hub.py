@@ -1,0 +1,219 @@
+"""What all browsers share: one ear on the mission, one model of it, and one copy of each robot's pictures."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+import os
+import re
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.component import NoParameters
+from backbone.component.launch import Launch
+from backbone.component.messages import LifeState
+from backbone.keys import Conversation
+from backbone.naming import Subsystem, address
+from backbone.wire import Envelope
+from resource_pool.arc_client import Frame
+from ui_console.console_events import ConsoleEvent, ScheduleHeard
+from ui_console.console_model import ConsoleModel
+from ui_console.observer import Observer
+from ui_console.team_model import ROBOT_KIND, TeamModel
+from ui_console.teleoperation import Teleoperation
+from ui_console.views import AlarmKind
+from ui_console.web.operator import Operator
+from ui_console.web.outbox import Outbox
+from ui_console.web.pictures import jpeg, packet
+from ui_console.web.protocol import Fault, Offence, Welcome
+
+log = logging.getLogger(__name__)
+
+OWN_EVERY_S = 0.25  # chosen: people read no faster; what happens to their own robot is told at once
+TEAM_EVERY = 4  # chosen: every so many of those the tables of the whole mission, which cost more
+TOLD_EVERY_S = 10.0  # chosen: a visitor that offends a thousand times a second fills no recording
+MAX_USER_IN_NAME = 24  # chosen: leaves room for what makes a component's name its own, and its ARC's
+
+Join = Callable[[Launch], Awaitable[Bus]]
+
+
+class WebHub:
+    """Serves any number of operators from one process.
+
+    Args:
+        launch: Of the component that listens to the mission; operators' consoles are launched like it.
+        bus: Of that component.
+        clock: The mission's time.
+        join: Opens a bus for one more component of this process.
+        kind: Component type of the ARCs that operators claim.
+        away_after_s: A robot is given back when its operator touched nothing for so long; 0: never.
+    """
+
+    def __init__(
+        self, launch: Launch, bus: Bus, clock: Clock, join: Join, *, kind: str = "capture", away_after_s: float = 0.0
+    ) -> None:
+        self.clock = clock
+        self.team = TeamModel(launch.mission)
+        self.observer: Observer[NoParameters] = Observer(launch, bus, clock, show=self._heard, user=launch.name)
+        self.operators: dict[Operator, None] = {}
+        self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False)
+        self._launch, self._bus, self._join = launch, bus, join
+        self._kind, self._away_after_s = kind, away_after_s
+        self._arcs: dict[str, str] = {}
+        self._streams: dict[str, tuple[str, Subscription]] = {}
+        self._numbers: dict[str, int] = {}
+        self._consoles = itertools.count(1)
+        self._somebody = asyncio.Event()
+        self._told_s: dict[Fault, float] = {}
+        self.pictures_packed = 0
+        """How many pictures were made into JPEG."""
+
+    # ------------------------------------------------------------------ operators come and go
+    def enter(self, welcome: Welcome) -> Operator:
+        """Return a new operator, who is told everything there is."""
+        operator = Operator(self, welcome)
+        self.operators[operator] = None
+        welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
+        operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
+        self._tell_tables([operator.outbox])
+        operator.refresh(self.clock.now_s())
+        self._say("web", f"{welcome.user} came, with priority {welcome.priority}")
+        self._somebody.set()
+        self.attention_changed()
+        return operator
+
+    async def leave(self, operator: Operator, reason: str) -> None:
+        """Let an operator go: the wheels stop, the robot is given back."""
+        self.operators.pop(operator, None)
+        if not self.operators:
+            self._somebody.clear()
+        await operator.leave(reason)
+        self._say("web", f"{operator.welcome.user} left: {reason}")
+
+    def offended(self, who: str, offence: Offence) -> None:
+        """Have the operators know of a visitor that did what it must not.
+
+        Args:
+            who: For people: an operator's name, or an address.
+            offence: What was done.
+        """
+        now_s = self.clock.now_s()
+        line = f"{who} {offence.line}"
+        log.warning("%s", line)
+        key = f"{AlarmKind.VISITOR}:{offence.fault}:{who}"
+        self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, offence.remedy, key)
+        if now_s >= self._told_s.get(offence.fault, -TOLD_EVERY_S) + TOLD_EVERY_S:
+            self._told_s[offence.fault] = now_s
+            self._say("web", line)
+
+    async def tell_all(self) -> None:
+        """Keep every operator's view fresh; until cancelled. Nobody there: nothing is done."""
+        for turn in itertools.count():
+            await self._somebody.wait()
+            now_s = self.clock.now_s()
+            if turn % TEAM_EVERY == 0:
+                self._tell_tables([operator.outbox for operator in self.operators])
+            for operator in self.operators:
+                operator.refresh(now_s)
+            await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
+
+    # ------------------------------------------------------------------ what operators need; see Hands
+    async def new_console(self, welcome: Welcome, robot: str, show: Callable[[ConsoleEvent], None]) -> Teleoperation:
+        """Return a console that claims the robot as soon as it runs."""
+        number = next(self._consoles)
+        wished = {
+            "robot": robot,
+            "kind": self._kind,
+            "priority": welcome.priority,
+            "away_after_s": self._away_after_s,
+        }
+        launch = msgspec.structs.replace(
+            self._launch,
+            name=f"{_name_from(welcome.user)}-{os.getpid()}-{number}",
+            class_path="ui_console.teleoperation:Teleoperation",
+            parameters=wished,
+        )
+        bus = await self._join(launch)
+        return Teleoperation(launch, bus, self.clock, show=show, watches=False, user=welcome.user)
+
+    def watching_changed(self) -> None:
+        """Listen to the pictures that somebody watches and that somebody's grant delivers, and to no others."""
+        watched = {robot for operator in self.operators for robot in operator.outbox.watched}
+        wanted = {robot: arc for robot, arc in self._arcs.items() if robot in watched}
+        for robot, (arc, stream) in list(self._streams.items()):
+            if wanted.get(robot) != arc:
+                stream.close()
+                del self._streams[robot]
+        for robot in wanted.keys() - self._streams.keys():
+            self._streams[robot] = (wanted[robot], self._listen(robot, wanted[robot]))
+
+    def attention_changed(self) -> None:
+        """Note whether anybody at all looks after the mission."""
+        self.team.alarms.attention(any(one.is_there for one in self.operators), self.clock.now_s())
+
+    # ------------------------------------------------------------------ within
+    def _heard(self, event: ConsoleEvent) -> None:
+        self._model.apply(event)
+        if isinstance(event, ScheduleHeard):
+            rcs = event.schedule.rcs
+            self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
+            self.watching_changed()
+            for operator in self.operators:
+                operator.schedule_heard()
+
+    def _listen(self, robot: str, arc: str) -> Subscription:
+        def arrived(envelope: Envelope[Any]) -> None:
+            frame: Frame = envelope.body
+            if frame.robot == robot:
+                self._show_picture(frame)
+
+        at = address(Subsystem.RESOURCE_POOL, arc)
+        return self._bus.subscribe(at, Conversation.FRAMES, Frame, arrived, latest=True)
+
+    def _show_picture(self, frame: Frame) -> None:
+        watchers = [operator for operator in self.operators if frame.robot in operator.outbox.watched]
+        if not watchers:
+            return
+        number = self._numbers[frame.robot] = self._numbers.get(frame.robot, 0) + 1
+        picture = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
+        packed = packet(frame.robot, number, frame.captured_s, jpeg(picture))
+        self.pictures_packed += 1
+        for operator in watchers:
+            operator.saw(frame.robot, number, frame.captured_s, packed)
+
+    def _tell_tables(self, outboxes: list[Outbox]) -> None:
+        team, now_s = self.team, self.clock.now_s()
+        tables: dict[str, Any] = {
+            "tree": team.tree(),
+            "requests": team.requests(),
+            "timeline": team.timeline(now_s),
+            "hosts": team.hosts(now_s),
+            "parameters": team.parameters(),
+            "components": team.components(),
+            "log": team.log(),
+            "now_s": now_s,
+        }
+        for name, table in tables.items():
+            body = msgspec.json.encode(table)
+            for outbox in outboxes:
+                outbox.put_section(name, body)
+
+    def _say(self, subject: str, what: str) -> None:
+        if self.observer.state is LifeState.READY:
+            self.observer.tell(subject, what)
+
+
+def _name_from(user: str) -> str:
+    """Return the part of a component's name that tells people who it is.
+
+    Example:
+        >>> _name_from("Anna B."), _name_from("7")
+        ('anna-b', 'web-7')
+    """
+    plain = re.sub(r"[^a-z0-9]+", "-", user.lower()).strip("-")[:MAX_USER_IN_NAME].strip("-")
+    return plain if plain and plain[0].isalpha() else f"web-{plain}".strip("-")

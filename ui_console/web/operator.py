@@ -1,0 +1,299 @@
+"""One person at a browser: what they want is done, what they must know waits in their outbox."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Any, Protocol, assert_never
+
+import msgspec
+
+from backbone.bus.interface import Clock
+from backbone.errors import LinkError, Refusal
+from ui_console.console_events import (
+    Attention,
+    CommandApplied,
+    CommandRefused,
+    ConsoleEvent,
+    LinkTrouble,
+    PictureSeen,
+)
+from ui_console.console_model import ConsoleModel
+from ui_console.driving import STICK_LASTS_S, drive_by_stick
+from ui_console.observer import Observer
+from ui_console.team_model import TeamModel
+from ui_console.teleoperation import Teleoperation
+from ui_console.views import view_json
+from ui_console.web.outbox import Outbox
+from ui_console.web.protocol import (
+    Acknowledge,
+    AskParameters,
+    AskWhy,
+    Drawn,
+    Here,
+    Intent,
+    JumpOnce,
+    LetGo,
+    LiftStop,
+    SetParameter,
+    Steer,
+    StopAll,
+    StopRobot,
+    StopWheels,
+    TakeOver,
+    Watch,
+    Welcome,
+)
+
+log = logging.getLogger(__name__)
+
+MOST_ASKED = 8  # chosen: a person asks one thing at a time; the mission's services need not bear more
+LATENCY_STEP = (
+    0.2  # chosen: weight of the newest picture in the latency shown: it follows within a second and is readable
+)
+
+AtWork = AskWhy | AskParameters | SetParameter | StopRobot | StopAll | LiftStop | TakeOver | LetGo
+Asked = AskWhy | AskParameters | SetParameter
+
+
+class Hands(Protocol):
+    """What an operator needs of the server."""
+
+    observer: Observer[Any]
+    team: TeamModel
+    clock: Clock
+
+    async def new_console(self, welcome: Welcome, robot: str, show: Callable[[ConsoleEvent], None]) -> Teleoperation:
+        """Return a console that claims the robot as soon as it runs."""
+
+    def watching_changed(self) -> None:
+        """Somebody wants other pictures."""
+
+    def attention_changed(self) -> None:
+        """Somebody came or went."""
+
+
+class Operator:
+    """A person at a browser, from the right token to the end of the connection.
+
+    Args:
+        hands: The server's.
+        welcome: Who it is.
+    """
+
+    def __init__(self, hands: Hands, welcome: Welcome) -> None:
+        self.welcome = welcome
+        self.outbox = Outbox()
+        self.news = asyncio.Event()
+        """Set when there is something to send."""
+        self.is_there = True
+        self.model = ConsoleModel(welcome.user, welcome.user, hands.team)
+        self._hands = hands
+        self._console: Teleoperation | None = None
+        self._life: asyncio.Task[None] | None = None
+        self._claiming = asyncio.Lock()
+        self._latency_s: dict[str, float] = {}
+        self._work: dict[bytes, asyncio.Task[None]] = {}
+
+    # ------------------------------------------------------------------ what the browser says
+    def obey(self, intent: Intent) -> None:
+        """Do what the browser asks; what takes time goes on beside."""
+        match intent:
+            case Steer(forward, right, speed_rad_s):
+                self._with_robot(
+                    lambda console: console.hold(drive_by_stick(forward, right, speed_rad_s), STICK_LASTS_S)
+                )
+            case StopWheels():
+                self.stop()
+            case JumpOnce():
+                self._with_robot(Teleoperation.jump)
+            case Drawn(robot, number):
+                self._drawn(robot, number)
+            case Watch(robots):
+                self.outbox.watch(frozenset(robots) & frozenset(self._hands.team.robot_names()))
+                self._hands.watching_changed()
+            case Acknowledge(key):
+                self._acknowledge(key)
+            case Here(is_there):
+                self._attend(is_there)
+            case TakeOver() | LetGo() | StopRobot() | StopAll() | LiftStop() | AskWhy() | AskParameters():
+                self._begin(intent)
+            case SetParameter():
+                self._begin(intent)
+            case _:
+                assert_never(intent)
+
+    def stop(self) -> None:
+        """Stop the wheels that this operator turns."""
+        self._with_robot(Teleoperation.stop)
+
+    async def leave(self, reason: str) -> None:
+        """Stop the wheels and give the robot back; the operator is gone afterwards."""
+        work = list(self._work.values())
+        for task in work:
+            task.cancel()
+        if work:
+            await asyncio.wait(work)
+        self.is_there = False
+        console, life = self._console, self._life
+        if console is not None and life is not None:
+            self.stop()
+            console.end(reason)
+            await asyncio.wait({life})
+        self._hands.watching_changed()
+        self._hands.attention_changed()
+
+    # ------------------------------------------------------------------ what the browser is told
+    def show(self, event: ConsoleEvent) -> None:
+        """Take in what happened to this operator's robot."""
+        if isinstance(event, Attention):
+            self.is_there = event.is_there
+            self._hands.attention_changed()
+            return
+        self.model.apply(event)
+        if not isinstance(event, PictureSeen | CommandApplied):
+            self.refresh(self._hands.clock.now_s())
+
+    def saw(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
+        """A picture of a robot came that may be watched here."""
+        if robot in self.outbox.watched:
+            self.model.apply(PictureSeen(self._hands.clock.now_s(), captured_s, robot))
+            self.outbox.put_picture(robot, number, captured_s, packet)
+            self.news.set()
+
+    def refresh(self, now_s: float) -> None:
+        """Have sent what changed of this operator's own part of the view, and of the alarms."""
+        model, put = self.model, self.outbox.put_section
+        model.look(now_s)
+        put("own", view_json(model.own(now_s)))
+        put("robots", _encode(model.robots(now_s)))
+        put("links", _encode(model.links(now_s)))
+        put("alarms", _encode(model.team.alarms.views()))
+        put("drawn", msgspec.json.encode({robot: round(at, 3) for robot, at in sorted(self._latency_s.items())}))
+        self.news.set()
+
+    def schedule_heard(self) -> None:
+        """There is a new schedule: ask why this operator waits, who does."""
+        self._with_robot(Teleoperation.schedule_heard)
+
+    # ------------------------------------------------------------------ within
+    def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
+        if self._console is not None and self._console.is_ready:
+            act(self._console)
+
+    def _drawn(self, robot: str, number: int) -> None:
+        captured_s = self.outbox.drawn(robot, number)
+        self.news.set()
+        if captured_s is not None:
+            took_s = max(0.0, self._hands.clock.now_s() - captured_s)
+            before_s = self._latency_s.get(robot, took_s)
+            self._latency_s[robot] = before_s + LATENCY_STEP * (took_s - before_s)
+
+    def _acknowledge(self, key: str) -> None:
+        seen = self.model.acknowledge(key)
+        if seen:
+            self._hands.observer.tell("alarms", f"{self.welcome.user} has seen {key or f'all {seen}'}")
+            self.refresh(self._hands.clock.now_s())
+
+    def _attend(self, is_there: bool) -> None:
+        if is_there:
+            self._with_robot(Teleoperation.touch)
+        else:
+            self._with_robot(Teleoperation.leave)
+        if self.is_there != is_there:
+            self.is_there = is_there
+            self._hands.attention_changed()
+
+    def _begin(self, intent: AtWork) -> None:
+        same = msgspec.json.encode(intent)
+        if same in self._work:
+            return
+        if isinstance(intent, Asked) and len(self._work) >= MOST_ASKED:
+            self._answer({"refused": "too much is being asked at once; wait for the answers"})
+            return
+        task = asyncio.create_task(self._do(intent), name=f"{self.welcome.user}:{type(intent).__name__}")
+        self._work[same] = task
+        task.add_done_callback(lambda done: self._done(same, done))
+
+    async def _do(self, intent: AtWork) -> None:
+        observer, user = self._hands.observer, self.welcome.user
+        match intent:
+            case TakeOver(robot):
+                async with self._claiming:
+                    await self._take(robot)
+            case LetGo():
+                async with self._claiming:
+                    if self._console is not None and self._console.is_ready:
+                        await self._console.give_back(f"{user} released it")
+            case StopRobot(robot):
+                await self._stop([robot])
+            case StopAll():
+                await self._stop(self._hands.team.robot_names())
+            case LiftStop(robot):
+                stop = self.model.team.stop_of(robot)
+                if stop is not None:
+                    observer.tell(robot, f"{user} lifts stop {stop.number} by {stop.by}")
+                    await observer.feed.lift(stop, user)
+            case AskWhy(name):
+                self._answer({"why": name, "lines": await observer.why(name)})
+            case AskParameters(name):
+                self._answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
+            case SetParameter(name, parameter, value):
+                is_set = await observer.feed.set_parameter(name, parameter, value, user)
+                observer.tell(name, f"{user} {'set' if is_set else 'could not set'} {parameter} to {value!r}")
+                self._answer({"set": name, "parameter": parameter, "done": is_set})
+            case _:
+                assert_never(intent)
+        self.refresh(self._hands.clock.now_s())
+
+    async def _stop(self, robots: list[str]) -> None:
+        """Emergency stop; the wheels this operator turns stop with it."""
+        self.stop()
+        known = sorted(set(robots) & set(self._hands.team.robot_names()))
+        observer, user = self._hands.observer, self.welcome.user
+        for robot in known:
+            observer.tell(robot, f"{user} stops it")
+        unsure = await observer.feed.stop_robots(known, "", user)
+        unknown = sorted(set(robots) - set(known))
+        if unsure or unknown:
+            self._answer({"refused": f"not certain to have stopped: {', '.join([*unsure, *unknown])}"})
+
+    async def _take(self, robot: str) -> None:
+        if self._console is not None and self._life is not None and not self._life.done():
+            if self._console.is_ready:
+                await self._console.switch(robot)
+            return
+        try:
+            self._console = await self._hands.new_console(self.welcome, robot, self.show)
+        except LinkError as error:
+            self.show(LinkTrouble(self._hands.clock.now_s(), str(error)))
+            return
+        self._life = asyncio.create_task(self._live(self._console), name=f"life of {self._console.address}")
+        self._life.add_done_callback(self._bug_of)
+
+    async def _live(self, console: Teleoperation) -> None:
+        now_s = self._hands.clock.now_s
+        try:
+            await console.run()
+        except LinkError as error:
+            self.show(LinkTrouble(now_s(), str(error)))
+        except Refusal as refusal:
+            self.show(CommandRefused(now_s(), refusal.code, refusal.detail, refusal.remedy))
+
+    def _done(self, same: bytes, task: asyncio.Task[None]) -> None:
+        self._work.pop(same, None)
+        self._bug_of(task)
+
+    def _bug_of(self, task: asyncio.Task[None]) -> None:
+        """A bug of an operator's part is a bug of the server."""
+        if not task.cancelled() and (bug := task.exception()) is not None:
+            self._hands.observer.fail(bug)
+
+    def _answer(self, answer: dict[str, Any]) -> None:
+        self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
+        self.news.set()
+
+
+def _encode(views: list[Any]) -> bytes:
+    return msgspec.json.encode(views)
