@@ -6,7 +6,7 @@ import asyncio
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -21,11 +21,14 @@ if TYPE_CHECKING:
     from backbone.component.launch import Launch
     from ui_console.console_events import ConsoleEvent
     from ui_console.observer import Observer
+    from ui_console.web.protocol import Pass
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
 others; a script needs no picture, so it waits for none to settle and leaves the video frequency to others too."""
 
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+WEB_PORT = 8420  # chosen: free on most machines
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
@@ -61,6 +64,16 @@ class _Looks:
     user: str
     is_bare: bool
     has_gamepad: bool
+
+
+@dataclass(frozen=True)
+class _Site:
+    """Where a page is served, and what its operators claim."""
+
+    host: str
+    port: int
+    kind: str
+    away_after_s: float
 
 
 @app.command()
@@ -110,6 +123,35 @@ def monitor(
     if not as_json:
         _need_a_terminal("monitor", "--json")
     run(lambda: _watch(mission, connect, user or _user(), as_json=as_json))
+
+
+@app.command()
+def serve(
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; beyond this machine only if you say so, 0.0.0.0 is all.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any that is free.")] = WEB_PORT,
+    priority: Annotated[int, typer.Option(help="The most an operator may ask for, beside the mission's own.")] = 100,
+    operator: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=PRIORITY: a token for this operator alone; again for each. Default: one for all."),
+    ] = None,
+    kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim.")] = KINDS["terminal"],
+    away_after: Annotated[
+        float, typer.Option(help="Give a robot back when its operator touched nothing for so many seconds; 0: never.")
+    ] = AWAY_AFTER_S,
+    mission: Mission = None,
+    connect: Connect = None,
+) -> None:
+    """Serve the console as a web page, for browsers, tablets and phones."""
+    from ui_console.web.protocol import WrongOperator, passes_for, read_operator
+
+    try:
+        passes = passes_for([read_operator(one) for one in operator or []], priority)
+    except WrongOperator as wrong:
+        say(f"--operator {wrong}")
+        raise typer.Exit(ExitCode.USAGE) from wrong
+    run(lambda: _serve(mission, connect, passes, _Site(host, port, kind, away_after)))
 
 
 def main() -> None:
@@ -204,6 +246,42 @@ async def _watch(mission: str | None, connect: str | None, user: str, *, as_json
     _end_on_signals(console)
     await session.run(console)
     return ExitCode.DONE
+
+
+async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, Pass], site: _Site) -> int:
+    import msgspec
+
+    from ui_console.web.hub import WebHub
+    from ui_console.web.protocol import Doorkeeper
+
+    try:
+        from ui_console.web.server import WebServer
+    except ModuleNotFoundError as missing:
+        say(f"{missing.name} is not installed; install scout-backbone[web]")
+        return ExitCode.USAGE
+    launch, clock = await _launch(mission, connect, {})
+    launch = msgspec.structs.replace(launch, name=f"web-{os.getpid()}")
+
+    async def join(one_more: Launch) -> Any:
+        return await _open_bus(one_more, clock)
+
+    hub = WebHub(launch, await join(launch), clock, join, kind=site.kind, away_after_s=site.away_after_s)
+    interrupted = _end_on_signals(hub.observer)
+
+    def ready(port: int) -> None:
+        shown = f"[{site.host}]" if ":" in site.host else site.host
+        for token, granted in passes.items():
+            who = f"{granted.user}: " if granted.user else ""
+            _write_line(f"{who}http://{shown}:{port}/#token={token}".encode())
+        if site.host not in LOOPBACK:
+            say("whoever can reach this address can read what is sent: use it on networks you trust")
+
+    try:
+        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, ready)
+    except OSError as error:
+        say(f"cannot listen at {site.host}:{site.port}: {error.strerror or error}; see --host and --port")
+        return ExitCode.USAGE
+    return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 
 def _user() -> str:

@@ -14,7 +14,7 @@ import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 
@@ -27,7 +27,8 @@ TOKEN_BYTES = 24  # chosen: 192 bits; nobody guesses them
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
 
-ShortText = Annotated[str, msgspec.Meta(max_length=63)]
+MAX_USER = 63  # as long as a component's name
+ShortText = Annotated[str, msgspec.Meta(max_length=MAX_USER)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
@@ -124,7 +125,7 @@ class SetParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_
 
     name: ShortText
     parameter: ShortText
-    value: bool | int | float | str | list[float] | list[str] | None
+    value: Any  # as JSON has it; the component checks it
 
 
 class Here(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="here"):
@@ -150,7 +151,7 @@ Intent = (
     | SetParameter
     | Here
 )
-_intents = msgspec.json.Decoder(Hello | Intent)
+_intents: msgspec.json.Decoder[Hello | Intent] = msgspec.json.Decoder(Hello | Intent)
 
 
 # ---------------------------------------------------------------------- what is wrong with a visitor
@@ -234,6 +235,26 @@ def passes_for(operators: Iterable[tuple[str, int]], priority: int) -> dict[str,
     """Return new tokens: one for each operator with a priority of their own, else one for all."""
     named = [Pass(user, own) for user, own in operators]
     return {new_token(): granted for granted in named or [Pass("", priority)]}
+
+
+class WrongOperator(ValueError):
+    """An operator is not written as ``NAME=PRIORITY``."""
+
+
+def read_operator(text: str) -> tuple[str, int]:
+    """Return an operator's name and priority.
+
+    Raises:
+        WrongOperator: It is not ``NAME=PRIORITY``, with a whole number from 0.
+
+    Example:
+        >>> read_operator("anna=120")
+        ('anna', 120)
+    """
+    user, _equals, priority = text.rpartition("=")
+    if not 0 < len(user) <= MAX_USER or not priority.isdecimal():
+        raise WrongOperator(f"{text!r} is not NAME=PRIORITY, such as anna=120")
+    return user, int(priority)
 
 
 class Visitor:
