@@ -90,7 +90,12 @@ class Painter:
         for geom in self._background:
             paint(geom)
         own_body = self._model.body_rootid[self._model.cam_bodyid[camera]]
-        others = [thing for thing in self._things if self._bodies[thing.solids[0]] != own_body]
+        # What is out of the picture must not take part in the order either: a remembered picture does not know of it.
+        others = [
+            thing
+            for thing in self._things
+            if self._bodies[thing.solids[0]] != own_body and not view.is_beside(thing.corners)
+        ]
         boxes = [thing.bounds(corners) for thing in others]
         for number in _far_to_near(np.array([low for low, _ in boxes]), np.array([high for _, high in boxes]), eye_m):
             thing = others[number]
@@ -157,7 +162,15 @@ class _View:
         self._corners: _Floats = (corners - eye_m) @ axes
         self._corners[:, 2] *= -1
         self._is_ahead = self._corners[:, 2] >= _NEAR_M
+        right, up, ahead = self._corners.T
+        # A line is drawn up to a pixel wider than it is.
+        across, upwards = ((size / 2 + 2) / self._focal_px * ahead for size in (PICTURE_WIDTH_PX, PICTURE_HEIGHT_PX))
+        self._is_out = np.stack([~self._is_ahead, right > across, right < -across, up > upwards, up < -upwards])
         self._pixels = self._project(np.where(self._is_ahead[:, np.newaxis], self._corners, 1.0))
+
+    def is_beside(self, corners: NDArray[np.intp]) -> bool:
+        """Say whether all these corners are behind the camera or beyond one and the same edge of the picture."""
+        return bool(self._is_out[:, corners].all(axis=1).any())
 
     def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float) -> None:
         """Paint the polygon, as far as it lies before the camera, with this grey level."""
