@@ -59,7 +59,7 @@ TracesTo = Annotated[Path | None, typer.Option("--traces", help="Folder for the 
 
 @app.callback()
 def _experiment() -> None:
-    """Keep ``surveillance`` and ``load`` commands of their own."""
+    """Keep each experiment a command of its own."""
 
 
 @app.command()
@@ -138,6 +138,28 @@ def load(
 
     conditions = list(load_conditions(policy.value, channels, driven))
     _run(conditions, "Load: 2 to 10 robots", trials, seed, jobs, as_json=as_json, plot=plot, traces=traces)
+
+
+@app.command()
+def servoing(
+    trials: Annotated[int, typer.Option("--trials", min=1, help="Starts.")] = 100,
+    seed: Seed = 1,
+    noise: Annotated[float, typer.Option("--noise", min=0, max=10, help="Of the pictures: 0 none, 1 papers'.")] = 1.0,
+    jobs: Jobs = 0,
+    as_json: AsJson = False,
+) -> None:
+    """Let a Scout find a landmark up to 2.5 m away and up to 45° aside; count how often it ends at its place."""
+    from rich.console import Console
+
+    from mission_control.experiments.screen import progress_bar, servo_table
+    from mission_control.experiments.servoing import run_servoing
+
+    with progress_bar(Console(stderr=True), "trials") as progress:
+        outcome = run_servoing(trials=trials, seed=seed, noise=noise, jobs=jobs, progress=progress)
+    if as_json:
+        print(json.dumps(outcome.to_json()))
+    else:
+        Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(servo_table(outcome))
 
 
 def run(arguments: list[str]) -> None:

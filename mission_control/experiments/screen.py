@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from statistics import median
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
@@ -12,10 +13,13 @@ from rich.table import Table
 from mission_control.experiments.conditions import PUBLISHED
 from mission_control.experiments.harness import Progress as Told
 from mission_control.experiments.intervals import wilson
+from mission_control.experiments.servoing import ServoOutcome, ServoTrial
 from mission_control.experiments.surveillance import Outcome, Row
 
 AGREES_WITHIN = 3.0
 """Standard errors between rate and prediction that are no disagreement."""
+BANDS_DEG = (15.0, 30.0, 45.0)
+"""Starts off the zero-angle line, in rows of the table."""
 
 
 def table(outcome: Outcome, title: str) -> Table:
@@ -87,3 +91,34 @@ def _cells(row: Row) -> list[str]:
 
 def _interval(bounds: tuple[float, float]) -> str:
     return f"{bounds[0]:.0%} - {bounds[1]:.0%}"
+
+
+def servo_table(outcome: ServoOutcome) -> Table:
+    """Return the trials by how far off the line they began, and all together."""
+    found = Table(title=f"Servoing: 5 cm and 10°, noise {outcome.noise:g}, seed {outcome.seed}", title_justify="left")
+    found.add_column("off the line")
+    for heading in ("arrived", "rate", "95 %", "median time", "median off", "approached again"):
+        found.add_column(heading, justify="right")
+    least_deg = 0.0
+    for most_deg in BANDS_DEG:
+        among = [t for t in outcome.trials if least_deg <= abs(t.off_axis_deg) < most_deg]
+        found.add_row(f"{least_deg:.0f} to {most_deg:.0f}°", *_servo_cells(among))
+        least_deg = most_deg
+    found.add_section()
+    found.add_row("all", *_servo_cells(list(outcome.trials)))
+    return found
+
+
+def _servo_cells(trials: list[ServoTrial]) -> list[str]:
+    if not trials:
+        return ["0/0", "", "", "", "", ""]
+    arrived = sum(trial.succeeded for trial in trials)
+    low, high = wilson(arrived, len(trials))
+    return [
+        f"{arrived}/{len(trials)}",
+        f"{arrived / len(trials):.1%}",
+        f"{low:.0%} to {high:.0%}",
+        f"{median(trial.took_s for trial in trials):.0f} s",
+        f"{median(trial.off_m for trial in trials) * 100:.1f} cm",
+        f"{sum(trial.approaches > 1 for trial in trials)}",
+    ]
