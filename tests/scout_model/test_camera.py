@@ -228,3 +228,15 @@ def test_the_memo_keeps_the_last_pictures_and_no_more() -> None:
 def test_a_picture_cannot_be_written_to() -> None:
     with Camera(room().mjcf, "paint") as camera, pytest.raises(ValueError, match="read-only"):
         camera.picture("scout1")[0, 0] = 1
+
+
+def test_who_is_beside_the_picture_does_not_change_it() -> None:
+    """Five Scouts in a row before the camera, and one more behind its back or just beyond the picture's edge."""
+    seen = []
+    for beside in ((0.72, 1.2), (0.1, 1.9), (3.0, 2.2)):
+        row = [ScoutPlace(f"scout{n}", n, 0.4 + 0.12 * n, 2.2 + 0.05 * n, 0.0) for n in range(2, 7)]
+        places = [ScoutPlace("scout1", 1, 0.72, 1.764, NORTH), *row, ScoutPlace("scout9", 9, *beside, 0.7)]
+        with Camera(World(WorldDescription(9.0, 6.0, 1, scouts=places)).mjcf, "paint") as camera:
+            seen.append(camera.picture("scout1"))
+    assert np.array_equal(seen[0], seen[1])
+    assert np.array_equal(seen[0], seen[2])

@@ -203,7 +203,20 @@ def test_the_same_description_gives_the_same_model() -> None:
     assert World(EMPTY).mjcf == World(EMPTY).mjcf
 
 
-@pytest.mark.parametrize("question", ["pose", "position_m", "wheel_speeds", "spring", "firmware_statistics"])
+@pytest.mark.parametrize(
+    "question",
+    [
+        "pose",
+        "position_m",
+        "wheel_speeds",
+        "spring",
+        "firmware_statistics",
+        "motors",
+        "is_asleep",
+        "is_upright",
+        "is_carried",
+    ],
+)
 def test_an_unknown_body_is_refused_by_name(question: str) -> None:
     world = World(EMPTY)
     with pytest.raises(UnknownBody, match="'nobody'") as refusal:
