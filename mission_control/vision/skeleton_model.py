@@ -179,7 +179,7 @@ class TargetModel:
             return 0.0
         there = frame[rows, columns]
         own = self.subimage[rows.start - top : rows.stop - top, columns.start - left : columns.stop - left]
-        return float(cv2.matchTemplate(there, own, cv2.TM_CCOEFF_NORMED)[0, 0])
+        return correlation(there, own)
 
     def best_subimage_match(self, frame: Picture) -> tuple[float, tuple[int, int]]:
         """Return how well the subimage correlates with the picture where it does best, both at half their size.
@@ -195,6 +195,21 @@ class TargetModel:
         scores = cv2.matchTemplate(small, own, cv2.TM_CCOEFF_NORMED)
         _, match, _, (column, row) = cv2.minMaxLoc(scores)
         return float(match), (2 * column - self.corner_px[0], 2 * row - self.corner_px[1])
+
+
+def correlation(one: Picture, other: Picture) -> float:
+    """Return how alike two pictures of one shape are, whatever their brightness and contrast.
+
+    What OpenCV's normalized template match says for one place, many times faster.
+
+    Returns:
+        -1 to 1; 0 if one of them is plain.
+    """
+    first, second = one.ravel().astype(np.float32), other.ravel().astype(np.float32)
+    first -= first.mean()
+    second -= second.mean()
+    scale = math.sqrt(float(first @ first) * float(second @ second))
+    return float(first @ second) / scale if scale > 0 else 0.0
 
 
 def plausible(blobs_px: Floats) -> bool:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from landmark_pictures import polar, view
+from landmark_pictures import noisy, polar, view
 
 from mission_control.vision import landmark, servo_law, target_pose
 from mission_control.vision.landmark import Disc
@@ -16,6 +17,7 @@ from mission_control.vision.skeleton_model import (
     SKELETON_PIXELS,
     TargetModel,
     centred,
+    correlation,
     is_match,
     landmark_match,
     levels_at,
@@ -108,6 +110,17 @@ def test_a_plain_picture_is_no_landmark(grey: int) -> None:
     wall = np.full_like(frame, grey)
     assert TargetModel.seen(frame, blobs_px).match(wall, blobs_px) == 0.0
     assert landmark_match(wall, blobs_px) == 0.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(gain=st.floats(0.3, 1.0), offset=st.floats(0.0, 60.0), sigma=st.floats(0.0, 40.0), seed=st.integers(0, 1000))
+def test_correlation_is_what_opencv_calls_it(gain: float, offset: float, sigma: float, seed: int) -> None:
+    one = view(0.8)[90:150, 100:220]
+    other = noisy((gain * one + offset).astype(np.uint8), np.random.default_rng(seed), sigma)
+    expected = float(cv2.matchTemplate(one, other, cv2.TM_CCOEFF_NORMED)[0, 0])
+    assert correlation(one, other) == pytest.approx(expected, abs=1e-3)
+    assert correlation(one, one) == pytest.approx(1.0)
+    assert correlation(one, np.full_like(one, 7)) == 0.0
 
 
 def test_pixels_outside_the_picture_agree_with_nothing() -> None:
