@@ -1,0 +1,105 @@
+"""The page is complete, and trusts nothing from elsewhere."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+
+import cv2
+import numpy as np
+import pytest
+
+from ui_console.web.pictures import jpeg, packet
+from ui_console.web.site import FILES, Site, is_own_page
+
+
+def texts() -> dict[str, str]:
+    folder = resources.files("ui_console.web").joinpath("page")
+    return {name: folder.joinpath(name).read_text() for name, _kind in FILES.values()}
+
+
+def test_every_file_of_the_page_is_served_with_its_safety() -> None:
+    for path in FILES:
+        answer = Site().answer(path + "?x=1")
+        assert answer.status == 200
+        assert answer.body
+        policy = answer.headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "unsafe" not in policy
+        assert answer.headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_a_page_the_browser_has_is_not_sent_again() -> None:
+    site = Site()
+    tag = site.answer("/").headers["ETag"]
+    assert (site.answer("/", tag).status, site.answer("/", tag).body) == (304, b"")
+    assert site.answer("/", '"another"').status == 200
+
+
+@pytest.mark.parametrize("path", ["/../cli.py", "/page/index.html", "//", "/index.html/..", "/%2e%2e/cli.py", ""])
+def test_there_is_nothing_else(path: str) -> None:
+    assert Site().answer(path).status == 404
+
+
+def test_nothing_comes_from_elsewhere_and_nothing_is_inline() -> None:
+    for name, text in texts().items():
+        found = re.findall(r"https?://[^\"'\s)]+", text)
+        assert set(found) <= {"http://www.w3.org/2000/svg"}, name
+    page = texts()["index.html"]
+    assert not re.search(r"<script(?![^>]*\bsrc=)|\son\w+=|\sstyle=|<style", page)
+    for name, text in texts().items():
+        if name.endswith(".js"):
+            assert not re.search(r"\beval\(|innerHTML|new Function|document\.write|insertAdjacentHTML", text), name
+
+
+def test_what_the_modules_look_for_is_on_the_page() -> None:
+    page, main = texts()["index.html"], texts()["main.js"]
+    ids = set(re.findall(r'id="([^"]+)"', page))
+    assert set(re.findall(r'find\("([^"]+)"\)', main)) <= ids
+    for name, text in texts().items():
+        for module in re.findall(r'from "\./([^"]+)"', text):
+            assert f"/{module}" in FILES, name
+
+
+def test_everything_a_person_presses_has_a_name() -> None:
+    page = texts()["index.html"]
+    assert '<html lang="en">' in page
+    for attributes, label in re.findall(r"<button([^>]*)>([^<]*)</button>", page):
+        assert label.strip() or "aria-label" in attributes
+    for tag in re.findall(r"<input[^>]*>", page):
+        at = page.index(tag)
+        assert page.rfind("<label", 0, at) > page.rfind("</label>", 0, at), tag
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "is_own"),
+    [
+        ("", "127.0.0.1:8420", True),
+        ("http://127.0.0.1:8420", "127.0.0.1:8420", True),
+        ("https://robots.lab", "robots.lab", True),
+        ("http://127.0.0.1:8421", "127.0.0.1:8420", False),
+        ("http://evil.example", "127.0.0.1:8420", False),
+        ("null", "127.0.0.1:8420", False),
+        ("file://", "", False),
+        ("http://[", "[", False),
+    ],
+)
+def test_only_its_own_page_may_connect(origin: str, host: str, is_own: bool) -> None:
+    assert is_own_page(origin, host) is is_own
+
+
+def test_a_picture_arrives_as_it_was_but_for_little() -> None:
+    rows, columns = np.mgrid[0:240, 0:320]
+    picture = ((rows + columns) // 3).astype(np.uint8)
+    packed = packet("scout1", 7, 1.5, jpeg(picture))
+    assert packed[:7] == b"\x06scout1"
+    assert int.from_bytes(packed[7:11], "big") == 7
+    shown = cv2.imdecode(np.frombuffer(packed[19:], np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert shown.shape == (240, 320)
+    assert np.abs(shown.astype(int) - picture).mean() < 2.0
+
+
+@pytest.mark.parametrize("picture", [np.zeros((0, 3), np.uint8), np.zeros((2, 2, 3), np.uint8), np.zeros((2, 2))])
+def test_what_is_no_picture_is_refused(picture: object) -> None:
+    with pytest.raises(ValueError, match="grey levels"):
+        jpeg(picture)  # type: ignore[arg-type]
