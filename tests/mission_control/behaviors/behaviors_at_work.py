@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from hypothesis import Phase, settings
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -20,6 +21,10 @@ from resource_pool.messages import AskPose, Pose
 from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
 from ui_console.driving import Drive
 from ui_console.teleoperation import Teleoperation
+
+FEW_MOMENTS = settings(max_examples=2, phases=[Phase.generate], derandomize=True, deadline=None)
+MANY_MOMENTS = settings(max_examples=30, phases=[Phase.generate], derandomize=True, deadline=None)
+"""How many sequences of take-overs are played; never shrunk, which would take an hour."""
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 PEOPLE = 100  # a console's priority above every mission of these tests

@@ -6,8 +6,8 @@ import math
 
 import msgspec
 import pytest
-from behaviors_at_work import Person, at_work, driving, example, pose, wait_until
-from hypothesis import Phase, given, settings
+from behaviors_at_work import FEW_MOMENTS, MANY_MOMENTS, Person, at_work, driving, example, pose, wait_until
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
@@ -172,9 +172,10 @@ def test_in_the_world_a_scout_jumps_over_a_box_of_thirty_centimeters_and_drives_
     run_virtual(scene())
 
 
-@settings(max_examples=4, phases=[Phase.generate], derandomize=True, deadline=None)
-@given(st.lists(st.tuples(st.floats(0.0, 10.0), st.floats(0.1, 3.0)), min_size=1, max_size=4))
-def test_in_the_world_it_gets_over_however_often_it_is_taken_over(disturbances: list[tuple[float, float]]) -> None:
+take_overs = st.lists(st.tuples(st.floats(2.0, 10.0), st.floats(0.1, 3.0)), min_size=1, max_size=4)
+
+
+def play(disturbances: list[tuple[float, float]]) -> None:
     async def scene() -> None:
         person = Person()
         async with at_work(example(NAME), person) as running:
@@ -189,6 +190,20 @@ def test_in_the_world_it_gets_over_however_often_it_is_taken_over(disturbances: 
             assert behavior.statistics()["times_suspended"] >= 1
 
     run_virtual(scene())
+
+
+@FEW_MOMENTS
+@given(take_overs)
+def test_in_the_world_it_gets_over_however_often_it_is_taken_over(disturbances: list[tuple[float, float]]) -> None:
+    play(disturbances)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@MANY_MOMENTS
+@given(take_overs)
+def test_in_the_world_it_gets_over_from_many_more_moments(disturbances: list[tuple[float, float]]) -> None:
+    play(disturbances)
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 import pytest
-from behaviors_at_work import Person, at_work, driving, example, hear, pose, wait_until
-from hypothesis import Phase, given, settings
+from behaviors_at_work import FEW_MOMENTS, MANY_MOMENTS, Person, at_work, driving, example, hear, pose, wait_until
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
@@ -46,20 +46,17 @@ def test_a_patrol_tells_each_way_point_and_succeeds_after_its_rounds() -> None:
     run_virtual(scene())
 
 
+Disturbances = list[tuple[float, tuple[float, float], float]]
 take_overs = st.lists(
     st.tuples(
-        st.floats(0.0, 15.0), st.sampled_from([(8.0, 8.0), (-8.0, -6.0), (3.0, -3.0), (0.0, 0.0)]), st.floats(0.1, 6.0)
+        st.floats(2.0, 15.0), st.sampled_from([(8.0, 8.0), (-8.0, -6.0), (3.0, -3.0), (0.0, 0.0)]), st.floats(0.1, 6.0)
     ),
     min_size=1,
     max_size=5,
 )
 
 
-@settings(max_examples=6, phases=[Phase.generate], derandomize=True, deadline=None)
-@given(take_overs)
-def test_taken_over_at_any_moment_its_record_is_that_of_an_undisturbed_patrol(
-    disturbances: list[tuple[float, tuple[float, float], float]],
-) -> None:
+def play(disturbances: Disturbances) -> None:
     async def scene() -> None:
         person = Person()
         async with at_work(patrol(), person) as running:
@@ -78,6 +75,24 @@ def test_taken_over_at_any_moment_its_record_is_that_of_an_undisturbed_patrol(
             assert world["stale_packets"] == 0
 
     run_virtual(scene())
+
+
+@FEW_MOMENTS
+@given(take_overs)
+def test_taken_over_at_any_moment_its_record_is_that_of_an_undisturbed_patrol(
+    disturbances: Disturbances,
+) -> None:
+    play(disturbances)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@MANY_MOMENTS
+@given(take_overs)
+def test_taken_over_at_many_more_moments_its_record_is_still_that(
+    disturbances: Disturbances,
+) -> None:
+    play(disturbances)
 
 
 def test_a_patrol_says_why_it_is_suspended_and_how_far_it_is() -> None:

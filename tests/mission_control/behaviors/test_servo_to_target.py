@@ -7,9 +7,9 @@ from typing import Any
 
 import msgspec
 import pytest
-from behaviors_at_work import Person, at_work, driving, example, pose, wait_until
+from behaviors_at_work import FEW_MOMENTS, MANY_MOMENTS, Person, at_work, driving, example, pose, wait_until
 from fake_resource_pool import FakePlacer
-from hypothesis import Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import VirtualClock, run_virtual
@@ -37,11 +37,13 @@ def assert_at_its_place(at: Pose) -> None:
     assert abs(at.heading_rad - PLACE[2]) < math.radians(10.0)
 
 
-@settings(max_examples=1, phases=[Phase.generate], derandomize=True, deadline=None)
-@given(st.lists(st.tuples(st.floats(0.0, 15.0), st.floats(0.2, 2.0), st.sampled_from([-1, 1])), min_size=2, max_size=2))
-def test_taken_over_and_turned_away_at_any_moment_it_still_arrives(
-    disturbances: list[tuple[float, float, int]],
-) -> None:
+Disturbances = list[tuple[float, float, int]]
+take_overs = st.lists(
+    st.tuples(st.floats(3.0, 15.0), st.floats(0.2, 2.0), st.sampled_from([-1, 1])), min_size=1, max_size=2
+)
+
+
+def play(disturbances: Disturbances) -> None:
     async def scene() -> None:
         person = Person()
         async with at_work(example(NAME), person) as running:
@@ -60,6 +62,22 @@ def test_taken_over_and_turned_away_at_any_moment_it_still_arrives(
             assert_at_its_place(await pose(running, ROBOT))
 
     run_virtual(scene())
+
+
+@FEW_MOMENTS
+@given(take_overs)
+def test_taken_over_and_turned_away_at_any_moment_it_still_arrives(
+    disturbances: Disturbances,
+) -> None:
+    play(disturbances)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@MANY_MOMENTS
+@given(take_overs)
+def test_taken_over_at_many_more_moments_it_still_arrives(disturbances: Disturbances) -> None:
+    play(disturbances)
 
 
 def test_where_there_is_no_target_it_fails_after_its_turns() -> None:
