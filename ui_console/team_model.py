@@ -348,15 +348,26 @@ class TeamModel:
         name = component_of(address)
         self.alarms.end(AlarmKind.UNSAFE, name, at_s)
         if component is None or component.state in LEAVING:
+            self._forget(name)
             return
         self._note(at_s, name, "is lost", "")
-        if name in self._arcs or _is_in(Subsystem.UI_CONSOLE, address):  # nobody restarts these by themselves
+        is_arc = name in self._arcs
+        self._arcs.discard(name)
+        if is_arc or _is_in(Subsystem.UI_CONSOLE, address):  # nobody restarts these by themselves
             self.alarms.happened(AlarmKind.LOST, name, f"{name} is lost: it ended without a word", at_s)
             return
         self._lost[address] = at_s
         self.alarms.begin(AlarmKind.LOST, name, f"{name} ({component.type}) on {component.host} is lost", at_s)
         if _is_in(Subsystem.MISSION_CONTROL, address):
             self._components[address] = component  # its place in the tree is kept until it is back
+
+    def _forget(self, name: str) -> None:
+        """Forget what was known of one that left for good: consoles and their ARCs come and go all day."""
+        self._arcs.discard(name)
+        self._finished.pop(name, None)
+        self._priorities.pop(name, None)
+        for key in [key for key in self._parameters if key[0] == name]:
+            del self._parameters[key]
 
     def _take_load(self, load: HostLoad, at_s: float) -> None:
         self._hosts[load.host] = (at_s, load)
@@ -406,6 +417,8 @@ class TeamModel:
 
     def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
         self._radios[radio] = values
+        counted = {(radio, name.removeprefix("overruns_")) for name in values}
+        self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in counted}
         for name, count in values.items():
             arc = name.removeprefix("overruns_")
             if arc == name:

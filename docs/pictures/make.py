@@ -1,6 +1,6 @@
 """Draws the pictures of the documentation from a running mission: ``.venv/bin/python docs/pictures/make.py``.
 
-What is shown is what a terminal of 120 columns shows. It takes about half a minute: the target has to pass.
+What is shown is what a terminal of 120 columns shows. It takes about a minute: the target has to pass.
 """
 
 from __future__ import annotations
@@ -15,12 +15,14 @@ from collections import deque
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from rich.console import Console
 from textual.pilot import Pilot
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
@@ -28,6 +30,7 @@ from backbone.mission_picture import look
 from backbone.mission_screen import live_screen
 from backbone.naming import Subsystem
 from mission_control.messages import MotionSeen
+from ui_console.observer import Observer
 from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession
 
@@ -36,10 +39,11 @@ MISSION_XML = HERE.parents[1] / "mission.xml"
 COLUMNS, LINES = 120, 34
 MOTION_WITHIN_S = 90.0
 PICTURE_STANDS_S, KEY_EVERY_S, KEYS = 2.0, 0.1, 8
+TURNS_PASS_S = 25.0
 
 
 async def main() -> None:
-    """Write ``up.svg`` and ``attach.svg`` beside this file."""
+    """Write ``up.svg``, ``attach.svg`` and ``monitor.svg`` beside this file."""
     found = run_files.find(None)
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
 
@@ -64,7 +68,7 @@ async def main() -> None:
         found.clock_rate,
         {"robot": "scout3", "kind": "capture", "priority": 100},
     )
-    session = TerminalSession(launch.name)
+    session = TerminalSession(launch.name, found.mission, "anna")
 
     async def drive(pilot: Pilot[Any]) -> None:
         await asyncio.sleep(PICTURE_STANDS_S)
@@ -74,8 +78,22 @@ async def main() -> None:
         (HERE / "attach.svg").write_text(pilot.app.export_screenshot(title="scout-console attach scout3"))
         await pilot.press("q")
 
-    console = Teleoperation(launch, await join(launch.address), clock, show=session.show, see=session.see)
+    console = Teleoperation(launch, await join(launch.address), clock, show=session.show, see=session.see, user="anna")
     await session.run(console, pilot=drive, size=(COLUMNS, LINES))
+
+    launch = msgspec.structs.replace(launch, name="console-2", parameters={})
+    watching = TerminalSession(launch.name, found.mission, "ben", sees=False)
+
+    async def look_on(pilot: Pilot[Any]) -> None:
+        await asyncio.sleep(TURNS_PASS_S)
+        await pilot.press("K")
+        (HERE / "monitor.svg").write_text(pilot.app.export_screenshot(title="scout-console monitor"))
+        await pilot.press("q")
+
+    observer: Observer[NoParameters] = Observer(
+        launch, await join(launch.address), clock, show=watching.show, user="ben"
+    )
+    await watching.run(observer, pilot=look_on, size=(COLUMNS, LINES))
 
 
 async def _picture_of_up(bus: ZenohBus, clock: MissionClock) -> str:

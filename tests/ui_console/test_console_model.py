@@ -296,6 +296,26 @@ def test_alarms_while_the_operator_was_away_are_marked_until_they_are_seen() -> 
     assert (stop.kind, stop.acknowledged_by, stop.while_away) == (AlarmKind.STOPPED, "anna", False)
 
 
+def test_of_consoles_that_come_and_go_all_day_nothing_is_left() -> None:
+    shown = model(*TEAM_EVENTS)
+    for number in range(50):
+        name = f"console-{number}"
+        address, arc = f"ui_console/{name}", f"{name}-drive"
+        asked = request(arc, address, RequestState.RUNNING, priority=f"console {name}:100")
+        for at in (address, f"resource_pool/{arc}"):
+            shown.apply(ComponentHeard(10.0, component(at, "console", since_s=10.0)))
+        shown.apply(ScheduleHeard(10.0, Schedule(10.0, [], [asked], [])))
+        shown.apply(RadioCounted(10.0, "radio", {f"overruns_{arc}": 0.0}))
+        for at in (f"resource_pool/{arc}", address):
+            shown.apply(ComponentHeard(11.0, component(at, "console", state=LifeState.STOPPED, since_s=11.0)))
+            shown.apply(ComponentGone(11.0, at))
+    shown.apply(ScheduleHeard(12.0, SCHEDULE))
+    view = shown.view(12.0)
+    assert not [row for row in view.components if row.name.startswith("console-")]
+    assert view.alarms == []
+    assert len(shown.team.tree()) == 3
+
+
 # ---------------------------------------------------------------------- parameters and the log
 def test_a_parameter_that_was_changed_says_what_it_was_and_who_changed_it() -> None:
     at = "mission_control/watch1"

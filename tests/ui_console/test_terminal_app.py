@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -167,6 +169,20 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
     elsewhere |= {"left_square_bracket", "pageup", "right_square_bracket", "pagedown", "4", "5", "6", "7", "8", "9"}
     known = set(ConsoleApp(WrittenSession())._bindings.key_to_bindings)  # noqa: SLF001  what the footer is made of
     assert known - {"ctrl+q"} == {key for key, _wanted in KEYS} | elsewhere
+
+
+def test_the_reference_names_every_key_and_who_has_it() -> None:
+    page = (Path(__file__).parents[2] / "docs/reference/console-keys.md").read_text()
+    profiles = {"attach": Profile.TERMINAL, "pendant": Profile.PENDANT, "monitor": Profile.MONITOR}
+    listed: dict[str, set[str]] = {}
+    for keys, who in re.findall(r"^\| ((?:`[^`]+` ?)+)\|[^|]*\| ([a-z, ]+) \|$", page, re.MULTILINE):
+        for key in re.findall(r"`([^`]+)`", keys):
+            listed[key] = set(profiles) if who == "all" else set(who.split(", "))
+    for name, profile in profiles.items():
+        screen = ConsoleApp(WrittenSession(), profile=profile)
+        bindings = screen._bindings.key_to_bindings  # noqa: SLF001  what the footer is made of
+        can = {key for key, found in bindings.items() if screen.check_action(found[0].action.partition("(")[0], ())}
+        assert {key for key, who in listed.items() if name in who} == can - {"ctrl+q"}
 
 
 async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds() -> None:
