@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -25,9 +27,11 @@ from ui_console.gamepad import (
     BUTTONS,
     EV_ABS,
     EV_KEY,
+    NoGamepad,
     PadWish,
     Stick,
     buttons_help,
+    find_gamepad,
     play_gamepad,
 )
 
@@ -143,6 +147,39 @@ def test_a_gamepad_that_is_gone_while_it_is_held_stops_the_wheels() -> None:
     said = play([(0.0, Said(EV_KEY, BTN_TL, 1)), (0.5, Said(EV_KEY, BTN_SOUTH, 1))], unplugged=True, for_s=3.0)
     assert said[-1] == "stop"
     assert PadWish.JUMP in said
+
+
+class FoundDevice:
+    """What evdev tells of a device."""
+
+    def __init__(self, path: str) -> None:
+        self.path, self.is_closed = path, False
+
+    def capabilities(self) -> dict[int, list[Any]]:
+        axis = SimpleNamespace(min=0, max=255)
+        if self.path == "mouse":
+            return {EV_KEY: [272]}
+        return {EV_KEY: [BTN_TL, BTN_SOUTH], EV_ABS: [(ABS_X, axis), (ABS_Y, axis)]}
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+def test_the_first_device_with_a_stick_and_a_shoulder_button_is_the_gamepad(monkeypatch: pytest.MonkeyPatch) -> None:
+    evdev = SimpleNamespace(list_devices=lambda: ["mouse", "pad", "other pad"], InputDevice=FoundDevice)
+    monkeypatch.setitem(sys.modules, "evdev", evdev)
+    device, ranges = find_gamepad()
+    assert isinstance(device, FoundDevice)
+    assert (device.path, ranges) == ("pad", {ABS_X: (0, 255), ABS_Y: (0, 255)})
+
+
+@pytest.mark.parametrize("installed", [True, False])
+def test_without_a_gamepad_or_the_extra_it_is_said_what_to_do(installed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    evdev = SimpleNamespace(list_devices=lambda: ["mouse"], InputDevice=FoundDevice) if installed else None
+    monkeypatch.setitem(sys.modules, "evdev", evdev)
+    with pytest.raises(NoGamepad) as refusal:
+        find_gamepad()
+    assert "scout-backbone[gamepad]" in refusal.value.remedy
 
 
 def test_the_help_names_every_button() -> None:

@@ -328,6 +328,13 @@ def test_what_is_typed_is_json_or_the_text_itself() -> None:
     assert [read_value(text) for text in ("1", "0.5", "true", '"a"', "a b", "[1]")] == [1, 0.5, True, "a", "a b", [1]]
 
 
+async def test_with_a_gamepad_the_keys_name_its_buttons_too() -> None:
+    async with ConsoleApp(WrittenSession(), has_gamepad=True).run_test(size=(100, 60)) as pilot:
+        await pilot.press("f1")
+        await settle(pilot)
+        assert "the left stick drives" in screen_text(pilot.app)
+
+
 async def test_video_only_hides_everything_but_picture_and_status_and_brings_it_back() -> None:
     session = WrittenSession(shown=held_model())
     screen = ConsoleApp(session)

@@ -21,6 +21,7 @@ from textual.widgets import Footer, Static
 
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import Direction, Drive, drive_towards
+from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Question, Reading, RobotPicker
 from ui_console.terminal.lines import (
@@ -161,6 +162,7 @@ class ConsoleApp(App[None]):
         profile: How it looks.
         has_pixels: True if the terminal shows real pixels.
         is_bare: True to begin with the picture alone, for a head-mounted display.
+        has_gamepad: True if the session also drives by one.
     """
 
     TITLE = "scout-console"
@@ -227,9 +229,11 @@ class ConsoleApp(App[None]):
         profile: Profile = Profile.TERMINAL,
         has_pixels: bool = False,
         is_bare: bool = False,
+        has_gamepad: bool = False,
     ) -> None:
         super().__init__()
         self._session, self.profile, self._has_pixels, self._begins_bare = session, profile, has_pixels, is_bare
+        self._has_gamepad = has_gamepad
         self.speed_rad_s = SPEED_RAD_S
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
@@ -536,6 +540,8 @@ class ConsoleApp(App[None]):
             f"{', '.join(self.get_key_display(one) for one in bindings)}: {description}"
             for description, bindings in self._keys().items()
         ]
+        if self._has_gamepad:
+            shown += ["", "gamepad", *buttons_help()]
         self.push_screen(Reading("keys", shown))
 
     def _keys(self) -> dict[str, list[Binding]]:

@@ -85,6 +85,7 @@ class TerminalSession:
             profile=self._profile if isinstance(console, Teleoperation) else Profile.MONITOR,
             has_pixels=pilot is None and can_show_pixels(os.environ),
             is_bare=self._is_bare,
+            has_gamepad=self._gamepad is not None,
         )
         living = asyncio.create_task(console.run(), name="console")
         living.add_done_callback(lambda _living: screen.exit())
