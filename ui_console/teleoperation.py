@@ -120,6 +120,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._touched = asyncio.Event()
         self._is_attended = True
         self._holding = ""
+        self._next_robot = ""
+        self._switching = asyncio.Lock()
         self.refusal: Refusal | None = None
         """Why the claim was refused; None if it was not."""
         self.given_back: bool | None = None
@@ -150,12 +152,17 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._keeping = self.start_task(self._keep(self._arc), "arc")
 
     async def switch(self, robot: str) -> None:
-        """Claim another robot in place of the one that is claimed, which is stopped and given back first."""
-        if robot == self.parameters.robot and self._keeping is not None:
-            return
-        await self.give_back(f"{self.user} takes {robot}")
-        self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
-        self.take()
+        """Claim another robot in place of the one that is claimed, which is stopped and given back first.
+
+        Asked for several in a row, it claims the last.
+        """
+        self._next_robot = robot
+        async with self._switching:
+            if robot != self._next_robot or (robot == self.parameters.robot and self._keeping is not None):
+                return
+            await self.give_back(f"{self.user} takes {robot}")
+            self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+            self.take()
 
     def touch(self) -> None:
         """The operator is there; driving says so by itself."""

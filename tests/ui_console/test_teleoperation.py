@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Awaitable, Callable
 from itertools import pairwise
@@ -320,6 +321,19 @@ def test_switching_gives_the_first_robot_back_before_the_other_is_asked_for(plac
             assert list(placer.arcs.values()) == [second]
         kinds = [type(event) for event in events if isinstance(event, Granted | GivenBack)]
         assert kinds == [Granted, GivenBack, Granted, GivenBack]
+
+    placer_world(scene)
+
+
+def test_of_several_robots_asked_for_in_a_row_the_last_is_taken(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            await asyncio.gather(*(driven.switch(robot) for robot in ("scout2", "scout3", "scout1", "scout3")))
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            assert arc.parameters["wish"] == {"scout": "scout3"}
 
     placer_world(scene)
 
