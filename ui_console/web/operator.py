@@ -20,7 +20,7 @@ from ui_console.console_events import (
     PictureSeen,
 )
 from ui_console.console_model import ConsoleModel
-from ui_console.driving import STICK_LASTS_S, drive_by_stick
+from ui_console.driving import STICK_LASTS_S, Halt, drive_by_stick
 from ui_console.observer import Observer
 from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
@@ -139,6 +139,8 @@ class Operator:
         console, life = self._console, self._life
         if console is not None and life is not None:
             self.stop()
+            if console.is_ready and console.is_held:
+                await console.do(Halt())
             console.end(reason)
             await asyncio.wait({life})
         self._hands.watching_changed()

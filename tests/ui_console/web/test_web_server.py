@@ -1,0 +1,416 @@
+"""Browsers on the loopback, real sockets and real time, before a placer and ARCs that decide nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import socket
+import struct
+import urllib.error
+import urllib.request
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from fake_resource_pool import FakeArc, FakePlacer
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.frames import CloseCode
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.component.launch import Launch
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import Holder, RcView, Schedule
+from resource_pool.messages import Drive, Halt
+from ui_console.web import server as web_server
+from ui_console.web.hub import WebHub
+from ui_console.web.protocol import MAX_MESSAGE_BYTES, Doorkeeper, Pass
+from ui_console.web.server import WebServer
+
+MISSION = "web-test"
+HIGH, LOW, ANYBODY = "high-token", "low-token", "anybody"
+PASSES = {HIGH: Pass("anna", 100), LOW: Pass("ben", 50), ANYBODY: Pass("", 10)}
+WITHIN_S = 15.0
+WIDTH_PX, HEIGHT_PX = 32, 24
+
+
+class Browser:
+    """What a page does, without a page: keeps the newest of each section, and says that pictures are drawn."""
+
+    def __init__(self, socket_: ClientConnection) -> None:
+        self.socket = socket_
+        self.view: dict[str, Any] = {}
+        self.answers: list[dict[str, Any]] = []
+        self.pictures: dict[str, list[int]] = {}
+        self.news = asyncio.Event()
+
+    async def listen(self) -> None:
+        try:
+            async for message in self.socket:
+                if isinstance(message, bytes):
+                    robot = message[1 : 1 + message[0]].decode()
+                    (number,) = struct.unpack_from(">I", message, 1 + message[0])
+                    assert message[13 + message[0] :].startswith(b"\xff\xd8"), "a JPEG"
+                    self.pictures.setdefault(robot, []).append(number)
+                    await self.say(do="drawn", robot=robot, number=number)
+                else:
+                    said = json.loads(message)
+                    self.view.update(said.get("view", {}))
+                    self.answers += [said["answer"]] if "answer" in said else []
+                self.news.set()
+        except ConnectionClosed:
+            self.news.set()
+
+    async def say(self, **message: Any) -> None:
+        await self.socket.send(json.dumps(message))
+
+    async def wait(self, holds: Callable[[], Any], what: str) -> None:
+        """Return when this holds of what was heard so far."""
+        try:
+            async with asyncio.timeout(WITHIN_S):
+                while not holds():
+                    self.news.clear()
+                    await self.news.wait()
+        except TimeoutError:
+            pytest.fail(f"never: {what}; own: {self.view.get('own')}; alarms: {self.view.get('alarms')}")
+
+    def has_alarm(self, words: str) -> bool:
+        return any(words in alarm["line"] for alarm in self.view.get("alarms", []))
+
+    @property
+    def is_held(self) -> bool:
+        return bool(self.view.get("own", {}).get("is_held"))
+
+
+async def all_in_turn(sends: Iterator[Awaitable[None]]) -> None:
+    for send in sends:
+        await send
+
+
+class Stage:
+    """A mission with a web console and nobody before it yet."""
+
+    def __init__(self, network: Any, clock: MissionClock, placer: FakePlacer, rc_manager: Bus) -> None:
+        self.placer, self.clock, self.rc_manager = placer, clock, rc_manager
+        launch = Launch(MISSION, Subsystem.UI_CONSOLE, "web-1", "console", "in this process", "local", "", 0.0, 1.0)
+
+        async def join(one_more: Launch) -> Bus:
+            return network.join(one_more.address, clock)
+
+        self.hub = WebHub(launch, network.join(launch.address, clock), clock, join)
+        self.port = 0
+
+    @asynccontextmanager
+    async def browser(self, token: str = HIGH, **hello: Any) -> AsyncIterator[Browser]:
+        async with self.connection() as connection:
+            browser = Browser(connection)
+            await browser.say(do="hello", token=token, **hello)
+            listening = asyncio.create_task(browser.listen(), name="browser")
+            try:
+                await browser.wait(lambda: "own" in browser.view, "welcome")
+                yield browser
+            finally:
+                listening.cancel()
+                await asyncio.wait({listening})
+
+    def connection(self, **options: Any) -> connect:
+        return connect(f"ws://127.0.0.1:{self.port}/socket", compression=None, proxy=None, **options)
+
+    def grant_all(self) -> None:
+        """Let every ARC have its robot at once, as if nobody else were there."""
+
+        def grant(arc: FakeArc) -> None:
+            arc.bus.start(arc.grant())  # type: ignore[attr-defined]
+
+        self.placer.on_arc = grant
+
+    def publish_schedule(self, **arcs: str) -> None:
+        """Say which ARC holds which robot; an empty name: none."""
+        now_s = self.clock.now_s()
+        rcs = [
+            RcView(robot, "scout", "up", False, 1.0, [Holder(arc, 1, now_s, 0.0)] if arc else [], 1, [], [now_s + 5.0])
+            for robot, arc in arcs.items()
+        ]
+        schedule = Schedule(now_s, rcs, [], [])
+        self.rc_manager.publish(RC_MANAGER, Conversation.SCHEDULE, schedule)
+
+    def drives(self, robot: str = "scout1") -> list[tuple[float, Any]]:
+        return [
+            (at_s, command)
+            for arc in self.placer.arcs.values()
+            if arc.rcs["scout"] == robot
+            for at_s, _epoch, command in arc.commands
+        ]
+
+
+@pytest.fixture
+async def stage(local_mission: Any) -> AsyncIterator[Stage]:
+    clock = MissionClock.started_now()
+    async with local_mission(MISSION, clock) as network:
+        placer = FakePlacer(network, clock, {})
+        rc_manager = network.join(RC_MANAGER, clock)
+        made = Stage(network, clock, placer, rc_manager)
+        is_ready = asyncio.Event()
+
+        def ready(port: int) -> None:
+            made.port = port
+            is_ready.set()
+
+        serving = asyncio.create_task(WebServer(made.hub, Doorkeeper(PASSES)).run("127.0.0.1", 0, ready), name="server")
+        try:
+            async with asyncio.timeout(WITHIN_S):
+                await is_ready.wait()
+            await placer.wait(lambda: made.hub.observer.state == "ready")
+            yield made
+        finally:
+            made.hub.observer.end("the test is over")
+            await asyncio.wait({serving})
+            await placer.close()
+            await rc_manager.close()
+        serving.result()
+
+
+async def test_who_takes_a_robot_drives_it_and_who_lets_go_stops_it(stage: Stage) -> None:
+    stage.grant_all()
+    async with stage.browser() as anna:
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+        assert anna.view["own"]["status"].startswith("you hold scout1")
+        for _ in range(6):
+            await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=4.0)
+            await stage.clock.sleep_s(0.05)
+        await anna.say(do="stop")
+        await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))
+        commands = [command for _at, command in stage.drives()]
+        assert commands[0] == Drive(4.0, 4.0)
+        assert isinstance(commands[-1], Halt)
+        await anna.say(do="release")
+        await anna.wait(lambda: not anna.view["own"]["is_asked"], "given back")
+        await stage.placer.wait(lambda: not stage.placer.arcs)
+
+
+async def test_when_nothing_is_heard_for_a_moment_the_wheels_stop_by_the_servers_clock(stage: Stage) -> None:
+    stage.grant_all()
+    async with stage.browser() as anna:
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+        await anna.say(do="drive", forward=1.0, right=0.5, speed_rad_s=4.0)
+        await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))
+        count = len(stage.drives())
+        await stage.clock.sleep_s(0.5)
+        assert len(stage.drives()) == count, "one halt, then silence"
+
+
+async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back(stage: Stage) -> None:
+    stage.grant_all()
+    async with stage.browser() as anna:
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+        [arc] = stage.placer.arcs.values()
+        await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=4.0)
+        await stage.placer.wait(lambda: arc.commands)
+        anna.socket.transport.abort()
+        await stage.placer.wait(lambda: arc.released)
+        assert isinstance(arc.commands[-1][2], Halt)
+        await stage.placer.wait(lambda: not stage.hub.operators)
+
+
+async def test_who_loses_the_robot_is_told_who_took_it_and_why(stage: Stage) -> None:
+    stage.grant_all()
+    async with stage.browser(LOW) as ben:
+        await ben.say(do="take", robot="scout1")
+        await ben.wait(lambda: ben.is_held, "held")
+        [arc] = stage.placer.arcs.values()
+        assert arc.parameters["path"][0][1] == 50
+        assert arc.name.startswith("ben-")
+        await arc.suspend("higher priority", "anna-1", deadline_s=0.0)
+        await ben.wait(lambda: not ben.is_held, "taken")
+        assert ben.view["own"]["taken_because"] == "higher priority by anna-1"
+        await arc.grant()
+        await ben.wait(lambda: ben.is_held, "back")
+        assert ben.view["own"]["taken_because"] == ""
+
+
+async def test_two_operators_claim_one_robot_each_with_the_priority_of_their_token(stage: Stage) -> None:
+    async with stage.browser(HIGH, priority=70) as anna, stage.browser(LOW, priority=1000) as ben:
+        await anna.say(do="take", robot="scout1")
+        await ben.say(do="take", robot="scout1")
+        await stage.placer.wait(lambda: len(stage.placer.arcs) == 2)
+        asked = {arc.name[:3]: arc.parameters["path"][0][1] for arc in stage.placer.arcs.values()}
+        assert asked == {"ann": 70, "ben": 50}
+
+
+async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: Stage) -> None:
+    """Three robots, none of them this operator's; their behaviors' ARCs deliver the pictures."""
+    robots = {f"scout{number}": f"watch{number}-capture" for number in (1, 2, 3)}
+    arcs = {}
+    for robot, name in robots.items():
+        bus = stage.placer.network.join(f"resource_pool/{name}", stage.clock)
+        arcs[robot] = FakeArc(bus, stage.clock, name, {"wish": {"scout": robot}, "owner": "mission_control/w"})
+    try:
+        async with stage.browser() as anna, stage.browser(LOW) as ben:
+            stage.publish_schedule(**robots)
+            await anna.wait(lambda: len(anna.view.get("robots", [])) == 3, "robots")
+            await anna.say(do="watch", robots=[*robots, "scout9"])
+            await ben.say(do="watch", robots=["scout2"])
+            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.operators) == 4)
+            for number in range(40):
+                for arc in arcs.values():
+                    arc.publish(bytes([number]) * (WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, number)
+                await stage.clock.sleep_s(0.03)
+            await anna.wait(lambda: all(len(anna.pictures.get(robot, [])) >= 30 for robot in robots), "pictures")
+            assert all(numbers == sorted(set(numbers)) for numbers in anna.pictures.values())
+            assert set(ben.pictures) == {"scout2"}
+            assert stage.hub.pictures_packed <= 3 * 40, "packed once for all who watch"
+            await anna.wait(lambda: len(anna.view["drawn"]) == 3, "the latency from lens to screen")
+            await anna.say(do="watch", robots=[])
+            await ben.say(do="watch", robots=[])
+            await stage.placer.wait(lambda: not any(one.outbox.watched for one in stage.hub.operators))
+            packed = stage.hub.pictures_packed
+            arcs["scout2"].publish(bytes(WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, 99)
+            await stage.clock.sleep_s(0.1)
+            assert stage.hub.pictures_packed == packed, "nobody watches, nothing is packed"
+    finally:
+        for arc in arcs.values():
+            await arc.bus.close()
+
+
+@pytest.mark.parametrize(
+    ("first", "words"),
+    [
+        (b'{"do":"hello","token":"wrong"}', "showed a wrong token"),
+        (b'{"do":"stop_all"}', "before it showed a token"),
+        (b"x" * (MAX_MESSAGE_BYTES + 1), "more than 4096 bytes"),
+        (b"\x00\x01", "means nothing"),
+    ],
+)
+async def test_who_is_not_let_in_is_cut_off_and_the_operators_see_an_alarm(
+    stage: Stage, first: bytes, words: str
+) -> None:
+    async with stage.browser() as anna:
+        async with stage.connection() as stranger:
+            await stranger.send(first)
+            with pytest.raises(ConnectionClosed) as closed:
+                async with asyncio.timeout(WITHIN_S):
+                    await stranger.recv()
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code in (1007, 1008, 1009)
+        await anna.wait(lambda: anna.has_alarm(words), words)
+        assert anna.view["own"]["status"].startswith("watching")
+        [key] = [alarm["key"] for alarm in anna.view["alarms"] if words in alarm["line"]]
+        await anna.say(do="acknowledge", key=key)
+        await anna.wait(lambda: not anna.has_alarm(words), "seen")
+
+
+async def test_a_page_of_another_site_may_not_connect(stage: Stage) -> None:
+    async with stage.browser() as anna:
+        with pytest.raises(InvalidStatus, match="403"):
+            async with stage.connection(origin="http://evil.example"):
+                pytest.fail("was let in")
+        await anna.wait(lambda: anna.has_alarm("another site"), "alarm")
+        async with stage.connection(origin=f"http://127.0.0.1:{stage.port}"):
+            pass
+
+
+async def test_others_do_not_notice_one_that_floods(stage: Stage) -> None:
+    stage.grant_all()
+    async with stage.browser() as anna, stage.connection() as flooder:
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+        await flooder.send(json.dumps({"do": "hello", "token": LOW}))
+        flood = (flooder.send(b'{"do":"drive","forward":1,"right":0,"speed_rad_s":4}') for _ in range(20_000))
+        with contextlib.suppress(ConnectionClosed):
+            await all_in_turn(flood)
+        async with asyncio.timeout(WITHIN_S):
+            await flooder.wait_closed()
+        assert flooder.close_code == CloseCode.POLICY_VIOLATION
+        await anna.wait(lambda: anna.has_alarm("ben at 127.0.0.1 sent more than"), "alarm")
+        await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=3.0)
+        await stage.placer.wait(lambda: any(command == Drive(3.0, 3.0) for _at, command in stage.drives()))
+
+
+async def test_others_do_not_notice_one_that_stops_reading(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is found out by the pings it does not answer; its robot is given back."""
+    stage.grant_all()
+    async with stage.browser() as anna:
+        deaf = socket.create_connection(("127.0.0.1", stage.port))
+        try:
+            request = (
+                f"GET /socket HTTP/1.1\r\nHost: 127.0.0.1:{stage.port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+                "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+            )
+            deaf.sendall(request.encode())
+            for said in ({"do": "hello", "token": LOW}, {"do": "take", "robot": "scout2"}):
+                body = json.dumps(said).encode()
+                deaf.sendall(bytes([0x81, 0x80 | len(body)]) + bytes(4) + body)  # masked with zeros
+            await stage.placer.wait(lambda: len(stage.hub.operators) == 2)
+            await anna.wait(lambda: anna.has_alarm("ben at 127.0.0.1 has read nothing"), "alarm")
+            await stage.placer.wait(lambda: len(stage.hub.operators) == 1)
+            await stage.placer.wait(lambda: not stage.placer.arcs)
+        finally:
+            deaf.close()
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+
+
+async def test_who_says_nothing_at_all_is_let_go(stage: Stage) -> None:
+    async with stage.browser() as anna, stage.connection() as silent:
+        with pytest.raises(ConnectionClosed):
+            async with asyncio.timeout(WITHIN_S):
+                await silent.recv()
+        await anna.wait(lambda: anna.has_alarm("showed no token within"), "alarm")
+
+
+async def test_only_so_many_are_served(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(web_server, "MOST_VISITORS", 1)
+    async with stage.browser() as anna:
+        with pytest.raises(InvalidStatus, match="503"):
+            async with stage.connection():
+                pytest.fail("was let in")
+        await anna.wait(lambda: anna.has_alarm("found 1 others there"), "alarm")
+
+
+async def test_the_page_is_served_with_its_policy_and_nothing_else_is(stage: Stage) -> None:
+    def get(path: str) -> tuple[int, str]:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{stage.port}{path}", timeout=WITHIN_S) as answer:
+                return answer.status, answer.headers["Content-Security-Policy"]
+        except urllib.error.HTTPError as error:
+            error.close()
+            return error.code, error.headers["Content-Security-Policy"]
+
+    status, policy = await asyncio.to_thread(get, "/")
+    assert (status, "default-src 'none'" in policy) == (200, True)
+    status, policy = await asyncio.to_thread(get, "/etc/passwd")
+    assert (status, "default-src 'none'" in policy) == (404, True)
+
+
+async def test_what_cannot_be_stopped_for_certain_is_said(stage: Stage) -> None:
+    async with stage.browser() as anna:
+        stage.publish_schedule(scout1="")
+        await anna.wait(lambda: anna.view.get("robots"), "robots")
+        await anna.say(do="stop_robot", robot="scout1")
+        await anna.wait(lambda: anna.answers, "answer")
+        assert anna.answers == [{"refused": "not certain to have stopped: scout1"}]
+
+
+async def test_why_is_answered(stage: Stage) -> None:
+    async with stage.browser() as anna:
+        await anna.say(do="why", name="nobody")
+        await anna.wait(lambda: anna.answers, "answer")
+        assert anna.answers[0]["why"] == "nobody"
+        assert anna.answers[0]["lines"]
+
+
+async def test_the_recording_says_who_came_and_who_left(stage: Stage) -> None:
+    async with stage.browser(ANYBODY, user="Carla"):
+        pass
+    await stage.placer.wait(lambda: not stage.hub.operators)
+    await stage.placer.wait(lambda: any("Carla left" in row.what for row in stage.hub.team.log()))
+    told = [row.what for row in stage.hub.team.log() if row.subject == "web"]
+    assert told == ["Carla came, with priority 10", "Carla left: the browser has gone away"]
