@@ -10,6 +10,7 @@ over to each other is the same for ``shared_bus``, whose members speak with othe
 from __future__ import annotations
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -29,7 +30,7 @@ class LocalNetwork:
     def __init__(self, mission: str = "local") -> None:
         self.mission = mission
         self.servers: dict[str, Serving] = {}
-        self.listeners: list[Listening] = []
+        self.listeners: dict[Conversation, list[Listening]] = defaultdict(list)
         self.tokens: dict[str, list[Declared]] = {}
         self.watchers: list[Watching] = []
 
@@ -95,8 +96,8 @@ class Neighbor(Speaker):
 
     def tell_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Any]) -> None:
         """Hand what was published to every listener in this process."""
-        for listening in self.network.listeners:
-            if listening.conversation == conversation and _matches(listening.pattern, address):
+        for listening in self.network.listeners[conversation]:
+            if _matches(listening.pattern, address):
                 self.network.carry_publication(listening, address, envelope)
 
     def serve_neighbors(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
@@ -109,7 +110,7 @@ class Neighbor(Speaker):
     ) -> Listening:
         """Hear publications made in this process."""
         listening = Listening(self, address, conversation, accepts, listener, latest)
-        self.network.listeners.append(listening)
+        self.network.listeners[conversation].append(listening)
         return listening
 
     def show_neighbors(self, address: str) -> Declared:
@@ -185,7 +186,7 @@ class Listening(Declared):
         listener: Listener,
         latest: bool,
     ) -> None:
-        super().__init__(owner, lambda: owner.network.listeners.remove(self))
+        super().__init__(owner, lambda: owner.network.listeners[conversation].remove(self))
         self.pattern, self.conversation, self.kinds, self.listener = pattern, conversation, kinds_of(accepts), listener
         self.latest = latest
         self.newest: dict[str, Envelope[Any]] = {}

@@ -39,7 +39,7 @@ def standard_errors_apart(detected: int, trials: int, predicted: float) -> float
     of 0 or 1 can be missed by one.
 
     Example:
-        >>> standard_errors_apart(60, 100, 0.5)
+        >>> round(standard_errors_apart(60, 100, 0.5), 6)
         2.0
     """
     rate = min(1 - 0.5 / trials, max(0.5 / trials, predicted))

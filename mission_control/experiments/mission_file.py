@@ -79,7 +79,6 @@ def mission_of_trial(condition: Condition, world_seed: int, departs_s: float) ->
     (world,) = mission.components
     content = dict(world.parameters[WORLD])
     content["seed"] = world_seed
-    content["air"] = {"noise": condition.noise}
     content["targets"] = [{**target, "begin_s": departs_s} for target in content["targets"]]
     there = world.model_copy(update={"parameters": {**world.parameters, WORLD: content}})
     return mission.model_copy(update={"components": (there,)})
@@ -152,6 +151,7 @@ def _world(condition: Condition) -> Iterator[str]:
     passage = condition.passage
     yield f'  <world name="{WORLD}" type="simulated_world" host="base" seed="1">'
     yield f'    <room width-m="{ROOM_M[0]:g}" depth-m="{ROOM_M[1]:g}"/>'
+    yield f'    <air noise="{condition.noise:g}"/>'
     places = (*WATCHERS[: condition.active], *EXTRAS[: condition.extra])
     for robot, (x_m, y_m) in zip(condition.robots, places, strict=True):
         yield f'    <scout name="{robot}" x-m="{x_m:g}" y-m="{y_m:g}" heading-deg="90"/>'

@@ -28,6 +28,7 @@ SWITCH_S = 0.002  # measured: the last packet of a hold
 BAD_SHARE, BAD_BURST_S = 0.25, 0.15  # SCHEDULING.md, section 6, at noise 1
 LEAST_M = 0.1  # measured: so much of a target must be in view before its region is large enough
 CLEAN_SHARE = 0.75  # of the watchers' parameters
+ADAPTED_SLICE_S = 2.5  # chosen: about what watchers work out; only the spread of phases depends on it
 ASK_BEFORE_END_S = 0.2  # resource_pool.aggregate_resource_controller: when "not now" can be said
 
 
@@ -89,15 +90,29 @@ class _Watch:
         return self.certain >= self.wanted
 
 
+def departs_s(condition: Condition, phase: float) -> float:
+    """Return when the target departs after the schedule's first turn began, seconds.
+
+    Args:
+        condition: What is tried.
+        phase: 0 to 1, of a round: everybody's slices, of consoles that yield for the share of time they are driven.
+    """
+    watcher_s, console_s = condition.slice_s, condition.slice_s
+    if condition.policy == "adaptive":
+        watcher_s = min(watcher_s, ADAPTED_SLICE_S)
+        console_s *= max(condition.driven, ADAPTED_SLICE_S / condition.slice_s)
+    switch_s = SETTLING_S + SWITCH_S
+    round_s = condition.active * (watcher_s + switch_s) + condition.extra * (console_s + switch_s)
+    first_s = 0.0 if condition.policy == "paper" else round_s / 2
+    return first_s + phase * round_s
+
+
 class _Sample:
     """One passage at a random phase."""
 
     def __init__(self, condition: Condition, dice: Random) -> None:
         self._condition, self._dice = condition, dice
-        turns = len(condition.in_turn)
-        self._departs_s = dice.random() * turns * (condition.slice_s + SETTLING_S + SWITCH_S)
-        if condition.policy == "adaptive":
-            self._departs_s += condition.slice_s
+        self._departs_s = departs_s(condition, dice.random())
         self._over_s = self._departs_s + condition.passage.lasts_s
         self._bursts = Bursts(condition.noise, dice)
         self._channels: list[list[_Claimant]] = [[] for _ in range(condition.channels)]

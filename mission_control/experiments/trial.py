@@ -30,13 +30,13 @@ from mission_control.experiments.mission_file import (
     watcher_of,
 )
 from mission_control.experiments.operator import Operator
+from mission_control.experiments.prediction import SWITCH_S, departs_s
 from mission_control.messages import MotionSeen
 from resource_pool.messages import WorldState
 from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
 
 CLAIMS_FROM_FRAME = 15  # chosen: half a second in which the Scouts come to rest on the floor
 AFTERWARDS_S = 0.5  # chosen: pictures are on their way for less
-SWITCH_S = 0.002  # measured: a last packet on the radio ends a hold
 
 
 class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,17 +87,17 @@ class Draw:
 def draw(condition: Condition, seed: int, number: int) -> Draw:
     """Return what is random about this trial: the same for the same arguments.
 
-    The phase between the target's departure and the schedule is uniform over a round. With one frequency it is
-    made of whole turns, which are a matter of who begins, and the rest of one, which is waited for.
+    The phase between the target's departure and the schedule is uniform over a round. Where slices are equal and
+    share one frequency, it is made of whole turns, which are a matter of who begins, and the rest of one, which is
+    waited for; else all of it is, after everybody had a first turn.
     """
     dice = Random(f"{seed} trial {number}")
-    turn_s = condition.slice_s + SETTLING_S + SWITCH_S
-    turns = len(condition.robots)
-    phase = dice.random() * turns
-    world_seed = dice.randrange(2**31)
-    if condition.channels > 1 or condition.policy != "paper":
-        return Draw(0, round(phase * turn_s * FRAMES_PER_S), world_seed)
-    return Draw(int(phase), round(phase % 1.0 * turn_s * FRAMES_PER_S), world_seed)
+    phase, world_seed = dice.random(), dice.randrange(2**31)
+    if condition.channels == 1 and condition.policy == "paper":
+        turn = phase * len(condition.robots)
+        turn_s = condition.slice_s + SETTLING_S + SWITCH_S
+        return Draw(int(turn), round(turn % 1.0 * turn_s * FRAMES_PER_S), world_seed)
+    return Draw(0, round(departs_s(condition, phase) * FRAMES_PER_S), world_seed)
 
 
 def run_trial(

@@ -9,6 +9,7 @@ or as soon afterwards as it is drawn.
 from __future__ import annotations
 
 import asyncio
+import functools
 import importlib
 import math
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 
+from backbone.bus.clock import VirtualLoop
 from backbone.bus.interface import Subscription
 from backbone.keys import Conversation
 from backbone.wire import Envelope
@@ -27,6 +29,7 @@ from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe
 
+CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each
 EARLY_S = 1 / 120  # chosen: a quarter of a frame; the times of frames are rounded, and no frame is left out for that
 
 
@@ -70,7 +73,8 @@ class SimulatedFramegrabber:
         choosing = run(None, _choose, self._site.parameters.camera)
         world = await meet_world(self._site)
         support, backend = await choosing
-        self._studio = await run(self._thread, _Studio, world, support, backend)
+        lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
+        self._studio = await run(self._thread, _Studio, world, support, backend, lasts)
         if support is not None and support.missing_packages:
             self._site.tell(support.summary)
         self._world = self._site.bus.subscribe(
@@ -139,9 +143,10 @@ class _Tuned:
 class _Studio:
     """Cameras of all robots and one receiver a frequency; lives in the drawing thread."""
 
-    def __init__(self, world: WorldModel, support: GlSupport | None, backend: str) -> None:
+    def __init__(self, world: WorldModel, support: GlSupport | None, backend: str, lasts: bool) -> None:
         prepare(support.backend if support is not None and backend == "gl" else "none")
-        self._camera = importlib.import_module("scout_model.camera").Camera(world.mjcf, backend)
+        self._camera_lasts = lasts
+        self._camera = _lasting_camera(world.mjcf, backend) if lasts else _new_camera(world.mjcf, backend)
         self._video_link = importlib.import_module("scout_model.video_link")
         self._distance_m = importlib.import_module("scout_model.air").distance_m
         self._world = world
@@ -182,7 +187,22 @@ class _Studio:
         )
 
     def close(self) -> None:
-        self._camera.close()
+        if not self._camera_lasts:
+            self._camera.close()
+
+
+def _new_camera(mjcf: str, backend: str) -> Any:
+    return importlib.import_module("scout_model.camera").Camera(mjcf, backend)
+
+
+@functools.lru_cache(maxsize=CAMERAS_KEPT)
+def _lasting_camera(mjcf: str, backend: str) -> Any:
+    """Return the camera of all worlds of this model that this process plays on a virtual clock, one after the other.
+
+    They are drawn in one thread, and what a picture shows depends on the world's state alone, so pictures that one
+    world's camera keeps serve the next world too.
+    """
+    return _new_camera(mjcf, backend)
 
 
 def _choose(wanted: str) -> tuple[GlSupport | None, str]:
