@@ -430,6 +430,23 @@ async def test_the_screen_shows_picture_holder_and_status() -> None:
         assert line.cell_length == screen.query_one(Video).size.width
 
 
+async def test_a_terminal_with_real_pixels_is_sent_the_picture_once_and_cells_that_name_it() -> None:
+    session = WrittenSession(shown=held_model())
+    session.shown = np.full((30, 40), 200, np.uint8)
+    screen = ConsoleApp(session, has_pixels=True)
+    async with screen.run_test(size=SIZE) as pilot:
+        screen.redraw()
+        await pilot.pause()
+        video = screen.query_one(Video)
+        first, second = video.render_line(0), video.render_line(1)
+        assert (first.cell_length, second.cell_length) == (video.size.width, video.size.width)
+        assert "\x1b_Ga=T" in first.text
+        assert "\x1b" not in second.text
+        session.now_s = lambda: 20.0  # type: ignore[method-assign]
+        screen.redraw()
+        assert "\x1b_G" not in video.render_line(0).text, "an old picture is drawn dark, in half blocks"
+
+
 async def test_an_old_picture_says_so_across_the_picture() -> None:
     session = WrittenSession(shown=held_model())
     session.shown = np.full((30, 40), 200, np.uint8)

@@ -74,11 +74,6 @@ def row_of_cells(row: int, columns: int) -> Segment:
     return Segment(PLACEHOLDER + ROW_MARKS[row] + PLACEHOLDER * (columns - 1), _STYLE)
 
 
-def forget() -> str:
-    """Return what makes the terminal forget the picture."""
-    return f"\x1b_Ga=d,d=I,i={IMAGE},q=2\x1b\\"
-
-
 def png(picture: NDArray[np.uint8]) -> bytes:
     """Return the picture as PNG, 8 bits of grey.
 
