@@ -115,11 +115,14 @@ def attach(
 @app.command()
 def monitor(
     as_json: Annotated[bool, typer.Option("--json", help="JSON lines instead of a screen.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="All that screens show now, as one JSON object.")] = False,
     user: User = "",
     mission: Mission = None,
     connect: Connect = None,
 ) -> None:
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
+    if once:
+        run(lambda: _look_once(mission, connect, user or _user()))
     if not as_json:
         _need_a_terminal("monitor", "--json")
     run(lambda: _watch(mission, connect, user or _user(), as_json=as_json))
@@ -245,6 +248,33 @@ async def _watch(mission: str | None, connect: str | None, user: str, *, as_json
     console = Observer(launch, bus, clock, show=session.show, user=user)
     _end_on_signals(console)
     await session.run(console)
+    return ExitCode.DONE
+
+
+async def _look_once(mission: str | None, connect: str | None, user: str) -> int:
+    from backbone.component.component import NoParameters
+    from ui_console.console_model import ConsoleModel
+    from ui_console.observer import Observer
+    from ui_console.team_model import TeamModel
+    from ui_console.views import view_json
+
+    launch, clock = await _launch(mission, connect, {})
+    model = ConsoleModel(launch.name, user, TeamModel(launch.mission), sees=False)
+    console: Observer[NoParameters] = Observer(launch, await _open_bus(launch, clock), clock, show=model.apply)
+    interrupted = _end_on_signals(console)
+
+    async def end_when_listed() -> None:
+        await console.feed.listed.wait()
+        console.end("all was told")
+
+    ending = asyncio.create_task(end_when_listed(), name="end when listed")
+    try:
+        await console.run()
+    finally:
+        ending.cancel()
+    if interrupted():
+        return ExitCode.INTERRUPTED
+    _write_line(view_json(model.view(clock.now_s())))
     return ExitCode.DONE
 
 

@@ -87,6 +87,8 @@ class ConsoleFeed:
         self._radios: set[str] = set()
         self._robots: set[str] = set()
         self._listing = asyncio.Event()
+        self.listed = asyncio.Event()
+        """Set once all were asked how things are, and answered or did not."""
         self._is_up = True
 
     # ------------------------------------------------------------------ listening
@@ -201,6 +203,7 @@ class ConsoleFeed:
             await self._listing.wait()
             self._listing.clear()
             await asyncio.gather(self._list(), self._ask_schedule())
+            self.listed.set()
 
     async def _list(self) -> None:
         try:

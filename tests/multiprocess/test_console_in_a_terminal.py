@@ -149,3 +149,14 @@ def test_a_monitor_without_a_screen_tells_the_same_as_json_lines(mission: Runnin
         words = {json.loads(watching.stdout.readline())["event"] for _line in range(5)}
         watching.terminate()
     assert "schedule" in words
+
+
+def test_a_script_is_told_once_all_that_screens_show(mission: RunningMission) -> None:
+    done = mission.command("scout-console", "monitor", "--once", "--mission", mission.name)
+    assert done.returncode == 0, done.stderr + mission.story()
+    view = json.loads(done.stdout)
+    assert view["mission"] == mission.name
+    assert [robot["robot"] for robot in view["robots"]] == ["scout1", "scout2", "scout3"]
+    assert [node["name"] for node in view["tree"]] == ["surveillance", "watch-scout1", "watch-scout2"]
+    assert [row["rc"] for row in view["timeline"]["rows"]]
+    assert not view["own"]["is_asked"]
