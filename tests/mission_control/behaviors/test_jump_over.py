@@ -172,7 +172,7 @@ def test_in_the_world_a_scout_jumps_over_a_box_of_thirty_centimeters_and_drives_
     run_virtual(scene())
 
 
-take_overs = st.lists(st.tuples(st.floats(2.0, 10.0), st.floats(0.1, 3.0)), min_size=1, max_size=4)
+take_overs = st.lists(st.tuples(st.floats(2.0, 7.0), st.floats(0.1, 3.0)), min_size=1, max_size=4)
 
 
 def play(disturbances: list[tuple[float, float]]) -> None:
