@@ -1,0 +1,375 @@
+"""``scout-console serve`` beside a running mission: driven by a program, and by a real browser at three sizes.
+
+Screenshots for the documents are kept where ``SCOUT_PICTURES`` says.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from running_mission import BIN, MISSION_XML, RunningMission, mission_up
+from websockets.asyncio.client import connect
+
+from backbone.bus.interface import Bus
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule, Schedule
+from resource_pool.messages import AskPose, Pose
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
+
+WITHIN_S = 30.0
+STOPPED_WITHIN_S = 3.0  # of which 0.3 s are the rule; the rest is a machine that also runs other tests
+WORLD = "resource_pool/world"
+SECOND_WATCHER = re.search(
+    r'<behavior type="watch_for_motion" name="watch-scout2".*?</behavior>', MISSION_XML.read_text(), re.DOTALL
+)
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
+
+
+@dataclass
+class Served:
+    """A mission with its web console.
+
+    Attributes:
+        mission: The mission.
+        port: Where the page is served.
+        token: What opens it.
+        process: The server's.
+    """
+
+    mission: RunningMission
+    port: int
+    token: str
+    process: subprocess.Popen[str]
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    assert SECOND_WATCHER is not None
+    with mission_up(change={SECOND_WATCHER.group(): ""}) as mission:
+        process = subprocess.Popen(
+            [str(BIN / "scout-console"), "serve", "--port", "0", "--mission", mission.name],
+            env=mission.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", process.stdout.readline())
+            assert found is not None
+            yield Served(mission, int(found[1]), found[2], process)
+            process.terminate()
+            assert process.wait(20) == 0
+        finally:
+            if process.poll() is None:
+                process.kill()
+            process.wait(10)
+            assert process.stdout is not None
+            process.stdout.close()
+
+
+async def pose(bus: Bus, robot: str = "scout1") -> Pose:
+    return await bus.ask(WORLD, AskPose(robot), Pose, within_s=5.0)
+
+
+def differs(one: Pose, other: Pose) -> bool:
+    turned_rad = abs(math.remainder(one.heading_rad - other.heading_rad, math.tau))
+    return math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) > 0.005 or turned_rad > 0.03
+
+
+async def wait_until(is_so: Callable[[], Awaitable[bool]], what: str, within_s: float = WITHIN_S) -> None:
+    try:
+        async with asyncio.timeout(within_s):
+            while not await is_so():  # noqa: ASYNC110  what another process does gives no event here
+                await asyncio.sleep(0.1)
+    except TimeoutError:
+        pytest.fail(f"never: {what}")
+
+
+async def wait_still(bus: Bus) -> None:
+    """Return when the robot stands, which it must soon."""
+
+    async def stands() -> bool:
+        before = await pose(bus)
+        await asyncio.sleep(0.5)
+        after = await pose(bus)
+        return math.hypot(after.x_m - before.x_m, after.y_m - before.y_m) < 0.001
+
+    await wait_until(stands, "the wheels stopped", STOPPED_WITHIN_S)
+
+
+async def test_a_program_drives_a_robot_and_when_it_vanishes_the_wheels_stop_and_the_behavior_goes_on(
+    served: Served,
+) -> None:
+    view: dict[str, Any] = {}
+    pictures: list[bytes] = []
+
+    async with served.mission.bus() as bus:
+        socket = await connect(f"ws://127.0.0.1:{served.port}/socket", compression=None, proxy=None)
+
+        async def listen() -> None:
+            async for message in socket:
+                if isinstance(message, bytes):
+                    pictures.append(message)
+                    number = int.from_bytes(message[7:11], "big")
+                    await socket.send(json.dumps({"do": "drawn", "robot": "scout1", "number": number}))
+                else:
+                    view.update(json.loads(message).get("view", {}))
+
+        async def heard(is_so: Callable[[], Any]) -> bool:
+            return bool(is_so())
+
+        async def drive() -> None:
+            while True:
+                await socket.send(json.dumps({"do": "drive", "forward": 0, "right": 1, "speed_rad_s": 6}))
+                await asyncio.sleep(0.05)
+
+        await socket.send(json.dumps({"do": "hello", "token": served.token, "user": "program"}))
+        listening = asyncio.create_task(listen())
+        driving: asyncio.Task[None] | None = None
+        try:
+            await wait_until(lambda: heard(lambda: view.get("robots")), "robots")
+            await socket.send('{"do":"watch","robots":["scout1"]}')
+            await wait_until(lambda: heard(lambda: pictures), "the watcher's pictures, before any grant")
+            await socket.send('{"do":"take","robot":"scout1"}')
+            await wait_until(lambda: heard(lambda: view["own"]["is_held"]), "held")
+            before, driving = await pose(bus), asyncio.create_task(drive())
+
+            async def moved() -> bool:
+                return differs(before, await pose(bus))
+
+            await wait_until(moved, "the pose changed")
+            socket.transport.abort()  # no goodbye
+            await wait_still(bus)
+            await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
+        finally:
+            for task in (listening, driving):
+                if task is not None:
+                    task.cancel()
+                    with contextlib.suppress(Exception, asyncio.CancelledError):
+                        await task
+
+
+async def holds(bus: Bus, behavior: str) -> bool:
+    """Say whether this behavior has scout1."""
+    schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=5.0)
+    return any(holder.arc.startswith(behavior) for rc in schedule.rcs if rc.rc == "scout1" for holder in rc.holders)
+
+
+# ---------------------------------------------------------------------- a real browser
+class Cable:
+    """A connection to the server that can be pulled out: afterwards nothing passes, and nobody is told."""
+
+    def __init__(self, to_port: int) -> None:
+        self._to_port, self.is_cut, self.port = to_port, False, 0
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @asynccontextmanager
+    async def plugged_in(self) -> AsyncIterator[Cable]:
+        server = await asyncio.start_server(self._meet, "127.0.0.1", 0)
+        self.port = server.sockets[0].getsockname()[1]
+        try:
+            yield self
+        finally:
+            server.close()
+            for task in list(self._tasks):
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self._to_port)
+        try:
+            await asyncio.gather(self._carry(reader, far_writer), self._carry(far_reader, writer))
+        finally:
+            writer.close()
+            far_writer.close()
+
+    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(ConnectionError):
+            while data := await reader.read(65536):
+                if not self.is_cut:
+                    writer.write(data)
+                    await writer.drain()
+            if not self.is_cut:
+                writer.close()
+
+
+SIZES = {"desktop": (1280, 860), "tablet": (820, 1180), "phone": (390, 844)}
+
+
+@asynccontextmanager
+async def page_at(size: str, port: int, token: str) -> AsyncIterator[Any]:
+    """Open the page in a browser of this size; anything the page complains about fails the test."""
+    async_api = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
+    if not CHROMIUM:
+        pytest.skip("no Chromium on this machine: apt-get install chromium")
+    width, height = SIZES[size]
+    async with async_api.async_playwright() as playwright:
+        browser = await playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--force-color-profile=srgb"]
+        )
+        try:
+            context = await browser.new_context(
+                viewport={"width": width, "height": height}, has_touch=size != "desktop", is_mobile=size == "phone"
+            )
+            page = await context.new_page()
+            page.set_default_timeout(1000 * WITHIN_S)
+            complaints: list[str] = []
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+            await page.goto(f"http://127.0.0.1:{port}/#token={token}&user={size}")
+            await page.wait_for_selector(".robot[data-robot=scout1]")
+            yield page
+            assert [one for one in complaints if "WebSocket" not in one] == []
+        finally:
+            await browser.close()
+
+
+async def keep_picture(page: Any, name: str) -> None:
+    folder = os.environ.get("SCOUT_PICTURES")
+    if folder:
+        await page.screenshot(path=Path(folder) / f"web-{name}.jpg", type="jpeg", quality=60)
+
+
+async def shown(page: Any) -> str:
+    """Return the picture of scout1 on the screen."""
+    picture: str = await page.locator(".robot[data-robot=scout1] canvas").evaluate("canvas => canvas.toDataURL()")
+    return picture
+
+
+async def take(page: Any) -> None:
+    await page.locator(".robot[data-robot=scout1]").get_by_role("button", name="Take over").click()
+    await page.wait_for_selector("body[data-held=scout1]")
+
+
+async def assert_no_sideways_scroll(page: Any) -> None:
+    overhang_px = await page.locator("html").evaluate("page => page.scrollWidth - page.clientWidth")
+    assert overhang_px <= 0
+
+
+class Finger:
+    """A finger on the drive pad."""
+
+    def __init__(self, page: Any) -> None:
+        self._page = page
+
+    async def push_right(self) -> None:
+        """Put it down in the middle and move it to the right."""
+        self._touches = await self._page.context.new_cdp_session(self._page)
+        await self._page.locator("#pad").scroll_into_view_if_needed()
+        box = await self._page.locator("#pad").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        await self._send("touchStart", [{"x": x, "y": y}])
+        await self._send("touchMove", [{"x": x + 0.45 * box["width"], "y": y}])
+        await self._page.wait_for_selector("#pad.is-held")
+
+    async def lift(self) -> None:
+        """Take it away."""
+        await self._send("touchEnd", [])
+
+    async def _send(self, kind: str, points: list[dict[str, float]]) -> None:
+        await self._touches.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+async def test_at_a_desk_a_person_watches_drives_by_keys_and_releases(served: Served) -> None:
+    async with served.mission.bus() as bus, page_at("desktop", served.port, served.token) as page:
+        await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stale)")
+        await take(page)
+        first, before = await shown(page), await pose(bus)
+        await page.keyboard.down("d")
+
+        async def moved() -> bool:
+            return differs(before, await pose(bus))
+
+        await wait_until(moved, "the pose changed")
+
+        async def changed() -> bool:
+            return await shown(page) != first
+
+        await wait_until(changed, "the picture changed")
+        await page.locator("#tab-timeline").click()
+        await page.wait_for_selector("svg.timeline")
+        await keep_picture(page, "desktop")
+        await page.keyboard.up("d")
+        await wait_still(bus)
+        await assert_no_sideways_scroll(page)
+        await page.locator("#release").click()
+        await page.wait_for_selector("body[data-held='']")
+        await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
+
+
+async def test_on_a_tablet_a_finger_on_the_pad_drives_and_a_lifted_one_stops(served: Served) -> None:
+    async with served.mission.bus() as bus, page_at("tablet", served.port, served.token) as page:
+        await take(page)
+        before = await pose(bus)
+        finger = Finger(page)
+        await finger.push_right()
+
+        async def moved() -> bool:
+            return differs(before, await pose(bus))
+
+        await wait_until(moved, "the pose changed")
+        await keep_picture(page, "tablet")
+        await finger.lift()
+        await page.wait_for_selector("#pad:not(.is-held)")
+        await wait_still(bus)
+        await assert_no_sideways_scroll(page)
+        await page.locator("#release").click()
+        await page.wait_for_selector("body[data-held='']")
+
+
+async def test_on_a_phone_that_loses_its_network_the_wheels_stop_and_the_behavior_goes_on(served: Served) -> None:
+    async with (
+        served.mission.bus() as bus,
+        Cable(served.port).plugged_in() as cable,
+        page_at("phone", cable.port, served.token) as page,
+    ):
+        await take(page)
+        await assert_no_sideways_scroll(page)
+        before = await pose(bus)
+        await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stale)")
+        finger = Finger(page)
+        await finger.push_right()
+
+        async def moved() -> bool:
+            return differs(before, await pose(bus))
+
+        await wait_until(moved, "the pose changed")
+        await keep_picture(page, "phone")
+        cable.is_cut = True  # the finger stays where it is
+        await wait_still(bus)
+        await page.wait_for_selector("#link.is-down")
+        await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
+        cable.is_cut = False
+        await page.wait_for_selector("#link:not(.is-down)")
+        await page.wait_for_selector("body[data-held='']")
+
+
+async def test_a_stranger_is_asked_for_the_token_and_told_that_it_is_wrong(served: Served) -> None:
+    async with page_at("desktop", served.port, served.token) as page:
+        other = await page.context.new_page()
+        await other.goto(f"http://127.0.0.1:{served.port}/#token=wrong")
+        await other.wait_for_selector("#login:not([hidden])")
+        assert "wrong token" in await other.locator("#login-why").inner_text()
+        await page.wait_for_selector("#alarm-bar:has-text('wrong token')")
+        await other.locator("#login-token").fill(served.token)
+        await other.locator("#login button").click()
+        await other.wait_for_selector(".robot[data-robot=scout1]")
