@@ -59,9 +59,7 @@ class ReturnToPickup(Servo[PickupParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        given = self.parameters
-        [near] = read_places(given.near)
-        self._route = PickupRoute(near, speed_m_s=given.speed_m_s, attempts=given.attempts)
+        self._route = self._way()
 
     @property
     def route(self) -> PickupRoute:
@@ -89,9 +87,19 @@ class ReturnToPickup(Servo[PickupParameters]):
         self._route.interrupt()
         await super().suspended(reason, by)
 
+    def parameters_changed(self) -> None:
+        """Begin anew with the new parameters."""
+        self._route = self._way()
+        super().parameters_changed()
+
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, and how often the mark was looked for in vain."""
         return {**super().statistics(), "searched_in_vain": self._route.in_vain}
+
+    def _way(self) -> PickupRoute:
+        given = self.parameters
+        [near] = read_places(given.near)
+        return PickupRoute(near, speed_m_s=given.speed_m_s, attempts=given.attempts)
 
     async def _travel(self, robot: str) -> None:
         position = await self.locate(self.parameters.localizer, robot)

@@ -79,7 +79,7 @@ class Servo(Driver[S]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._servo = VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
+        self._servo = self._plan()
         self._step: Step | None = None
         self._seen_s: float | None = None
         self._fresh = asyncio.Event()
@@ -115,6 +115,11 @@ class Servo(Driver[S]):
     async def suspended(self, reason: str, by: str) -> None:
         """Say how far it was; see ``Behavior.suspended``."""
         self.report(f"suspended: {reason} by {by}; {self._servo.approaches} approaches until now")
+
+    def parameters_changed(self) -> None:
+        """Begin anew with the new parameters."""
+        self._servo, self._counted_rad = self._plan(), 0.0
+        self.look_anew()
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, and how often the target was found and come near to."""
@@ -161,6 +166,9 @@ class Servo(Driver[S]):
         if pose is not None:
             at |= {"ahead_m": pose.ahead_m, "left_m": pose.left_m, "heading_rad": pose.heading_rad}
         self.finish(BehaviorStatus.SUCCESS, at)
+
+    def _plan(self) -> VisualServo:
+        return VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
 
     def _note_phase(self, robot: str, step: Step) -> None:
         if step.track.phase is self._phase:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
-from behaviors_at_work import at_work, example, wait_until
+from behaviors_at_work import at_work, example, filmed_at, wait_until
 
 from backbone.bus.clock import run_virtual
+from backbone.component.component import WrongParameter
+from backbone.component.messages import Parameters, SetParameter
 from mission_control.behavior import Behavior
 from mission_control.messages import BehaviorStatus
 
@@ -31,5 +35,30 @@ def test_each_reaches_its_aim_over_several_slices_and_no_two_are_on_the_air() ->
             assert patrol.statistics()["waypoints_reached"] >= 8
             world = await running.statistics("world")
             assert world["jammed_frames"] == world["stale_packets"] == 0
+
+    run_virtual(scene())
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "value"),
+    [
+        ("patrol-scout1", "waypoints", "2,2 3,2"),
+        ("jump-scout2", "attempts", 1),
+        ("servo-scout3", "stop_m", 0.6),
+        ("hide-scout4", "dark_level", 40.0),
+        ("return-scout5", "near", "1.5,4.5"),
+    ],
+)
+def test_a_parameter_can_be_changed_at_work_and_nonsense_changes_nothing(name: str, parameter: str, value: Any) -> None:
+    async def scene() -> None:
+        async with at_work(filmed_at(example(name), 5.0)) as running:
+            at = running.component(name).address
+            await running.clock.sleep_s(2.0)
+            told = await running.bus.ask(at, SetParameter(parameter, value), Parameters, within_s=1.0)
+            assert told.values[parameter] == value
+            await running.clock.sleep_s(1.0)
+            with pytest.raises(WrongParameter):
+                await running.bus.ask(at, SetParameter(parameter, -1), Parameters, within_s=1.0)
+            assert getattr(running.component(name).parameters, parameter) == value
 
     run_virtual(scene())
