@@ -1,0 +1,140 @@
+"""What three videos in a browser cost while their mission runs: ``.venv/bin/python bench/web_console.py [SECONDS]``.
+
+Starts the shipped mission with three video frequencies, so that three behaviors see at once, and ``scout-console
+serve`` beside it. A client watches all three and says that a picture is drawn as soon as it has it, as a page does. The
+claim: 15 pictures of 320 × 240 a second of each, at a small share of one core, a moment after they were taken.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+from console import BIN, MISSION_XML, busy_s, launcher_pid, mission_processes, percent
+from measuring import percentile, report
+from websockets.asyncio.client import ClientConnection, connect
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+
+ROBOTS = ("scout1", "scout2", "scout3")
+SETTLE_S = 8.0  # chosen: behaviors have their robots, and the first pictures are over
+
+
+def with_three_frequencies(mission: str) -> str:
+    """Return the shipped mission with a frequency, a framegrabber and a watcher for each robot."""
+    text = mission
+    for kind, names in (("video_frequency", ("video1", "video2", "video3")), ("framegrabber", ("grabber",))):
+        found = re.search(rf'    <resource type="{kind}" name="\w+".*?</resource>\n', text, re.DOTALL)
+        assert found is not None
+        one = found[0]
+        if kind == "framegrabber":
+            many = "".join(
+                one.replace('name="grabber"', f'name="grabber{n}"').replace('"video1"', f'"video{n}"')
+                for n in (1, 2, 3)
+            )
+        else:
+            many = "".join(one.replace('name="video1"', f'name="{name}"') for name in names)
+        text = text.replace(one, many)
+    for number in (2, 3):
+        robot = re.search(rf'<resource type="scout" name="scout{number}".*?</resource>', text, re.DOTALL)
+        assert robot is not None
+        text = text.replace(robot[0], robot[0].replace('"video1"', f'"video{number}"'))
+    watcher = re.search(r'      <behavior type="watch_for_motion" name="watch-scout2".*?</behavior>\n', text, re.DOTALL)
+    assert watcher is not None
+    return text.replace(watcher[0], watcher[0] + watcher[0].replace("scout2", "scout3"))
+
+
+class Watcher:
+    """Counts what arrives."""
+
+    def __init__(self, socket: ClientConnection, clock: MissionClock) -> None:
+        self._socket, self._clock = socket, clock
+        self.is_counting = False
+        self.counts = dict.fromkeys(ROBOTS, 0)
+        self.ages_s: list[float] = []
+        self.received_bytes = 0
+        self.drawn_s: dict[str, float] = {}
+
+    async def listen(self) -> None:
+        """Say of each picture that it is drawn; until cancelled."""
+        async for message in self._socket:
+            self.received_bytes += len(message) * self.is_counting
+            if isinstance(message, str):
+                view = json.loads(message).get("view", {})
+                self.drawn_s = view.get("drawn", self.drawn_s)
+                continue
+            robot = message[1 : 1 + message[0]].decode()
+            number, captured_s = struct.unpack_from(">Id", message, 1 + message[0])
+            await self._socket.send(json.dumps({"do": "drawn", "robot": robot, "number": number}))
+            if self.is_counting:
+                self.counts[robot] += 1
+                self.ages_s.append(self._clock.now_s() - captured_s)
+
+
+async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -> dict[str, Any]:
+    """Watch all robots for so long; return what was measured."""
+    found = run_files.find()
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    async with connect(f"ws://127.0.0.1:{port}/socket", compression=None, proxy=None) as socket:
+        await socket.send(json.dumps({"do": "hello", "token": token, "user": "bench"}))
+        watcher = Watcher(socket, clock)
+        listening = asyncio.create_task(watcher.listen())
+        await clock.sleep_s(SETTLE_S)
+        await socket.send(json.dumps({"do": "watch", "robots": ROBOTS}))
+        await clock.sleep_s(1.0)
+        mission = mission_processes(launcher_pid())
+        watcher.is_counting = True
+        began_s, own_s, mission_s = time.monotonic(), busy_s([server]), busy_s(mission)
+        await clock.sleep_s(lasts_s)
+        took_s = time.monotonic() - began_s
+        watcher.is_counting = False
+        measured = {
+            "serving_cpu_percent": percent(busy_s([server]) - own_s, took_s),
+            "mission_cpu_percent": percent(busy_s(mission) - mission_s, took_s),
+            "pictures_per_s": {robot: round(count / took_s, 1) for robot, count in watcher.counts.items()},
+            "age_p50_ms": round(1000 * percentile(watcher.ages_s or [0.0], 0.5), 1),
+            "age_p99_ms": round(1000 * percentile(watcher.ages_s or [0.0], 0.99), 1),
+            "shown_latency_ms": {robot: round(1000 * at_s, 1) for robot, at_s in watcher.drawn_s.items()},
+            "sent_kb_s": round(watcher.received_bytes / took_s / 1000, 1),
+            "memory_mb": round(server.memory_info().rss / 1e6, 1),
+        }
+        listening.cancel()
+        await asyncio.wait({listening})
+        return measured
+
+
+def main(lasts_s: float) -> None:
+    """Print one JSON line."""
+    with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
+        os.environ["XDG_RUNTIME_DIR"] = folder
+        file = Path(folder) / "mission.xml"
+        file.write_text(with_three_frequencies(MISSION_XML.read_text()))
+        backbone = str(BIN / "scout-backbone")
+        subprocess.run([backbone, "up", str(file), "--detach", "--headless"], check=True, stderr=subprocess.DEVNULL)
+        serving = subprocess.Popen(
+            [str(BIN / "scout-console"), "serve", "--port", "0"], stdout=subprocess.PIPE, text=True
+        )
+        try:
+            assert serving.stdout is not None
+            found = re.fullmatch(r"http://[^:]+:(\d+)/#token=(\S+)\n", serving.stdout.readline())
+            assert found is not None
+            report("web_console", **asyncio.run(watch(int(found[1]), found[2], psutil.Process(serving.pid), lasts_s)))
+        finally:
+            serving.terminate()
+            serving.wait(10)
+            subprocess.run([backbone, "down"], check=False, capture_output=True)
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 15.0)
