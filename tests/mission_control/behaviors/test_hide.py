@@ -78,7 +78,7 @@ def go_on(search: DarkSearch, room: PlayedRoom, lasts_s: float) -> None:
 near_the_dark = st.builds(Position, st.floats(1.5, 4.5), st.floats(1.5, 4.5), st.floats(-math.pi, math.pi))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(near_the_dark)
 def test_from_anywhere_near_it_ends_in_the_dark_and_looks_out(begin: Position) -> None:
     search, room = dark_search(), PlayedRoom(begin)
@@ -88,7 +88,7 @@ def test_from_anywhere_near_it_ends_in_the_dark_and_looks_out(begin: Position) -
     assert search.decide(room.seen(), room.now_s) == STILL
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     near_the_dark,
     st.lists(st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 20.0), st.none() | near_the_dark), max_size=4),
