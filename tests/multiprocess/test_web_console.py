@@ -21,7 +21,8 @@ from typing import Any
 
 import pytest
 from running_mission import BIN, MISSION_XML, RunningMission, mission_up
-from websockets.asyncio.client import connect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed
 
 from backbone.bus.interface import Bus
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
@@ -59,7 +60,7 @@ class Served:
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     assert SECOND_WATCHER is not None
-    with mission_up(change={SECOND_WATCHER.group(): ""}) as mission:
+    with mission_up(name="iros2001", change={SECOND_WATCHER.group(): ""}) as mission:
         process = subprocess.Popen(
             [str(BIN / "scout-console"), "serve", "--port", "0", "--mission", mission.name],
             env=mission.environment,
@@ -112,56 +113,98 @@ async def wait_still(bus: Bus) -> None:
     await wait_until(stands, "the wheels stopped", STOPPED_WITHIN_S)
 
 
+class Program:
+    """What a page does, as a program."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.view: dict[str, Any] = {}
+        self.pictures = 0
+
+    async def say(self, **message: Any) -> None:
+        await self.socket.send(json.dumps(message))
+
+    async def listen(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            async for message in self.socket:
+                if isinstance(message, bytes):
+                    self.pictures += 1
+                    number = int.from_bytes(message[7:11], "big")
+                    await self.say(do="drawn", robot="scout1", number=number)
+                else:
+                    self.view.update(json.loads(message).get("view", {}))
+
+    async def drive(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await self.say(do="drive", forward=0, right=1, speed_rad_s=6)
+                await asyncio.sleep(0.05)
+
+    async def wait(self, is_so: Callable[[], Any], what: str, within_s: float = WITHIN_S) -> None:
+        async def asked() -> bool:
+            return bool(is_so())
+
+        await wait_until(asked, f"{what}: {self.view.get('own')}", within_s)
+
+    @property
+    def is_held(self) -> bool:
+        return bool(self.view["own"]["is_held"])
+
+
+@asynccontextmanager
+async def program(served: Served, user: str, priority: int = 100) -> AsyncIterator[Program]:
+    async with connect(f"ws://127.0.0.1:{served.port}/socket", compression=None, proxy=None) as socket:
+        made = Program(socket)
+        await made.say(do="hello", token=served.token, user=user, priority=priority)
+        listening = asyncio.create_task(made.listen())
+        try:
+            await made.wait(lambda: made.view.get("robots"), "robots")
+            yield made
+        finally:
+            listening.cancel()
+            await asyncio.wait({listening})
+
+
 async def test_a_program_drives_a_robot_and_when_it_vanishes_the_wheels_stop_and_the_behavior_goes_on(
     served: Served,
 ) -> None:
-    view: dict[str, Any] = {}
-    pictures: list[bytes] = []
+    async with served.mission.bus() as bus, program(served, "program") as one:
+        await one.say(do="watch", robots=["scout1"])
+        await one.wait(lambda: one.pictures, "the watcher's pictures, before any grant")
+        await one.say(do="take", robot="scout1")
+        await one.wait(lambda: one.is_held, "held")
+        before, driving = await pose(bus), asyncio.create_task(one.drive())
 
-    async with served.mission.bus() as bus:
-        socket = await connect(f"ws://127.0.0.1:{served.port}/socket", compression=None, proxy=None)
+        async def moved() -> bool:
+            return differs(before, await pose(bus))
 
-        async def listen() -> None:
-            async for message in socket:
-                if isinstance(message, bytes):
-                    pictures.append(message)
-                    number = int.from_bytes(message[7:11], "big")
-                    await socket.send(json.dumps({"do": "drawn", "robot": "scout1", "number": number}))
-                else:
-                    view.update(json.loads(message).get("view", {}))
+        await wait_until(moved, "the pose changed")
+        one.socket.transport.abort()  # no goodbye
+        await wait_still(bus)
+        await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
+        await driving
 
-        async def heard(is_so: Callable[[], Any]) -> bool:
-            return bool(is_so())
 
-        async def drive() -> None:
-            while True:
-                await socket.send(json.dumps({"do": "drive", "forward": 0, "right": 1, "speed_rad_s": 6}))
-                await asyncio.sleep(0.05)
+async def test_of_two_operators_the_higher_has_the_robot_and_the_other_is_told_who_and_why(served: Served) -> None:
+    async with program(served, "anna", 100) as anna, program(served, "ben", 50) as ben:
+        await ben.say(do="take", robot="scout1")
+        await ben.wait(lambda: ben.is_held, "ben holds it")
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "anna holds it")
+        await ben.wait(lambda: not ben.is_held, "ben lost it")
+        await ben.wait(lambda: "anna" in ben.view["own"]["taken_because"], "ben is told by whom")
+        assert "waiting for scout1" in ben.view["own"]["status"]
+        await anna.say(do="release")
+        await ben.wait(lambda: ben.is_held, "ben has it back")
 
-        await socket.send(json.dumps({"do": "hello", "token": served.token, "user": "program"}))
-        listening = asyncio.create_task(listen())
-        driving: asyncio.Task[None] | None = None
-        try:
-            await wait_until(lambda: heard(lambda: view.get("robots")), "robots")
-            await socket.send('{"do":"watch","robots":["scout1"]}')
-            await wait_until(lambda: heard(lambda: pictures), "the watcher's pictures, before any grant")
-            await socket.send('{"do":"take","robot":"scout1"}')
-            await wait_until(lambda: heard(lambda: view["own"]["is_held"]), "held")
-            before, driving = await pose(bus), asyncio.create_task(drive())
 
-            async def moved() -> bool:
-                return differs(before, await pose(bus))
-
-            await wait_until(moved, "the pose changed")
-            socket.transport.abort()  # no goodbye
-            await wait_still(bus)
-            await wait_until(lambda: holds(bus, "watch-scout1"), "the behavior went on")
-        finally:
-            for task in (listening, driving):
-                if task is not None:
-                    task.cancel()
-                    with contextlib.suppress(Exception, asyncio.CancelledError):
-                        await task
+async def test_two_equal_operators_have_the_robot_in_turns(served: Served) -> None:
+    async with program(served, "carla", 70) as carla, program(served, "dora", 70) as dora:
+        for one in (carla, dora):
+            await one.say(do="take", robot="scout1")
+        await carla.wait(lambda: carla.is_held and not dora.is_held, "carla's turn")
+        await dora.wait(lambda: dora.is_held and not carla.is_held, "dora's turn")
+        await carla.wait(lambda: carla.is_held and not dora.is_held, "carla's next turn")
 
 
 async def holds(bus: Bus, behavior: str) -> bool:
@@ -216,8 +259,15 @@ SIZES = {"desktop": (1280, 860), "tablet": (820, 1180), "phone": (390, 844)}
 
 
 @asynccontextmanager
-async def page_at(size: str, port: int, token: str) -> AsyncIterator[Any]:
-    """Open the page in a browser of this size; anything the page complains about fails the test."""
+async def page_at(size: str, port: int, token: str, script: str = "") -> AsyncIterator[Any]:
+    """Open the page in a browser of this size; anything the page complains about fails the test.
+
+    Args:
+        size: Of ``SIZES``.
+        port: Where the page is.
+        token: What opens it.
+        script: Run before the page's own.
+    """
     async_api = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
     if not CHROMIUM:
         pytest.skip("no Chromium on this machine: apt-get install chromium")
@@ -231,6 +281,7 @@ async def page_at(size: str, port: int, token: str) -> AsyncIterator[Any]:
                 viewport={"width": width, "height": height}, has_touch=size != "desktop", is_mobile=size == "phone"
             )
             page = await context.new_page()
+            await page.add_init_script(script)
             page.set_default_timeout(1000 * WITHIN_S)
             complaints: list[str] = []
             page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -307,6 +358,7 @@ async def test_at_a_desk_a_person_watches_drives_by_keys_and_releases(served: Se
         await wait_until(changed, "the picture changed")
         await page.locator("#tab-timeline").click()
         await page.wait_for_selector("svg.timeline")
+        await page.wait_for_selector(".robot[data-robot=scout1] .age:has-text('ms')")
         await keep_picture(page, "desktop")
         await page.keyboard.up("d")
         await wait_still(bus)
@@ -363,13 +415,60 @@ async def test_on_a_phone_that_loses_its_network_the_wheels_stop_and_the_behavio
         await page.wait_for_selector("body[data-held='']")
 
 
+GAMEPAD = """
+window.shoulder = false;
+const buttons = () => [0, 1, 2, 3, 4, 5].map((n) => ({ pressed: n === 5 && window.shoulder }));
+const pad = () => ({ connected: true, axes: [1, 0, 0, 0], buttons: buttons() });
+Object.defineProperty(navigator, "getGamepads", { value: () => [pad()] });
+"""
+
+
+async def test_a_gamepad_drives_only_while_its_shoulder_button_is_held(served: Served) -> None:
+    async with served.mission.bus() as bus, page_at("desktop", served.port, served.token, script=GAMEPAD) as page:
+        await take(page)
+        await page.evaluate("() => { dispatchEvent(new Event('gamepadconnected')); }")
+        before = await pose(bus)
+        await asyncio.sleep(1.0)
+        assert not differs(before, await pose(bus)), "the stick alone does nothing"
+        await page.evaluate("() => { window.shoulder = true; }")
+
+        async def moved() -> bool:
+            return differs(before, await pose(bus))
+
+        await wait_until(moved, "the pose changed")
+        await page.evaluate("() => { window.shoulder = false; }")
+        await wait_still(bus)
+
+
+async def test_an_emergency_stop_holds_against_the_hands_until_it_is_lifted(served: Served) -> None:
+    async with served.mission.bus() as bus, page_at("desktop", served.port, served.token) as page:
+        card = page.locator(".robot[data-robot=scout1]")
+        await take(page)
+        await card.get_by_role("button", name="Stop").click()
+        await page.wait_for_selector(".robot[data-robot=scout1].is-stopped")
+        before = await pose(bus)
+        await page.keyboard.down("d")
+        await asyncio.sleep(1.0)
+        assert not differs(before, await pose(bus))
+        await page.keyboard.up("d")
+        await card.get_by_role("button", name="Let it move").click()
+        await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stopped)")
+        await page.keyboard.down("d")
+
+        async def moved() -> bool:
+            return differs(before, await pose(bus))
+
+        await wait_until(moved, "the pose changed")
+        await page.keyboard.up("d")
+
+
 async def test_a_stranger_is_asked_for_the_token_and_told_that_it_is_wrong(served: Served) -> None:
     async with page_at("desktop", served.port, served.token) as page:
         other = await page.context.new_page()
         await other.goto(f"http://127.0.0.1:{served.port}/#token=wrong")
         await other.wait_for_selector("#login:not([hidden])")
         assert "wrong token" in await other.locator("#login-why").inner_text()
-        await page.wait_for_selector("#alarm-bar:has-text('wrong token')")
+        await page.wait_for_selector("#panel:has-text('wrong token')")
         await other.locator("#login-token").fill(served.token)
         await other.locator("#login button").click()
         await other.wait_for_selector(".robot[data-robot=scout1]")

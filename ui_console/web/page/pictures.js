@@ -112,7 +112,7 @@ export class Cards {
     const now = performance.now();
     for (const card of this.cards.values()) {
       const span = now - card.since;
-      if (span >= 2000) { card.rate = (1000 * card.count) / span; card.count = 0; card.since = now; }
+      if (span >= (card.rate === 0 ? 500 : 2000)) { card.rate = (1000 * card.count) / span; card.count = 0; card.since = now; }
       const old = now - card.drawnAt;
       const isStale = card.drawnAt === 0 || old > STALE_MS;
       card.root.classList.toggle("is-stale", isStale);
