@@ -69,7 +69,8 @@ class ConsoleModel:
         self.asked: Asked | None = None
         self.why: WhyHeard | None = None
         self.applied: CommandApplied | None = None
-        self._sees = sees
+        self.sees = sees
+        """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
         self._pictures: dict[str, deque[PictureSeen]] = {}
         self._blind = ""  # robot that is held without pictures to drive by
 
@@ -221,7 +222,7 @@ class ConsoleModel:
 
     def _stale_line(self, now_s: float) -> str:
         """Return what is wrong with the pictures of the robot that is held; empty if nothing is."""
-        if self.held is None or not self._sees:
+        if self.held is None or not self.sees:
             return ""
         seen = self._pictures.get(self.robot)
         if not seen:

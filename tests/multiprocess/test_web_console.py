@@ -297,6 +297,10 @@ async def page_at(size: str, port: int, token: str, script: str = "") -> AsyncIt
 async def keep_picture(page: Any, name: str) -> None:
     folder = os.environ.get("SCOUT_PICTURES")
     if folder:
+        seen = page.locator("#alarm-bar button")
+        while await seen.is_visible():
+            await seen.click()
+            await page.wait_for_timeout(300)
         await page.screenshot(path=Path(folder) / f"web-{name}.jpg", type="jpeg", quality=60)
 
 

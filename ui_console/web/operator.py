@@ -167,6 +167,7 @@ class Operator:
     def refresh(self, now_s: float) -> None:
         """Have sent what changed of this operator's own part of the view, and of the alarms."""
         model, put = self.model, self.outbox.put_section
+        model.sees = model.robot in self.outbox.watched
         model.look(now_s)
         put("own", view_json(model.own(now_s)))
         put("robots", _encode(model.robots(now_s)))
