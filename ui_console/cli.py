@@ -28,6 +28,7 @@ KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 others; a script needs no picture, so it waits for none to settle and leaves the video frequency to others too."""
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
+ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104  only compared with what the operator said
 WEB_PORT = 8420  # chosen: free on most machines
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
@@ -285,7 +286,7 @@ async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, 
     from ui_console.web.protocol import Doorkeeper
 
     try:
-        from ui_console.web.server import WebServer
+        from ui_console.web.server import CannotListen, WebServer
     except ModuleNotFoundError as missing:
         say(f"{missing.name} is not installed; install scout-backbone[web]")
         return ExitCode.USAGE
@@ -295,23 +296,32 @@ async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, 
     async def join(one_more: Launch) -> Any:
         return await _open_bus(one_more, clock)
 
-    hub = WebHub(launch, await join(launch), clock, join, kind=site.kind, away_after_s=site.away_after_s)
+    bus = await join(launch)
+    hub = WebHub(launch, bus, clock, join, kind=site.kind, away_after_s=site.away_after_s)
     interrupted = _end_on_signals(hub.observer)
 
     def ready(port: int) -> None:
-        shown = f"[{site.host}]" if ":" in site.host else site.host
         for token, granted in passes.items():
             who = f"{granted.user}: " if granted.user else ""
-            _write_line(f"{who}http://{shown}:{port}/#token={token}".encode())
+            _write_line(f"{who}http://{_shown(site.host)}:{port}/#token={token}".encode())
         if site.host not in LOOPBACK:
-            say("whoever can reach this address can read what is sent: use it on networks you trust")
+            say("whoever can listen on the way to this address can read what is sent: use it on networks you trust")
 
     try:
         await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, ready)
-    except OSError as error:
-        say(f"cannot listen at {site.host}:{site.port}: {error.strerror or error}; see --host and --port")
-        return ExitCode.USAGE
+    except CannotListen:
+        await bus.close()
+        raise
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+
+
+def _shown(host: str) -> str:
+    """Return how a browser names an address that is listened at."""
+    import socket
+
+    if host in ANYWHERE:
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host
 
 
 def _user() -> str:

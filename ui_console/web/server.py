@@ -12,6 +12,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
+from backbone.errors import Refusal
 from ui_console.web.hub import WebHub
 from ui_console.web.operator import Operator
 from ui_console.web.protocol import MAX_MESSAGE_BYTES, Doorkeeper, Fault, Offence, Visitor, Welcome
@@ -23,7 +24,8 @@ OPEN_WITHIN_S = 5.0  # chosen: a request is a few lines
 PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
 READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
 CLOSE_WITHIN_S = 1.0  # chosen: who does not say goodbye is cut off
-MOST_VISITORS = 32  # chosen: more browsers than a team has people
+MOST_OPERATORS = 32  # chosen: more browsers than a team has people
+MOST_STRANGERS = 16  # chosen: who has shown no token yet; apart, so that they never take an operator's place
 MOST_UNREAD = 8  # messages read ahead of what is obeyed
 SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
 FATAL_CODES = {
@@ -33,6 +35,13 @@ FATAL_CODES = {
     Fault.CROWD: CloseCode.TRY_AGAIN_LATER,
 }
 KEEPALIVE_REASON = "keepalive ping timeout"
+
+
+class CannotListen(Refusal):
+    """The address cannot be had."""
+
+    code = "web.address"
+    remedy = "Choose another address with --host, or another port with --port."
 
 
 class WebServer:
@@ -45,7 +54,7 @@ class WebServer:
 
     def __init__(self, hub: WebHub, doorkeeper: Doorkeeper) -> None:
         self._hub, self._doorkeeper, self._site = hub, doorkeeper, Site()
-        self._visitors = 0
+        self._strangers = 0
 
     async def run(self, host: str, port: int, ready: Callable[[int], None]) -> None:
         """Serve until the hub's component has ended; all robots are given back then.
@@ -56,7 +65,7 @@ class WebServer:
             ready: Called with the port once browsers can come.
 
         Raises:
-            OSError: The address cannot be had.
+            CannotListen: The address cannot be had.
             BaseException: The bug that ended the component.
         """
         observer = self._hub.observer
@@ -79,21 +88,24 @@ class WebServer:
             telling.result()
 
     async def _listen(self, host: str, port: int) -> Server:
-        return await serve(
-            self._meet,
-            host,
-            port,
-            process_request=self._answer,
-            compression=None,
-            server_header=None,
-            open_timeout=OPEN_WITHIN_S,
-            ping_interval=PING_EVERY_S,
-            ping_timeout=READ_WITHIN_S,
-            close_timeout=CLOSE_WITHIN_S,
-            max_size=MAX_MESSAGE_BYTES,
-            max_queue=MOST_UNREAD,
-            write_limit=SEND_AHEAD_BYTES,
-        )
+        try:
+            return await serve(
+                self._meet,
+                host,
+                port,
+                process_request=self._answer,
+                compression=None,
+                server_header=None,
+                open_timeout=OPEN_WITHIN_S,
+                ping_interval=PING_EVERY_S,
+                ping_timeout=READ_WITHIN_S,
+                close_timeout=CLOSE_WITHIN_S,
+                max_size=MAX_MESSAGE_BYTES,
+                max_queue=MOST_UNREAD,
+                write_limit=SEND_AHEAD_BYTES,
+            )
+        except OSError as error:
+            raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the file asked for; None: it is the page's socket."""
@@ -103,22 +115,22 @@ class WebServer:
             remedy = "Close that page; only this server's own may drive robots."
             self._hub.offended(_who(connection), Offence(Fault.ORIGIN, "shows a page of another site", remedy))
             return connection.respond(403, "A page of another site may not connect.\n")
-        if self._visitors >= MOST_VISITORS:
-            remedy = "Close some pages."
-            self._hub.offended("a browser", Offence(Fault.CROWD, f"found {MOST_VISITORS} others there", remedy))
+        if len(self._hub.operators) >= MOST_OPERATORS or self._strangers >= MOST_STRANGERS:
+            line = f"found {len(self._hub.operators)} operators and {self._strangers} strangers there"
+            self._hub.offended("a browser", Offence(Fault.CROWD, line, "Close some pages."))
             return connection.respond(503, "Too many are connected.\n")
         return None
 
     async def _meet(self, connection: ServerConnection) -> None:
         """Serve one connection to its end."""
-        self._visitors += 1
         visitor = Visitor(self._doorkeeper, _now_s())
+        self._strangers += 1
         try:
             welcome = await self._wait_welcome(connection, visitor)
-            if welcome is not None:
-                await self._serve(connection, visitor, welcome)
         finally:
-            self._visitors -= 1
+            self._strangers -= 1
+        if welcome is not None:
+            await self._serve(connection, visitor, welcome)
 
     async def _wait_welcome(self, connection: ServerConnection, visitor: Visitor) -> Welcome | None:
         try:

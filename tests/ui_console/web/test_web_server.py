@@ -30,7 +30,7 @@ from resource_pool.messages import Drive, Halt
 from ui_console.web import server as web_server
 from ui_console.web.hub import WebHub
 from ui_console.web.protocol import MAX_MESSAGE_BYTES, Doorkeeper, Pass
-from ui_console.web.server import WebServer
+from ui_console.web.server import CannotListen, WebServer
 
 MISSION = "web-test"
 HIGH, LOW, ANYBODY = "high-token", "low-token", "anybody"
@@ -334,7 +334,7 @@ async def test_others_do_not_notice_one_that_floods(stage: Stage) -> None:
         await stage.placer.wait(lambda: any(command == Drive(3.0, 3.0) for _at, command in stage.drives()))
 
 
-async def test_others_do_not_notice_one_that_stops_reading(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_others_do_not_notice_one_that_stops_reading(stage: Stage) -> None:
     """It is found out by the pings it does not answer; its robot is given back."""
     stage.grant_all()
     async with stage.browser() as anna:
@@ -366,13 +366,20 @@ async def test_who_says_nothing_at_all_is_let_go(stage: Stage) -> None:
         await anna.wait(lambda: anna.has_alarm("showed no token within"), "alarm")
 
 
-async def test_only_so_many_are_served(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(web_server, "MOST_VISITORS", 1)
-    async with stage.browser() as anna:
+@pytest.mark.parametrize("limit", ["MOST_OPERATORS", "MOST_STRANGERS"])
+async def test_only_so_many_are_served(stage: Stage, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
+    async with stage.browser() as anna, stage.connection():
+        monkeypatch.setattr(web_server, limit, 1)
         with pytest.raises(InvalidStatus, match="503"):
             async with stage.connection():
                 pytest.fail("was let in")
-        await anna.wait(lambda: anna.has_alarm("found 1 others there"), "alarm")
+        await anna.wait(lambda: anna.has_alarm("found 1 operators and 1 strangers there"), "alarm")
+
+
+async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage) -> None:
+    with pytest.raises(CannotListen, match=str(stage.port)) as refused:
+        await WebServer(stage.hub, Doorkeeper(PASSES)).run("127.0.0.1", stage.port, lambda port: None)
+    assert "--port" in refused.value.remedy
 
 
 async def test_the_page_is_served_with_its_policy_and_nothing_else_is(stage: Stage) -> None:
