@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,24 @@ class Watcher:
         self.ages_s: list[float] = []
         self.received_bytes = 0
         self.drawn_s: dict[str, float] = {}
+        self._own: dict[str, Any] = {}
+        self._own_changed = asyncio.Event()
+
+    async def take_over(self) -> float:
+        """Take scout1 from its behavior and give it back; return the ms from the wish until the client knows it."""
+        asked_s = time.perf_counter()
+        await self._socket.send('{"do":"take","robot":"scout1"}')
+        await self._wait_own(lambda own: own["is_held"])
+        took_s = time.perf_counter() - asked_s
+        await self._socket.send('{"do":"release"}')
+        await self._wait_own(lambda own: not own["is_asked"])
+        return round(1000 * took_s, 1)
+
+    async def _wait_own(self, is_so: Callable[[dict[str, Any]], bool]) -> None:
+        async with asyncio.timeout(10.0):
+            while not is_so(self._own):
+                self._own_changed.clear()
+                await self._own_changed.wait()
 
     async def listen(self) -> None:
         """Say of each picture that it is drawn; until cancelled."""
@@ -73,6 +92,8 @@ class Watcher:
             if isinstance(message, str):
                 view = json.loads(message).get("view", {})
                 self.drawn_s = view.get("drawn", self.drawn_s)
+                self._own = view.get("own", self._own)
+                self._own_changed.set()
                 continue
             robot = message[1 : 1 + message[0]].decode()
             number, captured_s = struct.unpack_from(">Id", message, 1 + message[0])
@@ -109,6 +130,7 @@ async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -
             "sent_kb_s": round(watcher.received_bytes / took_s / 1000, 1),
             "memory_mb": round(server.memory_info().rss / 1e6, 1),
         }
+        measured["take_over_ms"] = [await watcher.take_over() for _ in range(4)]
         listening.cancel()
         await asyncio.wait({listening})
         return measured

@@ -111,7 +111,7 @@ class Operator:
             case Drawn(robot, number):
                 self._drawn(robot, number)
             case Watch(robots):
-                self.outbox.watch(frozenset(robots) & frozenset(self._hands.team.robot_names()))
+                self.outbox.watch(frozenset(robots))  # also those not heard of yet: a page may be older than the server
                 self._hands.watching_changed()
             case Acknowledge(key):
                 self._acknowledge(key)

@@ -258,7 +258,7 @@ async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: S
             await anna.wait(lambda: len(anna.view.get("robots", [])) == 3, "robots")
             await anna.say(do="watch", robots=[*robots, "scout9"])
             await ben.say(do="watch", robots=["scout2"])
-            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.operators) == 4)
+            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.operators) == 5)
             for number in range(40):
                 for arc in arcs.values():
                     arc.publish(bytes([number]) * (WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, number)
