@@ -421,3 +421,28 @@ async def test_the_recording_says_who_came_and_who_left(stage: Stage) -> None:
     await stage.placer.wait(lambda: any("Carla left" in row.what for row in stage.hub.team.log()))
     told = [row.what for row in stage.hub.team.log() if row.subject == "web"]
     assert told == ["Carla came, with priority 10", "Carla left: the browser has gone away"]
+
+
+async def test_when_the_page_is_no_longer_in_front_the_wheels_stop_and_alarms_are_kept_for_later(stage: Stage) -> None:
+    stage.grant_all()
+    async with stage.browser() as anna:
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+        await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=4.0)
+        await stage.placer.wait(stage.drives)
+        await anna.say(do="here", is_there=False)
+        await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))
+        await anna.wait(lambda: anna.view["own"]["away_since_s"] >= 0, "away")
+        async with stage.browser(LOW) as ben:
+            await ben.wait(lambda: ben.view["own"]["away_since_s"] < 0, "somebody is there again")
+
+
+async def test_parameters_of_a_component_are_told_and_changed(stage: Stage) -> None:
+    async with stage.browser() as anna:
+        await anna.say(do="parameters", name="nobody")
+        await anna.wait(lambda: anna.answers, "answer")
+        assert anna.answers.pop() == {"parameters": "nobody", "told": False}
+        await anna.say(do="set", name="nobody", parameter="threshold", value=[1, 2])
+        await anna.wait(lambda: anna.answers, "answer")
+        assert anna.answers.pop() == {"set": "nobody", "parameter": "threshold", "done": False}
+        await anna.wait(lambda: anna.has_alarm("nobody"), "why not")
