@@ -22,14 +22,15 @@ Discipline = Literal["turns", "time"]
 ROUNDING_S = 1e-6  # chosen: who is ahead of the average by no more than this is not ahead
 
 
-def eligible(had_s: float, rivals_s: Iterable[float]) -> bool:
+def eligible(had_s: float, rivals_s: Iterable[float], tolerance_s: float = 0.0) -> bool:
     """Say whether an ARC that had this much time may ask for more before its rivals.
 
     Args:
         had_s: Time it had.
         rivals_s: Times its rivals had.
+        tolerance_s: By so much no timer is exact: who is ahead of the average by no more is not ahead.
     """
-    return had_s <= fmean([had_s, *rivals_s]) + ROUNDING_S
+    return had_s <= fmean([had_s, *rivals_s]) + max(ROUNDING_S, tolerance_s)
 
 
 def joining_s(had_s: float, rivals_s: Iterable[float]) -> float:

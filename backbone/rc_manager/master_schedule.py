@@ -56,8 +56,13 @@ class MasterSchedule(Table):
             admission: See ``Table``.
             exact_up_to: See ``Table``.
         """
-        super().__init__(strict=strict, discipline=discipline, admission=admission, exact_up_to=exact_up_to)
-        self._slack_s = tolerance_s
+        super().__init__(
+            tolerance_s=tolerance_s,
+            strict=strict,
+            discipline=discipline,
+            admission=admission,
+            exact_up_to=exact_up_to,
+        )
         self._line = FirstInLine(self, slack_s=tolerance_s)
         self._plans: dict[Group[ArcEntry], _Plans] = {}
 
@@ -132,7 +137,7 @@ class MasterSchedule(Table):
         if self.discipline == "turns":
             return self._due_of(queued, possible, plans, now_s)
         while queued:
-            by_time = _Plans(self, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
+            by_time = _Plans(self, queued, group.arcs, now_s, slack_s=self._tolerance_s, among_equals=False)
             turn = self._due_of(queued, possible, by_time, now_s)
             if turn is None or self._in_turn(turn, group, now_s):
                 return turn
@@ -143,7 +148,7 @@ class MasterSchedule(Table):
         plans = self._plans.get(group)
         if plans is None:
             order = self.in_order([arc for arc in group.arcs if arc.queued])
-            plans = self._plans[group] = _Plans(self, order, group.arcs, now_s, slack_s=self._slack_s)
+            plans = self._plans[group] = _Plans(self, order, group.arcs, now_s, slack_s=self._tolerance_s)
         return plans
 
     def _due_of(
@@ -206,7 +211,7 @@ class MasterSchedule(Table):
                 None: by the tolerance of this run.
         """
         order = self.in_order([arc for arc in group if arc.queued])
-        slack_s = self._slack_s if slack_s is None else slack_s
+        slack_s = self._tolerance_s if slack_s is None else slack_s
         return Plan(self, order, group, now_s, slack_s=slack_s, handed_over=handed_over).slots()
 
     def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:

@@ -41,10 +41,13 @@ class Table:
         admission: How it is decided what a sharable RC can serve.
     """
 
-    def __init__(self, *, strict: bool, discipline: Discipline, admission: Analysis, exact_up_to: int) -> None:
+    def __init__(
+        self, *, tolerance_s: float, strict: bool, discipline: Discipline, admission: Analysis, exact_up_to: int
+    ) -> None:
         """Begin empty.
 
         Args:
+            tolerance_s: Reaction and timer tolerance of this run.
             strict: No ARC starts while a higher usable one of its group waits.
             discipline: Which of several equals comes first.
             admission: How it is decided what a sharable RC can serve.
@@ -55,6 +58,7 @@ class Table:
         self.strict = strict
         self.discipline: Discipline = discipline
         self.admission: Analysis = admission
+        self._tolerance_s = tolerance_s
         self._exact_up_to = exact_up_to
         self._groups: Groups[ArcEntry] = Groups(exact_up_to)
         self._bits: dict[str, int] = {}
@@ -293,7 +297,9 @@ class Table:
         if self.discipline == "turns":
             return (False, 0.0, *arc.stamp)
         had_s = self._had_s(arc)
-        late = not eligible(had_s, map(self._had_s, self._rivals(arc)))
+        late = not eligible(had_s, map(self._had_s, self._rivals(arc)), self._tolerance_s)
+        if arc.state is RequestState.RUNNING:  # who had as much time, but for what timers miss, comes before who runs
+            return (late, deadline_s(had_s, arc.minimum_s) + self._tolerance_s, self._now_s, 0)
         return (late, deadline_s(had_s, arc.minimum_s), *arc.stamp)
 
     def _had_s(self, arc: ArcEntry) -> float:

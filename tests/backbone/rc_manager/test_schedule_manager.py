@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from random import Random
+
 import pytest
 from simulated_switches import REPAIR_S, Bench, ask, load, manager, sharable, unit
 
@@ -491,6 +493,18 @@ def test_under_the_discipline_time_equals_get_equal_time_whatever_they_ask_for()
     assert sum(runs["short"]) == pytest.approx(sum(runs["long"]), abs=8.0)
     assert set(runs["long"]) == {6.0}
     assert all(run_s % 2.0 == 0 for run_s in runs["short"])
+
+
+@pytest.mark.parametrize("jitter_s", [0.0, 0.01])
+def test_under_the_discipline_time_equals_that_ask_for_the_same_take_turns(jitter_s):
+    """Also where no two slices are equally long to the millisecond (rule 13: with equal run times, round robin)."""
+    dice = Random(1)
+    bench = Bench(manager(discipline="time", tolerance_s=0.05), unit("v"), delay_s=lambda: dice.uniform(0.0, jitter_s))
+    bench.tell(ask("left", "v", run_s=2.5))
+    bench.tell(ask("right", "v", run_s=2.5))
+    bench.run(120.0)
+    for arc in ("left", "right"):
+        assert max(end_s - start_s for start_s, end_s in bench.runs(arc) if end_s) < 2.6
 
 
 def test_with_aging_a_lower_one_that_waited_long_gets_one_whole_slice():
