@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from backbone.bus.interface import Clock
     from backbone.component.launch import Launch
     from ui_console.console_events import ConsoleEvent
+    from ui_console.design.draft import Draft
     from ui_console.observer import Observer
     from ui_console.web.protocol import Pass
 
@@ -156,6 +157,24 @@ def serve(
         say(f"--operator {wrong}")
         raise typer.Exit(ExitCode.USAGE) from wrong
     run(lambda: _serve(mission, connect, passes, _Site(host, port, kind, away_after)))
+
+
+@app.command()
+def design(
+    file: Annotated[str, typer.Argument(help="Mission file to change, or to begin if there is none.")] = "mission.xml",
+    new: Annotated[bool, typer.Option("--new", help="Begin from nothing, whatever the file holds.")] = False,
+) -> None:
+    """Build or change a mission file by keys, checked while you build it; nothing needs to be up."""
+    from backbone.mission.reader import MissionInvalid
+    from ui_console.design.draft import Draft
+
+    _need_a_terminal("design", "an editor and scout-backbone check")
+    try:
+        draft = Draft.opened(file) if Path(file).exists() and not new else Draft.new(file)
+    except MissionInvalid as invalid:
+        say(str(invalid))
+        raise typer.Exit(ExitCode.MISSION_INVALID) from invalid
+    run(lambda: _design(draft))
 
 
 def main() -> None:
@@ -322,6 +341,14 @@ def _shown(host: str) -> str:
     if host in ANYWHERE:
         return socket.gethostname()
     return f"[{host}]" if ":" in host else host
+
+
+async def _design(draft: Draft) -> int:
+    from ui_console.design.look_up import look_up
+    from ui_console.design.screen import DesignApp
+
+    await DesignApp(draft, look_up).run_async()
+    return ExitCode.DONE
 
 
 def _user() -> str:

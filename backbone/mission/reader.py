@@ -17,7 +17,7 @@ from backbone.mission.schema import apply_schema, schema_text, vocabulary
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, Tables, parameters, section
 from backbone.naming import Subsystem
 
-__all__ = ["Fault", "MissionInvalid", "read_mission", "schema_text"]
+__all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes", "schema_text"]
 
 
 def read_mission(path: str | Path) -> MissionDescription:
@@ -31,13 +31,29 @@ def read_mission(path: str | Path) -> MissionDescription:
     """
     report = Report(str(path))
     data = read_bytes(Path(path), report)
-    root = None if data is None else parse(data, report)
+    if data is None:
+        raise MissionInvalid(report.faults())
+    return read_mission_bytes(data, str(path))
+
+
+def read_mission_bytes(data: bytes, source: str) -> MissionDescription:
+    """Return the mission these bytes describe, as ``read_mission`` does of a file that holds them.
+
+    Args:
+        data: What the file holds or would hold.
+        source: Its path; faults name it, and files that the mission names are looked for beside it.
+
+    Raises:
+        MissionInvalid: With every fault, in the order of the file.
+    """
+    report = Report(source)
+    root = parse(data, report)
     if root is not None and apply_schema(root, report):
         check(root, report)
     faults = report.faults()
     if faults or root is None:
         raise MissionInvalid(faults)
-    return _describe(root, str(path))
+    return _describe(root, source)
 
 
 def _describe(root: Element, source: str) -> MissionDescription:

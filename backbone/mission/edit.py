@@ -1,0 +1,478 @@
+"""Changes of a mission file's text, made where they are meant and nowhere else.
+
+Pure: bytes in, bytes out. Comments, order and layout of what is not changed stay as they are; what is added looks
+as a person would have written it: one element a line, indented like its neighbors, attributes in the schema's order.
+
+Rules of this file:
+
+* What stands where is expat's to say, as for the reader: a node is numbered by the elements it found.
+* A change is made in text, then read again; one after which the text could not be read is refused.
+* Only what can be written down is refused here. Whether names and values fit is the reader's to say.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from backbone.errors import Refusal
+from backbone.mission.document import MAX_BYTES, parse
+from backbone.mission.report import MissionInvalid, Report, told, told_names
+from backbone.mission.schema import vocabulary
+
+Path = tuple[int, ...]
+"""Where an element stands: its number among its parent's children, from 0, from the root down; the root's is empty."""
+
+LINE_LENGTH = 120  # chosen: as mission.xml; longer tags get a second line of attributes
+STEP = "  "  # the indentation of what has no neighbor to copy it from
+
+_ORDER = {
+    "behavior": ("parameter", "arc", "behavior"),
+    "world": ("parameter", "room", "air", "furniture", "ramp", "landmark", "dark", "scout", "target"),
+}
+"""What a person writes first, where the schema allows any order and does not say it."""
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
+_ATTRIBUTE = re.compile(rb"""(\s+)([^\s=<>"'/]+)\s*=\s*("[^"]*"|'[^']*')""")
+_WHOLE = re.compile(rb"""<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<(?:[^>"']|"[^"]*"|'[^']*')*>""", re.DOTALL)
+_QUOTED = re.compile(rb"""("[^"]*"|'[^']*')""")
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_LINE_END_COMMENT = re.compile(rb"[ \t]*<!--(?:(?!-->)[^\n])*-->(?=[ \t]*(?:\r?\n|$))")
+
+
+class EditRefused(Refusal):
+    """A change of a mission file that cannot be made; the text is as it was."""
+
+    code = "mission.edit"
+    remedy = "Look at the tree: what may stand where is told in docs/reference/mission-file.md."
+
+
+@dataclass(frozen=True, slots=True)
+class NewElement:
+    """An element to be added.
+
+    Attributes:
+        tag: Its tag.
+        attributes: Its attributes; they are written in the order of the schema.
+        children: Elements in it, in this order.
+    """
+
+    tag: str
+    attributes: Mapping[str, str] = field(default_factory=dict)
+    children: Sequence[NewElement] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """An element of the text, as it is written: nothing is filled in.
+
+    Attributes:
+        path: Where it stands.
+        tag: Its tag.
+        attributes: Its attributes in the order of the text.
+        children: Elements in it.
+        line: Line of its tag, from 1.
+        begin: First byte of its tag.
+        content: First byte behind its tag.
+        close: First byte of its end tag; the same as ``content`` if it has none.
+        end: First byte behind it.
+        is_empty: Whether it is written ``<tag/>``.
+    """
+
+    path: Path
+    tag: str
+    attributes: dict[str, str]
+    children: tuple[Node, ...]
+    line: int
+    begin: int
+    content: int
+    close: int
+    end: int
+    is_empty: bool
+
+    def __iter__(self) -> Iterator[Node]:
+        """Yield this element and all below it, in the order of the text."""
+        yield self
+        for child in self.children:
+            yield from child
+
+    def at(self, path: Path) -> Node:
+        """Return the element at a path.
+
+        Raises:
+            EditRefused: There is none.
+        """
+        node = self
+        for number in path:
+            if not 0 <= number < len(node.children):
+                raise EditRefused(f"no element stands at {'/'.join(map(str, path))}", remedy="Pick another.")
+            node = node.children[number]
+        return node
+
+    def all(self, tag: str) -> list[Node]:
+        """Return the children of this tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Node | None:
+        """Return the first child of this tag, if there is one."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+    def text(self, attribute: str) -> str:
+        """Return the value as it is written, empty if there is none."""
+        return self.attributes.get(attribute, "")
+
+
+def outline(data: bytes) -> Node:
+    """Return the root of a mission file's text.
+
+    Raises:
+        MissionInvalid: It is no well-formed XML, or is hostile; with the reader's faults.
+    """
+    report = Report("mission")
+    if parse(data, report) is None:
+        raise MissionInvalid(report.faults())
+    return _Outline(data).root()
+
+
+# ---------------------------------------------------------------------- changes
+def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> bytes:
+    """Return the text with another value; its quotes stay, and a new attribute stands where the schema has it.
+
+    Args:
+        data: The text.
+        path: The element.
+        name: The attribute.
+        value: What it shall be; None: left out.
+
+    Raises:
+        EditRefused: There is no such element, it can have no such attribute, or the value cannot be written in XML.
+    """
+    node = outline(data).at(path)
+    _may_have(node.tag, name)
+    spans = _attributes(data, node)
+    if value is None:
+        if name not in spans:
+            return data
+        begin, _value, end = spans[name]
+        return _readable(data[:begin] + data[end:])
+    if name in spans:
+        _begin, begin, end = spans[name]
+        quote = data[begin : begin + 1].decode()
+        return _readable(data[:begin] + _quoted(value, quote) + data[end:])
+    order = list(vocabulary()[node.tag].attributes)
+    before = [end for other, (_b, _v, end) in spans.items() if other in order[: order.index(name)]]
+    head = node.begin + 1 + len(node.tag.encode())
+    at = max(before, default=head)
+    text = f"{name}=".encode() + _quoted(value)
+    blank = b" "
+    line_begin, line_end = data.rfind(b"\n", 0, at) + 1, data.find(b"\n", at)
+    if spans and len(data[line_begin:line_end].rstrip().decode()) + 1 + len(text.decode()) > LINE_LENGTH:
+        blank = _newline(data) + _indent(data, node.begin).encode() + b" " * (len(node.tag) + 2)
+    return _readable(data[:at] + blank + text + data[at:])
+
+
+def add(data: bytes, parent: Path, new: NewElement, at: int | None = None) -> bytes:
+    """Return the text with one more element, on lines of its own if its neighbors stand on such.
+
+    Args:
+        data: The text.
+        parent: Where it goes in.
+        new: The element.
+        at: Its number among its siblings afterwards; None: the last of its tag, where the schema's order has it.
+
+    Raises:
+        EditRefused: It cannot stand there.
+    """
+    root = outline(data)
+    node = root.at(parent)
+    _may_hold(node, new.tag)
+    _may_be(new)
+    number = place_for(node, new.tag, at)
+    indent = _indent_of_children(data, node)
+    lines = _written(new, indent)
+    return _insert(data, node, number, lines, apart=parent == () and _stands_apart(data, node))
+
+
+def place_for(parent: Node, tag: str, at: int | None = None) -> int:
+    """Return the number a new child would have among its siblings.
+
+    Args:
+        parent: Where it goes in; may hold such a child.
+        tag: Its tag.
+        at: The number wished for; None: behind the last of its tag, else behind what a person would write before it.
+    """
+    if at is not None:
+        return min(max(at, 0), len(parent.children))
+    order = list(_ORDER.get(parent.tag, vocabulary()[parent.tag].children))
+    same = [number for number, child in enumerate(parent.children) if child.tag == tag]
+    if same:
+        return same[-1] + 1
+    earlier = set(order[: order.index(tag)])
+    before = [number for number, child in enumerate(parent.children) if child.tag in earlier]
+    return before[-1] + 1 if before else 0
+
+
+def remove(data: bytes, path: Path) -> bytes:
+    """Return the text without an element, all in it, and the lines it alone stood on.
+
+    Raises:
+        EditRefused: There is no such element, or it is the root.
+    """
+    if not path:
+        raise EditRefused("the mission itself cannot be removed", remedy="Begin another file.")
+    root = outline(data)
+    return _readable(_cut(data, root.at(path), root.at(path[:-1])))
+
+
+def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
+    """Return the text with an element elsewhere, with all that stands in it, comments too.
+
+    Args:
+        data: The text.
+        path: The element.
+        parent: Where it goes in, as paths are before the change.
+        at: Its number among its siblings afterwards.
+
+    Raises:
+        EditRefused: It cannot stand there.
+    """
+    root = outline(data)
+    node, target = root.at(path), root.at(parent)
+    if not path or parent[: len(path)] == path:
+        raise EditRefused(f"<{node.tag}> cannot be moved into itself", remedy="Pick another place.")
+    if parent != path[:-1]:
+        _may_hold(target, node.tag)
+    depth = len(path) - 1
+    cut = _cut(data, node, root.at(path[:-1]))
+    if len(parent) > depth and parent[:depth] == path[:-1] and parent[depth] > path[-1]:
+        parent = (*parent[:depth], parent[depth] - 1, *parent[depth + 1 :])
+    after = outline(cut).at(parent)
+    old_indent, new_indent = _indent(data, node.begin), _indent_of_children(cut, after)
+    text = _indented(data[node.begin : node.end], old_indent, new_indent)
+    return _insert(cut, after, min(max(at, 0), len(after.children)), text)
+
+
+# ---------------------------------------------------------------------- what may be written
+def _may_have(tag: str, name: str) -> None:
+    rule = vocabulary().get(tag)
+    if rule is None or name not in rule.attributes:
+        known = told_names(rule.attributes) if rule is not None else ""
+        raise EditRefused(
+            f"<{tag}> has no attribute {told(name)}", remedy=f"Its attributes: {known}" if known else "It has none."
+        )
+
+
+def _may_hold(node: Node, tag: str) -> None:
+    rule = vocabulary().get(node.tag)
+    allowed = {} if rule is None else rule.children
+    if tag not in allowed:
+        there = told_names([f"<{one}>" for one in allowed])
+        raise EditRefused(
+            f"<{tag}> does not belong in <{node.tag}>",
+            remedy=f"In <{node.tag}> may stand: {there}" if there else f"<{node.tag}> has no elements inside.",
+        )
+    if len(node.all(tag)) >= allowed[tag][1]:
+        raise EditRefused(f"<{node.tag}> has its <{tag}> already", remedy="Change that one, or remove it first.")
+
+
+def _may_be(new: NewElement) -> None:
+    for name in new.attributes:
+        _may_have(new.tag, name)
+    allowed = vocabulary()[new.tag].children
+    for child in new.children:
+        if child.tag not in allowed:
+            raise EditRefused(f"<{child.tag}> does not belong in <{new.tag}>")
+        _may_be(child)
+
+
+def _quoted(value: str, quote: str = '"') -> bytes:
+    if strange := _NOT_XML.search(value):
+        raise EditRefused(f"the character {strange[0]!r} cannot stand in XML", remedy="Leave it out.")
+    escaped = value.replace("&", "&amp;").replace("<", "&lt;").replace("\r", "&#13;")
+    escaped = escaped.replace("\n", "&#10;").replace("\t", "&#9;")
+    escaped = escaped.replace('"', "&quot;") if quote == '"' else escaped.replace("'", "&apos;")
+    return f"{quote}{escaped}{quote}".encode()
+
+
+def _readable(data: bytes) -> bytes:
+    """Return the text if the reader can still read it."""
+    if len(data) > MAX_BYTES:
+        raise EditRefused(f"the file would be larger than {MAX_BYTES} bytes", remedy="Split the mission.")
+    report = Report("mission")
+    if parse(data, report) is None:
+        fault = report.faults()[0]
+        raise EditRefused(f"the file could not be read any more: {fault.message}", remedy=fault.remedy)
+    return data
+
+
+# ---------------------------------------------------------------------- layout
+def _written(new: NewElement, indent: str) -> bytes:
+    """Return the element as lines without the first indentation and without the last line's end."""
+    order = {name: number for number, name in enumerate(vocabulary()[new.tag].attributes)}
+    values = [
+        f"{name}={_quoted(value).decode()}"
+        for name, value in sorted(new.attributes.items(), key=lambda item: order[item[0]])
+    ]
+    head = f"<{new.tag}"
+    close = ">" if new.children else "/>"
+    lines, length = [head], len(indent) + len(head)
+    for value in values:
+        if length + 1 + len(value) + len(close) > LINE_LENGTH and lines[-1] != head:
+            lines.append(indent + " " * len(head) + " " + value)
+            length = len(lines[-1])
+        else:
+            lines[-1] += f" {value}"
+            length += 1 + len(value)
+    lines[-1] += close
+    lines += [indent + STEP + _written(child, indent + STEP).decode() for child in new.children]
+    if new.children:
+        lines.append(f"{indent}</{new.tag}>")
+    return "\n".join(lines).encode()
+
+
+def _insert(data: bytes, parent: Node, number: int, text: bytes, *, apart: bool = False) -> bytes:
+    """Return the data with a text in the parent, before its child of this number."""
+    newline = _newline(data)
+    text = re.sub(rb"\r?\n", newline, text)
+    own_indent, indent = _indent(data, parent.begin).encode(), _indent_of_children(data, parent).encode()
+    if not parent.children and not data[parent.content : parent.close].strip():
+        inside = newline + indent + text + newline + own_indent
+        if parent.is_empty:
+            head = data[parent.begin : parent.content - 2].rstrip()
+            tail = data[parent.end :]
+            return _readable(data[: parent.begin] + head + b">" + inside + f"</{parent.tag}>".encode() + tail)
+        return _readable(data[: parent.content] + inside + data[parent.close :])
+    gap = newline * 2 if apart else newline
+    if number > 0 or not parent.children:
+        before = parent.children[number - 1] if parent.children else None
+        at = _behind(data, before) if before is not None else len(data[: parent.close].rstrip())
+        return _readable(data[:at] + gap + indent + text + data[at:])
+    first = parent.children[0]
+    if _is_first_in_line(data, first.begin):
+        start = data.rfind(b"\n", 0, first.begin) + 1
+        return _readable(data[:start] + indent + text + gap + data[start:])
+    return _readable(data[: first.begin] + text + data[first.begin :])
+
+
+def _behind(data: bytes, node: Node) -> int:
+    """Return where the element ends, with a comment that ends its line."""
+    comment = _LINE_END_COMMENT.match(data, node.end)
+    return comment.end() if comment else node.end
+
+
+def _cut(data: bytes, node: Node, parent: Node) -> bytes:
+    begin, end = node.begin, node.end
+    rest = re.compile(rb"[ \t]*(\r?\n)").match(data, end)
+    if _is_first_in_line(data, begin) and rest:
+        begin, end = data.rfind(b"\n", 0, begin) + 1, rest.end()
+        blank = re.compile(rb"[ \t]*\r?\n").match(data, end)
+        if blank and re.search(rb"(?:^|\n)[ \t]*\r?\n\Z", data[:begin]):
+            end = blank.end()
+    left, right = data[:begin], data[end:]
+    inside = data[parent.content : begin] + data[end : parent.close]
+    if inside.strip():
+        return left + right
+    head = data[parent.begin : parent.content - 1].rstrip()
+    return data[: parent.begin] + head + b"/>" + data[parent.end :]
+
+
+def _newline(data: bytes) -> bytes:
+    return b"\r\n" if b"\r\n" in data else b"\n"
+
+
+def _is_first_in_line(data: bytes, at: int) -> bool:
+    return not data[data.rfind(b"\n", 0, at) + 1 : at].strip()
+
+
+def _indent(data: bytes, at: int) -> str:
+    line = data[data.rfind(b"\n", 0, at) + 1 : at]
+    return line[: len(line) - len(line.lstrip())].decode()
+
+
+def _indent_of_children(data: bytes, node: Node) -> str:
+    for child in node.children:
+        if _is_first_in_line(data, child.begin):
+            return _indent(data, child.begin)
+    return _indent(data, node.begin) + STEP
+
+
+def _indented(text: bytes, old: str, new: str) -> bytes:
+    """Return an element with another indentation; line breaks inside values stay as they are."""
+    if old == new:
+        return text
+    parts: list[bytes] = []
+    at = 0
+    for whole in _WHOLE.finditer(text):
+        parts.append(_shifted(text[at : whole.start()], old, new))
+        if whole[0].startswith((b"<![CDATA[", b"<?")):
+            parts.append(whole[0])
+        elif whole[0].startswith(b"<!--"):
+            parts.append(_shifted(whole[0], old, new))
+        else:
+            pieces = _QUOTED.split(whole[0])
+            parts += [piece if number % 2 else _shifted(piece, old, new) for number, piece in enumerate(pieces)]
+        at = whole.end()
+    parts.append(_shifted(text[at:], old, new))
+    return b"".join(parts)
+
+
+def _shifted(text: bytes, old: str, new: str) -> bytes:
+    return text.replace(b"\n" + old.encode(), b"\n" + new.encode())
+
+
+def _stands_apart(data: bytes, node: Node) -> bool:
+    """Say whether there is an empty line between the children."""
+    return bool(re.search(rb"\n[ \t]*\r?\n", data[node.content : node.close]))
+
+
+def _attributes(data: bytes, node: Node) -> dict[str, tuple[int, int, int]]:
+    """Return for each attribute where the blanks before it, its quotes and what follows it begin."""
+    begin = node.begin + 1 + len(node.tag.encode())
+    return {
+        match[2].decode(): (match.start(1), match.start(3), match.end())
+        for match in _ATTRIBUTE.finditer(data, begin, node.content)
+    }
+
+
+class _Outline:
+    """One run of expat over a text that is known to be well-formed and harmless."""
+
+    def __init__(self, data: bytes) -> None:
+        self._offset = len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
+        self._data = data
+        self._open: list[tuple[str, dict[str, str], int, int, int]] = []
+        self._children: list[list[Node]] = [[]]
+        self._parser = expat.ParserCreate("utf-8")
+        self._parser.StartElementHandler = self._start
+        self._parser.EndElementHandler = self._end
+
+    def root(self) -> Node:
+        self._parser.Parse(self._data[self._offset :], True)
+        return self._children[0][0]
+
+    def _start(self, tag: str, values: dict[str, str]) -> None:
+        begin = self._offset + self._parser.CurrentByteIndex
+        matched = _TAG.match(self._data, begin)
+        if matched is None:
+            raise AssertionError(f"expat found a tag at byte {begin}, where none begins")
+        self._open.append((tag, values, begin, matched.end(), self._parser.CurrentLineNumber))
+        self._children.append([])
+
+    def _end(self, tag: str) -> None:
+        _tag, values, begin, content, line = self._open.pop()
+        children = self._children.pop()
+        is_empty = self._data[content - 2 : content] == b"/>"
+        close = content if is_empty else self._offset + self._parser.CurrentByteIndex
+        end = content if is_empty else self._data.index(b">", close) + 1
+        number = len(self._children[-1])
+        path = ((*_numbers(self._children), number))[1:]
+        node = Node(path, tag, values, tuple(children), line, begin, content, close, end, is_empty)
+        self._children[-1].append(node)
+
+
+def _numbers(levels: list[list[Node]]) -> list[int]:
+    """Return the number each open element will have among its siblings."""
+    return [len(level) for level in levels[:-1]]

@@ -1,0 +1,1 @@
+"""Mission design: a mission file built step by step, checked while it is built."""

@@ -1,0 +1,199 @@
+"""What a mission can be made of: component types, what they are for, their parameters.
+
+Types come from the project's own list and from the designed file. What their classes say of themselves, their
+documentation and parameters, is asked of another process (``look_up``), for to import a behavior imports OpenCV.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from importlib import resources
+
+import msgspec
+
+from backbone.mission.edit import Node, outline
+from backbone.naming import Subsystem
+
+
+class Role(StrEnum):
+    """What a type is for."""
+
+    BEHAVIOR = "behavior"
+    ARC = "ARC"
+    RESOURCE = "resource"
+    WORLD = "world"
+    SERVICE = "service"
+    CONSOLE = "console"
+
+
+class ParameterFacts(msgspec.Struct, frozen=True):
+    """A parameter of a class.
+
+    Attributes:
+        name: Its name.
+        type: What it takes: number, integer, string, boolean, or JSON's word for it.
+        default: As JSON; empty: it must be given.
+        span: Its legal range, as ``above 0, at most 1``; empty: any.
+        doc: What it means.
+    """
+
+    name: str
+    type: str
+    default: str
+    span: str
+    doc: str
+
+    @property
+    def told(self) -> str:
+        """Type, default and range on one line."""
+        given = f"default {self.default}" if self.default else "required"
+        return ", ".join(part for part in (self.type, self.span, given) if part)
+
+
+class ClassFacts(msgspec.Struct, frozen=True):
+    """What a class says of itself.
+
+    Attributes:
+        doc: Its documentation.
+        parameters: What it can be given in a mission file.
+        failure: Why nothing can be said; empty: all is said.
+    """
+
+    doc: str = ""
+    parameters: tuple[ParameterFacts, ...] = ()
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TypeEntry:
+    """A component type.
+
+    Attributes:
+        name: Its name in mission files.
+        class_path: The class that runs it.
+        role: What it is for.
+        needs: Types of resource an ARC needs.
+        uses: Types of resource a resource must be tied to.
+        is_stock: Whether the project brings it along.
+        is_declared: Whether the designed file has it.
+    """
+
+    name: str
+    class_path: str
+    role: Role
+    needs: tuple[str, ...]
+    uses: tuple[str, ...]
+    is_stock: bool
+    is_declared: bool
+
+
+def stock() -> Node:
+    """Return the project's own list, as a mission without services and behaviors."""
+    return outline(_stock_text())
+
+
+def new_text() -> bytes:
+    """Return the text a new mission begins with: one host, the core services and their types."""
+    return resources.files("ui_console.design").joinpath("new.xml").read_bytes()
+
+
+def stock_type(name: str) -> Node | None:
+    """Return the type of this name from the project's own list."""
+    return _by_name("types").get(name)
+
+
+def stock_resource(kind: str) -> Node | None:
+    """Return the first shape of a resource of this type."""
+    return next((one for one in _by_name("resources").values() if one.text("type") == kind), None)
+
+
+def entries(mission: Node) -> list[TypeEntry]:
+    """Return every type that is at hand: the file's own in its order, then those it could take from the project.
+
+    Args:
+        mission: The designed file.
+    """
+    section = mission.first("types")
+    declared = [] if section is None else section.all("type")
+    names = {one.text("name") for one in declared}
+    world = mission.first("world")
+    world_type = (world.text("type") if world is not None else "") or "simulated_world"
+    known = _by_name("types")
+    own = [_entry(one, world_type, is_stock=one.text("name") in known, is_declared=True) for one in declared]
+    rest = [
+        _entry(one, world_type, is_stock=True, is_declared=False) for name, one in known.items() if name not in names
+    ]
+    return own + rest
+
+
+def stock_classes() -> list[str]:
+    """Return the class paths of the project's own types."""
+    return [one.text("class") for one in _by_name("types").values()]
+
+
+def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
+    """Return all that is known of a type, as lines to read.
+
+    Args:
+        entry: The type.
+        facts: Class path → what the class says.
+    """
+    lines = [f"{entry.name}: {entry.role}, {entry.class_path}"]
+    if entry.needs:
+        lines.append(f"holds one each of: {', '.join(entry.needs)}")
+    if entry.uses:
+        lines.append(f"tied to: {', '.join(entry.uses)}")
+    known = facts.get(entry.class_path)
+    if known is None:
+        return [*lines, "", "not looked up"]
+    if known.failure:
+        return [*lines, "", known.failure]
+    lines += ["", *known.doc.splitlines(), ""]
+    if not known.parameters:
+        return [*lines, "no parameters"]
+    for one in known.parameters:
+        lines.append(f"{one.name}: {one.told}")
+        if one.doc:
+            lines.append(f"    {one.doc}")
+    return lines
+
+
+@lru_cache(maxsize=1)
+def _stock_text() -> bytes:
+    return resources.files("ui_console.design").joinpath("stock.xml").read_bytes()
+
+
+@lru_cache(maxsize=2)
+def _by_name(section: str) -> dict[str, Node]:
+    found = stock().first(section)
+    return {} if found is None else {one.text("name"): one for one in found.children}
+
+
+def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool) -> TypeEntry:
+    needs = tuple(needed.text("type") for needed in declared.all("needs"))
+    return TypeEntry(
+        declared.text("name"),
+        declared.text("class"),
+        _role(declared, needs, world_type),
+        needs,
+        tuple(declared.text("uses").split()),
+        is_stock,
+        is_declared,
+    )
+
+
+def _role(declared: Node, needs: tuple[str, ...], world_type: str) -> Role:
+    match declared.text("subsystem"):
+        case Subsystem.MISSION_CONTROL:
+            return Role.BEHAVIOR
+        case Subsystem.UI_CONSOLE:
+            return Role.CONSOLE
+        case Subsystem.BACKBONE:
+            return Role.SERVICE
+        case _ if needs:
+            return Role.ARC
+        case _:
+            return Role.WORLD if declared.text("name") == world_type else Role.RESOURCE

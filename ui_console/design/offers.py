@@ -1,0 +1,242 @@
+"""What may be added where, what has to be asked for it, and which command that becomes.
+
+Pure: a tree and an element in, offers out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from backbone.mission.edit import NewElement, Node, Path
+from backbone.mission.schema import vocabulary
+from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
+from ui_console.design.draft import (
+    Add,
+    AddBehavior,
+    AddResource,
+    AddType,
+    AddWorld,
+    Claim,
+    Command,
+    DesignRefused,
+    SetParameter,
+)
+from ui_console.design.properties import choices
+
+MINIMUM_RUNTIME_S = "5"  # RAM 2002, "Experiments": slices of five seconds
+_POINT = re.compile(r"([^\s,]+),([^\s,]+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Something to be asked.
+
+    Attributes:
+        name: What.
+        doc: What it means.
+        proposed: What is proposed.
+        choices: What makes sense, if it can be listed.
+    """
+
+    name: str
+    doc: str
+    proposed: str = ""
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """Something that may be added.
+
+    Attributes:
+        label: Its name in a list.
+        doc: What it is.
+        asks: What has to be asked for it.
+        build: From the answers, in this order, to the command; may refuse with ``DesignRefused``.
+    """
+
+    label: str
+    doc: str
+    asks: tuple[Asked, ...]
+    build: Callable[[Sequence[str]], Command]
+
+
+def offers(mission: Node, path: Path) -> list[Offer]:
+    """Return what may be added at an element; if nothing may, at the next one above where something may.
+
+    Args:
+        mission: The whole file.
+        path: The element.
+    """
+    while True:
+        node = mission.at(path)
+        found = _offers(mission, node)
+        if found or not path:
+            return found
+        path = path[:-1]
+
+
+def free_name(mission: Node, wished: str) -> str:
+    """Return the name, or the first like it with another number, that no component has.
+
+    Example: with ``scout1`` taken, ``scout1`` gives ``scout2``.
+    """
+    taken = {node.text("name") for node in mission}
+    stem, number = wished.rstrip("0123456789"), 2
+    if wished not in taken:
+        return wished
+    while f"{stem}{number}" in taken:
+        number += 1
+    return f"{stem}{number}"
+
+
+def _offers(mission: Node, node: Node) -> list[Offer]:
+    match node.tag:
+        case "mission":
+            missing = [] if mission.first("world") is not None else [_world()]
+            return [*_behaviors(mission, node), *_resources(mission), *missing]
+        case "behaviors":
+            return _behaviors(mission, node)
+        case "behavior":
+            return [*_behaviors(mission, node), *_claims(mission, node), _parameter(node)]
+        case "arc":
+            return _wishes(mission, node)
+        case "resources":
+            return _resources(mission)
+        case "resource":
+            return [*_generic(mission, node, "uses"), _parameter(node)]
+        case "types":
+            return [*_types(mission), *_generic(mission, node, "type")]
+        case "target":
+            return _generic(mission, node, "point")
+        case _:
+            rule = vocabulary().get(node.tag)
+            tags = (
+                [] if rule is None else [tag for tag, (_, most) in rule.children.items() if len(node.all(tag)) < most]
+            )
+            return [offer for tag in tags for offer in _generic(mission, node, tag)]
+
+
+def _of(mission: Node, role: Role) -> list[TypeEntry]:
+    return [one for one in entries(mission) if one.role is role]
+
+
+def _behaviors(mission: Node, node: Node) -> list[Offer]:
+    def offer(entry: TypeEntry) -> Offer:
+        asks = (
+            Asked("name", "Name of the behavior.", free_name(mission, entry.name.replace("_", "-"))),
+            Asked("priority", "Its priority among its siblings, a whole number; larger is higher.", "1"),
+        )
+        return Offer(f"behavior {entry.name}", entry.class_path, asks, lambda given: build(entry, given))
+
+    def build(entry: TypeEntry, given: Sequence[str]) -> Command:
+        if not re.fullmatch(r"-?\d{1,9}", given[1].strip()):
+            raise DesignRefused(f"{given[1]!r} is no priority", remedy="Write a whole number; larger is higher.")
+        return AddBehavior(node.path, entry.name, given[0], int(given[1]))
+
+    return [offer(entry) for entry in _of(mission, Role.BEHAVIOR)]
+
+
+def _claims(mission: Node, node: Node) -> list[Offer]:
+    doc = vocabulary()["arc"].attributes["minimum-runtime-s"].documentation
+    asks = (Asked("minimum-runtime-s", doc, MINIMUM_RUNTIME_S),)
+
+    def offer(entry: TypeEntry) -> Offer:
+        what = f"claims one each of: {', '.join(entry.needs)}"
+        return Offer(f"arc {entry.name}", what, asks, lambda given: Claim(node.path, entry.name, given[0].strip()))
+
+    return [offer(entry) for entry in _of(mission, Role.ARC)]
+
+
+def _wishes(mission: Node, node: Node) -> list[Offer]:
+    needs = next((one.needs for one in entries(mission) if one.name == node.text("kind")), ())
+    wished = {one.text("type") for one in node.all("wish")}
+
+    def offer(kind: str) -> Offer:
+        there = [one.text("name") for one in mission if one.tag == "resource" and one.text("type") == kind]
+        doc = vocabulary()["wish"].attributes["name"].documentation
+        asks = (Asked("name", doc, there[0] if there else "", tuple(there)),)
+        return Offer(
+            f"wish {kind}",
+            vocabulary()["wish"].documentation,
+            asks,
+            lambda given: Add(node.path, NewElement("wish", {"type": kind, "name": given[0]})),
+        )
+
+    return [offer(kind) for kind in needs if kind not in wished]
+
+
+def _resources(mission: Node) -> list[Offer]:
+    def offer(entry: TypeEntry) -> Offer:
+        shape = stock_resource(entry.name)
+        name = shape.text("name") if shape is not None else entry.name
+        asks = (Asked("name", "Name of the resource and of its controller.", free_name(mission, name)),)
+        return Offer(f"resource {entry.name}", entry.class_path, asks, lambda given: AddResource(entry.name, given[0]))
+
+    return [offer(entry) for entry in _of(mission, Role.RESOURCE)]
+
+
+def _world() -> Offer:
+    rules = vocabulary()["room"].attributes
+    asks = (
+        Asked("width-m", rules["width-m"].documentation, "9"),
+        Asked("depth-m", rules["depth-m"].documentation, "6"),
+    )
+    return Offer(
+        "world", vocabulary()["world"].documentation, asks, lambda given: AddWorld(given[0].strip(), given[1].strip())
+    )
+
+
+def _types(mission: Node) -> list[Offer]:
+    def offer(entry: TypeEntry) -> Offer:
+        return Offer(f"type {entry.name}", entry.class_path, (), lambda _given: AddType(entry.name))
+
+    return [offer(entry) for entry in entries(mission) if not entry.is_declared]
+
+
+def _parameter(node: Node) -> Offer:
+    rules = vocabulary()["parameter"].attributes
+    asks = (Asked("name", rules["name"].documentation), Asked("value", rules["value"].documentation))
+    return Offer(
+        "parameter",
+        vocabulary()["parameter"].documentation,
+        asks,
+        lambda given: SetParameter(node.path, given[0], given[1]),
+    )
+
+
+def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
+    """Return an offer of an element as the schema describes it: its required attributes are asked."""
+    rule = vocabulary()[tag]
+    new = Node((*node.path, 0), tag, {}, (), 0, 0, 0, 0, 0, is_empty=True)
+    required = [name for name, one in rule.attributes.items() if one.required]
+    asks = [
+        Asked(
+            name,
+            rule.attributes[name].documentation,
+            free_name(mission, tag) if name == "name" and tag not in ("uses", "parameter") else "",
+            choices(mission, new, name, rule.attributes[name].type),
+        )
+        for name in required
+    ]
+    if tag == "target":
+        asks.append(Asked("path", "Its way points, x,y in meters, separated by blanks.", "1,1 2,1"))
+
+    def build(given: Sequence[str]) -> Command:
+        values = {name: value for name, value in zip(required, given, strict=False) if value}
+        points = _points(given[-1]) if tag == "target" else []
+        return Add(node.path, NewElement(tag, values, points))
+
+    return [Offer(tag, rule.documentation, tuple(asks), build)]
+
+
+def _points(text: str) -> list[NewElement]:
+    found = []
+    for word in text.split():
+        matched = _POINT.fullmatch(word)
+        if matched is None:
+            raise DesignRefused(f"{word!r} is no way point", remedy="Write x,y in meters, as in 0,3 9,3.")
+        found.append(NewElement("point", {"x-m": matched[1], "y-m": matched[2]}))
+    return found

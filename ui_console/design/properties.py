@@ -1,0 +1,144 @@
+"""What can be set of an element: its attributes and parameters, with what they mean and may be.
+
+Pure. Meanings and defaults are the schema's and, for parameters, the class's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from backbone.mission.edit import Node, Path
+from backbone.mission.schema import enumerations, vocabulary
+from ui_console.design.catalogue import ClassFacts, Role, entries
+from ui_console.design.draft import Command, Rename, SetParameter, SetValue
+
+HAVE_PARAMETERS = ("behavior", "resource", "world")
+WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "scout")
+"""Tags whose name others mention; to set it is to rename."""
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """One thing that can be set.
+
+    Attributes:
+        name: Attribute or parameter.
+        value: What is written; None: nothing.
+        default: What holds then; None: nothing does.
+        is_required: Whether it must be written.
+        is_parameter: Whether it is a parameter.
+        doc: What it means and may be.
+        choices: Values that make sense, if they can be listed.
+    """
+
+    name: str
+    value: str | None
+    default: str | None
+    is_required: bool
+    is_parameter: bool
+    doc: str
+    choices: tuple[str, ...] = ()
+
+    @property
+    def is_missing(self) -> bool:
+        """It must be written, and is not."""
+        return self.is_required and self.value is None
+
+    def command(self, path: Path, tag: str, value: str) -> Command:
+        """Return what sets it; empty text leaves it out."""
+        if self.is_parameter:
+            return SetParameter(path, self.name, value or None)
+        if self.name == "name" and tag in WITH_NAMES and value:
+            return Rename(path, value)
+        return SetValue(path, self.name, value or None)
+
+
+def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> list[Property]:
+    """Return everything that can be set of an element, attributes first.
+
+    Args:
+        mission: The whole file.
+        node: The element.
+        facts: Class path → what the class says of itself.
+    """
+    rule = vocabulary().get(node.tag)
+    if rule is None:
+        return []
+    found = [
+        Property(
+            name,
+            node.attributes.get(name),
+            one.default,
+            one.required,
+            is_parameter=False,
+            doc=one.documentation,
+            choices=choices(mission, node, name, one.type),
+        )
+        for name, one in rule.attributes.items()
+    ]
+    return found + (_parameters(mission, node, facts) if node.tag in HAVE_PARAMETERS else [])
+
+
+def choices(mission: Node, node: Node, attribute: str, simple_type: str = "") -> tuple[str, ...]:
+    """Return the values of an attribute that make sense where it stands; none if they cannot be listed."""
+    match node.tag, attribute:
+        case (_, "host"):
+            return _names(mission, "hosts")
+        case ("behavior", "type"):
+            return _of_role(mission, Role.BEHAVIOR)
+        case ("arc", "kind"):
+            return _of_role(mission, Role.ARC)
+        case ("resource", "type") | ("uses", "type") | ("needs", "type"):
+            return _of_role(mission, Role.RESOURCE)
+        case ("wish", "type"):
+            arc = mission.at(node.path[:-1])
+            return next((one.needs for one in entries(mission) if one.name == arc.text("kind")), ())
+        case ("wish", "name") | ("uses", "name"):
+            resources = mission.first("resources")
+            there = [] if resources is None else resources.all("resource")
+            return tuple(one.text("name") for one in there if one.text("type") == node.text("type"))
+        case ("scout", "carried-by"):
+            world = mission.first("world")
+            targets = [] if world is None else world.all("target")
+            return tuple(one.text("name") for one in targets if one.text("shape") == "carrier")
+        case _:
+            return ("true", "false") if simple_type == "xs:boolean" else tuple(enumerations().get(simple_type, ()))
+
+
+def class_of(mission: Node, node: Node) -> str:
+    """Return the class path of the component that an element is; empty if that is not known."""
+    return next((one.class_path for one in entries(mission) if one.name == node.text("type")), "")
+
+
+def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> list[Property]:
+    given = {one.text("name"): one.text("value") for one in node.all("parameter")}
+    known = facts.get(class_of(mission, node), ClassFacts()).parameters
+    found = [
+        Property(
+            one.name,
+            given.get(one.name),
+            one.default.strip('"') or None,
+            not one.default,
+            is_parameter=True,
+            doc=" ".join(part for part in (one.doc, f"({one.told})") if part),
+            choices=("true", "false") if one.type == "boolean" else (),
+        )
+        for one in known
+    ]
+    names = {one.name for one in known}
+    doc = "Its class has no such parameter." if known else "Not looked up."
+    return found + [
+        Property(name, value, None, is_required=False, is_parameter=True, doc=doc)
+        for name, value in given.items()
+        if name not in names
+    ]
+
+
+def _names(mission: Node, section: str) -> tuple[str, ...]:
+    found = mission.first(section)
+    return () if found is None else tuple(one.text("name") for one in found.children)
+
+
+def _of_role(mission: Node, role: Role) -> tuple[str, ...]:
+    return tuple(one.name for one in entries(mission) if one.role is role)
