@@ -346,9 +346,14 @@ def _insert(data: bytes, parent: Node, number: int, text: bytes, *, apart: bool 
             return _readable(data[: parent.begin] + head + b">" + inside + f"</{parent.tag}>".encode() + tail)
         return _readable(data[: parent.content] + inside + data[parent.close :])
     gap = newline * 2 if apart else newline
-    if number > 0 or not parent.children:
-        before = parent.children[number - 1] if parent.children else None
-        at = _behind(data, before) if before is not None else len(data[: parent.close].rstrip())
+    if not parent.children:
+        at = len(data[: parent.close].rstrip())
+        return _readable(data[:at] + gap + indent + text + data[at:])
+    if number > 0:
+        before = parent.children[number - 1]
+        if not _is_first_in_line(data, before.begin):
+            return _readable(data[: before.end] + text + data[before.end :])
+        at = _behind(data, before)
         return _readable(data[:at] + gap + indent + text + data[at:])
     first = parent.children[0]
     if _is_first_in_line(data, first.begin):
