@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-GRAIN_S = 0.5  # chosen: times of views are guesses, and run times that hardly differ make schedules nobody can read
+GRAIN_S = 0.25  # chosen: times of views are guesses, and run times that hardly differ make schedules nobody can read
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +34,8 @@ class RunTimes:
 def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect_s: float, given_s: float) -> RunTimes:
     """Return the run times to ask for.
 
-    A short slice is as long as the settling time, so that no more than half of all time is lost to switching, and
-    besides it holds the blind beginning and twice the time to detect, so that what comes into view in the first
-    half of what is left is detected. It can be extended by one more time to detect, when something was glimpsed
-    at its end.
+    A short slice holds the blind beginning and one time to detect: it is as short as still tells something of what is
+    in view already. It can be extended by one more time to detect, when something was glimpsed at its end.
 
     Args:
         view_s: Shortest time for which what is looked for is in view, seconds.
@@ -48,7 +46,7 @@ def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect
 
     Example:
         >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
-        RunTimes(minimum_s=2.5, maximum_s=3.5)
+        RunTimes(minimum_s=1.5, maximum_s=2.5)
         >>> useful_run_times(view_s=2.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
         RunTimes(minimum_s=5.0, maximum_s=6.0)
 
@@ -58,8 +56,8 @@ def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect
     times = (view_s, settling_s, blind_s, detect_s, given_s)
     if not all(math.isfinite(time) and time >= 0 for time in times) or not detect_s or not given_s:
         raise ValueError(f"no run times from {times} s of view, settling, blindness, detection and the mission's own")
-    shortest_s = settling_s + blind_s + 2 * detect_s
-    minimum_s = min(given_s, _up(shortest_s)) if view_s > shortest_s else given_s
+    short_pays = view_s > settling_s + blind_s + 2 * detect_s
+    minimum_s = min(given_s, _up(blind_s + detect_s)) if short_pays else given_s
     return RunTimes(minimum_s, _up(minimum_s + detect_s))
 
 

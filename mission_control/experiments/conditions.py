@@ -13,6 +13,9 @@ from mission_control.experiments.geometry import EXTRAS, PASSAGES, SLICE_S, WATC
 Policy = Literal["paper", "adaptive"]
 Order = Literal["active-first", "extra-first", "interleaved"]
 
+CONSOLE_SLICE_S = (
+    3.0  # chosen: less than a target's time in view, so that none hides it; long enough to see what one steers
+)
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 
 
@@ -31,7 +34,8 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         extra: Scouts that consoles hold, of the mission's own priority.
         channels: Video frequencies, each with a framegrabber.
         policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers work out their run times and ask
-            for more on a glimpse, equals get equal time, and consoles want no air while nobody drives.
+            for more on a glimpse, equals get equal time, and consoles ask for at most ``CONSOLE_SLICE_S`` and want
+            no air while nobody drives.
         target: ``pioneer`` or ``person``.
         speed_m_s: Of the target; 0: that of the papers.
         slice_s: Run time that watchers and consoles are given, seconds.
@@ -60,6 +64,11 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         if not self.speed_m_s:
             return usual
         return Passage(usual.shape, self.speed_m_s, usual.there_and_back, usual.radius_m)
+
+    @property
+    def console_slice_s(self) -> float:
+        """Run time that consoles ask for, seconds."""
+        return self.slice_s if self.policy == "paper" else min(self.slice_s, CONSOLE_SLICE_S)
 
     @property
     def robots(self) -> tuple[str, ...]:

@@ -28,7 +28,7 @@ SWITCH_S = 0.002  # measured: the last packet of a hold
 BAD_SHARE, BAD_BURST_S = 0.25, 0.15  # SCHEDULING.md, section 6, at noise 1
 LEAST_M = 0.1  # measured: so much of a target must be in view before its region is large enough
 CLEAN_SHARE = 0.75  # of the watchers' parameters
-ADAPTED_SLICE_S = 2.5  # chosen: about what watchers work out; only the spread of phases depends on it
+ADAPTED_SLICE_S = 1.25  # chosen: about what watchers work out; only the spread of phases depends on it
 ASK_BEFORE_END_S = 0.2  # resource_pool.aggregate_resource_controller: when "not now" can be said
 
 
@@ -95,14 +95,18 @@ def departs_s(condition: Condition, phase: float) -> float:
 
     Args:
         condition: What is tried.
-        phase: 0 to 1, of a round: everybody's slices, of consoles that yield for the share of time they are driven.
+        phase: 0 to 1, of a round: slices in turn, one of each; with equal time as many of each as make it equal.
     """
-    watcher_s, console_s = condition.slice_s, condition.slice_s
+    watcher_s, console_s = condition.slice_s, condition.console_slice_s
     if condition.policy == "adaptive":
         watcher_s = min(watcher_s, ADAPTED_SLICE_S)
-        console_s *= max(condition.driven, ADAPTED_SLICE_S / condition.slice_s)
     switch_s = SETTLING_S + SWITCH_S
-    round_s = condition.active * (watcher_s + switch_s) + condition.extra * (console_s + switch_s)
+    most_s = max(watcher_s, console_s) if condition.extra else watcher_s
+    if condition.policy == "paper":
+        watching_s, driving_s = watcher_s + switch_s, console_s + switch_s
+    else:
+        watching_s, driving_s = (most_s / slice_s * (slice_s + switch_s) for slice_s in (watcher_s, console_s))
+    round_s = condition.active * watching_s + condition.extra * driving_s
     first_s = 0.0 if condition.policy == "paper" else round_s / 2
     return first_s + phase * round_s
 
@@ -146,7 +150,8 @@ class _Sample:
         if condition.policy == "paper":
             return _Claimant(robot, condition.slice_s, condition.slice_s, since=number)
         hands = Hands(self._dice.randrange(2**31), condition.driven, 5.0)
-        return _Claimant(robot, condition.slice_s, condition.slice_s, hands=hands, changes_s=hands.next_change_s())
+        asked_s = condition.console_slice_s
+        return _Claimant(robot, asked_s, asked_s, hands=hands, changes_s=hands.next_change_s())
 
     def _channel_detects(self, claimants: list[_Claimant]) -> bool:
         now_s, served = 0.0, len(claimants)

@@ -171,7 +171,7 @@ class _Trial:
         parameters = {
             "robot": robot,
             "priority": MISSION_PRIORITY,
-            "minimum_runtime_s": condition.slice_s,
+            "minimum_runtime_s": condition.console_slice_s,
             "period_s": PERIOD_S,
             "packet_time_s": PACKET_TIME_S,
             "driven": condition.driven,
