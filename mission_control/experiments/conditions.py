@@ -14,8 +14,6 @@ Policy = Literal["paper", "adaptive"]
 Order = Literal["active-first", "extra-first", "interleaved"]
 
 CONSOLE_SLICE_S = 3.0  # chosen: less than a target is in view, so that none hides it; long enough to steer by sight
-    3.0  # chosen: less than a target's time in view, so that none hides it; long enough to see what one steers
-)
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 
 
