@@ -112,6 +112,13 @@ class Node:
             node = node.children[number]
         return node
 
+    def nearest(self, path: Path) -> Path:
+        """Return the path as far down as elements stand there."""
+        node, depth = self, 0
+        while depth < len(path) and path[depth] < len(node.children):
+            node, depth = node.children[path[depth]], depth + 1
+        return path[:depth]
+
     def all(self, tag: str) -> list[Node]:
         """Return the children of this tag."""
         return [child for child in self.children if child.tag == tag]

@@ -19,11 +19,11 @@ from ui_console.design.offers import Asked
 T = TypeVar("T")
 CHOICES_TOLD = 12  # chosen: fits two lines
 CSS = """
-Dialog { align: center middle; }
+Dialog { align: center middle; background: $background; }
 Dialog > Vertical { width: 80%; max-width: 100; height: auto; max-height: 90%; padding: 0 1; }
 Dialog > Vertical { border: thick $primary; background: $surface; }
-Dialog OptionList { height: auto; max-height: 14; }
-Dialog #doc { margin-top: 1; height: auto; max-height: 14; }
+Dialog OptionList { height: 12; }
+Dialog #doc { margin-top: 1; height: 12; }
 Dialog VerticalScroll { height: auto; max-height: 100%; }
 """
 
@@ -80,7 +80,7 @@ class Picker(Dialog[int | None]):
         """Explain it."""
         number = self._number()
         lines = [] if number is None else self._docs[number]
-        self.query_one("#doc", Static).update(Text("\n".join(lines)))
+        self.query_one("#doc", Static).update(Text("\n".join(lines)), layout=False)
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Answer a mouse."""

@@ -31,7 +31,7 @@ from ui_console.design.catalogue import new_text, stock_resource, stock_type
 
 UNDO_MOST = 1000  # chosen: more than a sitting; a mission file is small
 LAST_NETWORK_ID = 254  # as the reader has it
-BODY_STEP_M = 1.0  # chosen: so far apart the first places of robots are, far from touching
+BODY_STEP_M = 1.0  # chosen: so far apart the first places of robots are, half of it from the wall; none touch
 WORLD_NAMED_BY = (WORLD, "localizer")  # parameters whose value is the world's name
 RADIO_RATE = {"period-s": "0.1", "packet-time-s": "0.002"}  # chosen: as mission.xml, a fiftieth of a radio
 
@@ -454,7 +454,7 @@ def _add_world(text: bytes, command: AddWorld) -> Step:
 
 
 def _with_bodies(text: bytes) -> bytes:
-    """Return a text in which every simulated robot has a body, in a row through the middle of the room."""
+    """Return a text in which every simulated robot has a body: in a row near the lower wall, looking into the room."""
     world = outline(text).first("world")
     section = outline(text).first("resources")
     if world is None or section is None:
@@ -469,7 +469,7 @@ def _with_bodies(text: bytes) -> bytes:
         if _network_id(resource) is None or not is_simulated or name in bodies:
             continue
         x_m = (BODY_STEP_M * (len(bodies) + 1)) % width_m or width_m / 2
-        place = {"name": name, "x-m": f"{x_m:g}", "y-m": f"{depth_m / 2:g}", "heading-deg": "90"}
+        place = {"name": name, "x-m": f"{x_m:g}", "y-m": f"{min(BODY_STEP_M, depth_m) / 2:g}", "heading-deg": "90"}
         text = add(text, world.path, NewElement("scout", place))
         bodies.append(name)
     return text

@@ -64,18 +64,17 @@ class Offer:
 
 
 def offers(mission: Node, path: Path) -> list[Offer]:
-    """Return what may be added at an element; if nothing may, at the next one above where something may.
+    """Return what may be added: in an element first, then in those above it, each kind at the nearest that can hold it.
 
     Args:
         mission: The whole file.
         path: The element.
     """
-    while True:
-        node = mission.at(path)
-        found = _offers(mission, node)
-        if found or not path:
-            return found
-        path = path[:-1]
+    found: dict[str, Offer] = {}
+    for depth in range(len(path), -1, -1):
+        for offer in _offers(mission, mission.at(path[:depth])):
+            found.setdefault(offer.label, offer)
+    return list(found.values())
 
 
 def free_name(mission: Node, wished: str) -> str:

@@ -66,8 +66,8 @@ class DesignApp(App[None]):
         + """
     #status { height: 1; background: $panel; color: $text; }
     #body { height: 1fr; }
-    #left { width: 1fr; }
-    #right { width: 1fr; }
+    #left { width: 4fr; }
+    #right { width: 3fr; }
     .panel { border: round $primary; padding: 0 1; }
     #tree { height: 1fr; text-wrap: nowrap; text-overflow: ellipsis; }
     #properties { height: 1fr; text-wrap: nowrap; text-overflow: ellipsis; }
@@ -158,7 +158,7 @@ class DesignApp(App[None]):
         row = self._panel(PanelName.PROPERTIES).row
         chosen = next((one for one in self._properties() if row is not None and _key(one) == row.key), None)
         meaning = chosen.doc if chosen is not None else ""
-        self.screen_stack[0].query_one("#meaning", Static).update(Text(meaning))
+        self.screen_stack[0].query_one("#meaning", Static).update(Text(meaning), layout=False)
         self.screen_stack[0].query_one("#status", Static).update(self._status(), layout=False)
 
     def _show(self, name: PanelName, rows: list[Row], nothing: str = "nothing") -> None:
@@ -210,7 +210,8 @@ class DesignApp(App[None]):
             self._panel(PanelName.TREE).choose(key_of(self._at))
         self.redraw()
 
-    def _go_to(self, path: Path) -> None:
+    def go_to(self, path: Path) -> None:
+        """Put the cursor of the tree on an element; of a parameter, on the element that has it."""
         node = self.draft.mission.at(path)
         self._at = path[:-1] if node.tag == "parameter" else path
         if len(self._at) > 1:
@@ -221,12 +222,14 @@ class DesignApp(App[None]):
     def do(self, command: Command) -> bool:
         """Carry out a command and go to what it touched; say so if it is refused."""
         try:
-            self.draft = self.draft.do(command)
+            after = self.draft.do(command)
         except Refusal as refusal:
             self.notify(str(refusal), title="refused", severity="error", markup=False)
             return False
-        self._go_to(self.draft.step.touched)
-        self.redraw()
+        if after is not self.draft:
+            self.draft = after
+            self.go_to(after.step.touched)
+            self.redraw()
         return True
 
     @work
@@ -259,7 +262,7 @@ class DesignApp(App[None]):
         elif self.chosen is PanelName.PROBLEMS:
             if not self._shows_rehearsal and row is not None and self.draft.problems:
                 self.chosen = PanelName.TREE
-                self._go_to(self.draft.element_of(self.draft.problems[int(row.key)]))
+                self.go_to(self.draft.element_of(self.draft.problems[int(row.key)]))
                 self.redraw()
         elif row is not None:
             found = next(one for one in self._properties() if _key(one) == row.key)
@@ -318,19 +321,20 @@ class DesignApp(App[None]):
 
     def action_undo(self) -> None:
         """Take the last command back."""
-        self._step(self.draft.undo)
+        undone = self.draft.step.touched
+        self._step(self.draft.undo, undone)
 
     def action_redo(self) -> None:
         """Do again what was taken back."""
         self._step(self.draft.redo)
 
-    def _step(self, step: Callable[[], Draft]) -> None:
+    def _step(self, step: Callable[[], Draft], path: Path | None = None) -> None:
         try:
             self.draft = step()
         except Refusal as refusal:
             self.notify(refusal.detail, severity="warning", markup=False)
             return
-        self._go_to(self.draft.step.touched)
+        self.go_to(self.draft.mission.nearest(self.draft.step.touched if path is None else path))
         self.redraw()
 
     # ------------------------------------------------------------------ reading

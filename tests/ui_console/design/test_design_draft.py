@@ -1,0 +1,351 @@
+"""A draft: commands, refusals, the way back, and that the text is always what the model says."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from backbone.errors import Refusal
+from backbone.mission.edit import NewElement, Node, outline
+from backbone.mission.reader import MissionInvalid, read_mission
+from ui_console.design.catalogue import Role, entries, stock
+from ui_console.design.draft import (
+    Add,
+    AddBehavior,
+    AddResource,
+    AddType,
+    AddWorld,
+    Claim,
+    Command,
+    DesignRefused,
+    Draft,
+    FileChanged,
+    Move,
+    NameTaken,
+    NothingToUndo,
+    Remove,
+    Rename,
+    SetParameter,
+    SetValue,
+    Step,
+)
+from ui_console.design.file import NotSaved, save
+from ui_console.design.offers import free_name, offers
+from ui_console.design.properties import properties
+
+ROOT = Path(__file__).parents[3]
+SHIPPED = [ROOT / "mission.xml", ROOT / "docs" / "examples" / "behaviors.xml"]
+COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+
+
+def designed(*commands: Command, draft: Draft | None = None) -> Draft:
+    draft = draft or Draft.new("guard.xml")
+    for command in commands:
+        draft = draft.do(command)
+    return draft
+
+
+def only(draft: Draft, tag: str, name: str) -> Node:
+    (found,) = [node for node in draft.mission if node.tag == tag and node.text("name") == name]
+    return found
+
+
+def watchers() -> Draft:
+    draft = designed(
+        AddWorld("9", "6"),
+        AddResource("command_radio", "radio"),
+        AddResource("video_frequency", "video1"),
+        AddResource("framegrabber", "grabber"),
+        AddResource("scout", "scout1"),
+        AddResource("scout", "scout2"),
+        AddBehavior((), "surveillance", "surveillance", 5),
+    )
+    for robot in ("scout1", "scout2"):
+        parent = only(draft, "behavior", "surveillance").path
+        draft = draft.do(AddBehavior(parent, "watch_for_motion", f"watch-{robot}"))
+        draft = draft.do(Claim(draft.step.touched, "capture", "5"))
+        draft = draft.do(Add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
+    return draft
+
+
+# ---------------------------------------------------------------------- laws
+NAMES = st.sampled_from(["scout1", "scout9", "radio", "world", "watch-scout1", "base", "Not Legal", ""])
+START = st.sampled_from([Draft.opened(str(SHIPPED[0])), Draft.opened(str(SHIPPED[1])), Draft.new("new.xml")])
+
+
+def commands(draft: Draft) -> st.SearchStrategy[Command]:
+    paths = st.sampled_from([node.path for node in draft.mission])
+    kinds = st.sampled_from([entry.name for entry in entries(draft.mission)])
+    return st.one_of(
+        st.builds(Remove, paths),
+        st.builds(Rename, paths, NAMES),
+        st.builds(Move, paths, paths, st.integers(0, 5)),
+        st.builds(SetValue, paths, st.sampled_from(["name", "priority", "host", "x-m"]), NAMES | st.none()),
+        st.builds(SetParameter, paths, NAMES, NAMES | st.none()),
+        st.builds(AddBehavior, paths, kinds, NAMES, st.integers(-3, 3)),
+        st.builds(AddResource, kinds, NAMES),
+        st.builds(AddType, kinds),
+        st.builds(AddWorld, st.just("9"), st.sampled_from(["6", "x"])),
+        st.builds(Claim, paths, kinds, st.sampled_from(["5", "none"])),
+        st.builds(Add, paths, st.builds(NewElement, st.sampled_from(["wish", "uses", "behavior", "furniture"]))),
+    )
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=list(HealthCheck))
+@given(START, st.data())
+def test_any_sequence_of_commands_can_be_read_loses_no_comment_and_is_undone_to_the_byte(
+    draft: Draft, data: st.DataObject
+) -> None:
+    first, states = draft, [draft]
+    for _ in range(data.draw(st.integers(1, 6))):
+        command = data.draw(commands(draft))
+        after = done(draft, command)
+        if after is draft:
+            continue
+        taken = re.findall(COMMENT, removed_by(draft, command))
+        assert len(re.findall(COMMENT, after.text)) == len(re.findall(COMMENT, draft.text)) - len(taken)
+        assert outline(after.text).at(after.step.touched)
+        draft = after
+        states.append(draft)
+    for state in reversed(states[:-1]):
+        draft = draft.undo()
+        assert draft.text == state.text
+    for state in states[1:]:
+        draft = draft.redo()
+        assert draft.text == state.text
+    assert first.saved == states[-1].saved
+
+
+def done(draft: Draft, command: Command) -> Draft:
+    try:
+        return draft.do(command)
+    except Refusal:
+        return draft
+
+
+def removed_by(draft: Draft, command: Command) -> bytes:
+    if not isinstance(command, Remove):
+        return b""
+    node = draft.mission.at(command.path)
+    return draft.text[node.begin : node.end]
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(START, st.data())
+def test_every_offer_can_be_taken_or_says_why_not_and_touches_what_it_added(draft: Draft, data: st.DataObject) -> None:
+    node = data.draw(st.sampled_from(list(draft.mission)))
+    offer = data.draw(st.sampled_from(offers(draft.mission, node.path)))
+    given = [data.draw(st.sampled_from([asked.proposed, *asked.choices, "x", "1"])) for asked in offer.asks]
+    try:
+        after = draft.do(offer.build(given))
+    except Refusal:
+        return
+    assert after.mission.at(after.step.touched).tag in (*offer.label.split(), "behavior", "resource")
+
+
+def test_the_problems_are_those_of_check(tmp_path: Path) -> None:
+    file = tmp_path / "mission.xml"
+    draft = Draft.opened(str(SHIPPED[0]))
+    draft = designed(
+        Remove(only(draft, "resource", "video1").path), Rename(only(draft, "host", "base").path, "b"), draft=draft
+    )
+    draft = save(Draft(str(file), draft.step), file)
+    with pytest.raises(MissionInvalid) as invalid:
+        read_mission(file)
+    assert draft.problems == invalid.value.faults
+    assert draft.description is None
+    assert draft.rehearsal is None
+    assert {draft.mission.at(draft.element_of(fault)).tag for fault in draft.problems} <= {"resource", "uses", "arc"}
+
+
+def test_what_the_text_means_is_what_the_reader_reads(tmp_path: Path) -> None:
+    draft = save(watchers(), tmp_path / "guard.xml")
+    assert draft.description is not None
+    assert draft.description.model_copy(update={"source": draft.source}) == read_mission(draft.source)
+
+
+# ---------------------------------------------------------------------- building
+def test_a_new_mission_is_fine_and_named_as_its_file() -> None:
+    assert Draft.new("night-watch.xml").mission.text("name") == "night-watch"
+    assert Draft.new("Ünlawful name.xml").mission.text("name") == "mission"
+    assert Draft.new("a.xml").problems == ()
+    assert Draft.new("a.xml").is_changed
+
+
+def test_two_watchers_are_built_from_nothing_and_take_turns() -> None:
+    draft = watchers()
+    assert draft.problems == ()
+    assert draft.rehearsal is not None
+    assert draft.rehearsal.can_come_up
+    turns = {claimed.behavior: claimed.turns for claimed in draft.rehearsal.claimed}
+    assert set(turns) == {"watch-scout1", "watch-scout2"}
+    assert min(turns.values()) >= 5
+    assert max(turns.values()) - min(turns.values()) <= 1
+
+
+def test_the_projects_own_list_is_what_its_missions_write() -> None:
+    written = {
+        one.text("name"): (one.attributes, [needed.attributes for needed in one.all("needs")])
+        for file in SHIPPED
+        for one in Draft.opened(str(file)).mission.first("types").all("type")  # type: ignore[union-attr]
+    }
+    listed = {
+        one.text("name"): (one.attributes, [needed.attributes for needed in one.all("needs")])
+        for one in stock().first("types").all("type")  # type: ignore[union-attr]
+    }
+    assert listed == {name: written[name] for name in listed}
+    modules = {path.stem for path in (ROOT / "mission_control" / "behaviors").glob("*.py")}
+    assert {entry.name for entry in entries(stock()) if entry.role is Role.BEHAVIOR} <= modules
+
+
+def test_every_behavior_of_the_project_is_at_hand() -> None:
+    table = (ROOT / "docs" / "reference" / "behaviors.md").read_text().partition("\n## ")[0]
+    names = set(re.findall(r"^\| `(\w+)` \| (?:`|–)", table, re.MULTILINE))
+    assert names == {entry.name for entry in entries(Draft.new("a.xml").mission) if entry.role is Role.BEHAVIOR}
+
+
+def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> None:
+    draft = watchers().do(AddResource("scout", "scout3"))
+    robot = draft.mission.at(draft.step.touched)
+    assert [(one.text("type"), one.text("name")) for one in robot.all("uses")] == [
+        ("command_radio", "radio"),
+        ("video_frequency", "video1"),
+    ]
+    assert [one.text("value") for one in robot.all("parameter")] == ["3"]
+    assert only(draft, "scout", "scout3").attributes["x-m"] == "3"
+    assert draft.problems == ()
+    assert draft.do(Remove(robot.path)).text != draft.text
+    assert draft.do(Remove(robot.path)).problems == ()
+
+
+def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
+    draft = watchers()
+    draft = draft.do(Rename(only(draft, "resource", "scout1").path, "spy"))
+    assert draft.problems == ()
+    assert b"scout1" not in draft.text.replace(b"watch-scout1", b"")
+    draft = draft.do(Rename(only(draft, "scout", "spy").path, "scout1"))
+    assert draft.text == watchers().text
+
+
+@pytest.mark.parametrize(
+    ("tag", "old"), [("host", "base"), ("type", "scout"), ("type", "capture"), ("world", "world"), ("type", "placer")]
+)
+def test_to_rename_anything_keeps_the_mission_fine(tag: str, old: str) -> None:
+    draft = Draft.opened(str(SHIPPED[0]))
+    after = draft.do(Rename(only(draft, tag, old).path, "renamed"))
+    assert [fault for fault in after.problems if "core service" not in fault.message and tag != "type"] == []
+    assert after.do(Rename(only(after, tag, "renamed").path, old)).text == draft.text
+
+
+def test_a_claim_replaces_the_one_before_and_declares_what_it_needs() -> None:
+    draft = designed(AddBehavior((), "patrol", "guard"))
+    draft = draft.do(Claim(draft.step.touched, "drive", "5"))
+    names = {one.text("name") for one in draft.mission.first("types").all("type")}  # type: ignore[union-attr]
+    assert {"patrol", "drive", "scout", "command_radio"} <= names
+    draft = draft.do(Claim(draft.step.touched[:-1], "capture", "7"))
+    (arc,) = [node for node in draft.mission if node.tag == "arc"]
+    assert (arc.text("kind"), arc.text("minimum-runtime-s")) == ("capture", "7")
+
+
+def test_a_parameter_is_set_changed_and_left_out() -> None:
+    draft = watchers()
+    path = only(draft, "behavior", "watch-scout1").path
+    more = draft.do(SetParameter(path, "view_s", "6"))
+    assert more.description is not None
+    assert more.description.behaviors[0].children[0].parameters == {"view_s": 6}
+    again = more.do(SetParameter(path, "view_s", "7")).do(SetParameter(path, "view_s", None))
+    assert again.text == draft.text
+    assert draft.do(SetParameter(path, "view_s", None)) is draft
+
+
+def test_what_cannot_be_meant_is_refused_and_changes_nothing() -> None:
+    draft = watchers()
+    refused: list[tuple[Command, type[Refusal]]] = [
+        (AddResource("scout", "scout1"), NameTaken),
+        (AddBehavior((), "patrol", "world"), NameTaken),
+        (Rename(only(draft, "host", "base").path, "Base Station"), Refusal),
+        (AddResource("submarine", "nautilus"), DesignRefused),
+        (AddBehavior((), "no_such", "x"), DesignRefused),
+        (Claim(only(draft, "host", "base").path, "drive", "5"), DesignRefused),
+        (AddWorld("1", "1"), Refusal),
+        (Remove(()), Refusal),
+    ]
+    for command, kind in refused:
+        with pytest.raises(kind) as refusal:
+            draft.do(command)
+        assert refusal.value.remedy
+    with pytest.raises(NothingToUndo):
+        draft.redo()
+    with pytest.raises(NothingToUndo):
+        Draft.new("a.xml").undo()
+
+
+def test_the_last_network_id_is_the_last_robot() -> None:
+    draft = watchers()
+    robot = only(draft, "resource", "scout1")
+    section = draft.text[robot.begin : robot.end].decode()
+    many = "\n".join(section.replace("scout1", f"s{number}").replace('"1"', f'"{number}"') for number in range(3, 255))
+    text = draft.text.replace(b"  </resources>", many.encode() + b"</resources>")
+    full = Draft("many.xml", Step(text))
+    with pytest.raises(DesignRefused, match="254 network ids"):
+        full.do(AddResource("scout", "one-more"))
+
+
+def test_names_are_proposed_that_nobody_has() -> None:
+    mission = watchers().mission
+    assert [free_name(mission, name) for name in ("scout1", "radio", "eye")] == ["scout3", "radio2", "eye"]
+
+
+def test_properties_know_meaning_default_and_what_may_be_chosen() -> None:
+    draft = watchers()
+    wish = next(node for node in draft.mission if node.tag == "wish")
+    of_wish = {one.name: one for one in properties(draft.mission, wish, {})}
+    assert of_wish["name"].choices == ("scout1", "scout2")
+    assert of_wish["type"].choices == ("scout", "command_radio", "video_frequency", "framegrabber")
+    radio = {one.name: one for one in properties(draft.mission, only(draft, "resource", "radio"), {})}
+    assert (radio["connect-s"].value, radio["connect-s"].default) == (None, "0")
+    assert radio["sharable"].choices == ("true", "false")
+    assert radio["host"].choices == ("base",)
+
+
+# ---------------------------------------------------------------------- files
+def test_an_opened_file_is_saved_to_the_byte(tmp_path: Path) -> None:
+    file = tmp_path / "mission.xml"
+    file.write_bytes(SHIPPED[0].read_bytes())
+    file.chmod(0o640)
+    draft = Draft.opened(str(file))
+    assert not draft.is_changed
+    changed = draft.do(SetValue((), "priority", "11"))
+    assert changed.is_changed
+    kept = save(changed, file)
+    assert not kept.is_changed
+    assert file.read_bytes() == SHIPPED[0].read_bytes().replace(b'priority="10"', b'priority="11"')
+    assert file.stat().st_mode & 0o777 == 0o640
+    assert [one.name for one in tmp_path.iterdir()] == ["mission.xml"]
+
+
+def test_somebody_elses_change_is_not_overwritten_unasked(tmp_path: Path) -> None:
+    file = tmp_path / "mission.xml"
+    draft = save(Draft.new(str(file)), file)
+    file.write_bytes(draft.text + b"<!-- theirs -->")
+    with pytest.raises(FileChanged, match="holds something else"):
+        save(draft.do(SetValue((), "priority", "11")), file)
+    assert file.read_bytes().endswith(b"<!-- theirs -->")
+    assert save(draft, file, overwrite=True).text == file.read_bytes()
+
+
+def test_a_folder_that_is_not_there_refuses_and_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(NotSaved, match="No such file"):
+        save(Draft.new("a.xml"), tmp_path / "no" / "a.xml")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_no_xml_is_told_as_check_tells_it(tmp_path: Path) -> None:
+    file = tmp_path / "mission.xml"
+    file.write_text("<mission")
+    with pytest.raises(MissionInvalid, match=rf"{file}:1:1: no well-formed XML"):
+        Draft.opened(str(file))
