@@ -65,7 +65,7 @@ VALUES = st.text(st.characters(codec="utf-8", exclude_categories=["Cs", "Cc"]), 
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(TEXTS, st.data())
 def test_any_sequence_of_changes_does_to_the_text_what_it_does_to_a_tree(text: bytes, data: st.DataObject) -> None:
     """What is read afterwards is what was meant, comments stand as they stood, the layout is never read."""

@@ -34,6 +34,7 @@ from ui_console.design.draft import (
     Step,
 )
 from ui_console.design.file import NotSaved, save
+from ui_console.design.lines import problem_rows, property_rows, tree_rows
 from ui_console.design.offers import free_name, offers
 from ui_console.design.properties import properties
 
@@ -95,7 +96,7 @@ def commands(draft: Draft) -> st.SearchStrategy[Command]:
     )
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
 @given(START, st.data())
 def test_any_sequence_of_commands_can_be_read_loses_no_comment_and_is_undone_to_the_byte(
     draft: Draft, data: st.DataObject
@@ -349,3 +350,29 @@ def test_what_is_no_xml_is_told_as_check_tells_it(tmp_path: Path) -> None:
     file.write_text("<mission")
     with pytest.raises(MissionInvalid, match=rf"{file}:1:1: no well-formed XML"):
         Draft.opened(str(file))
+
+
+# ---------------------------------------------------------------------- files with faults
+WORDS = st.sampled_from(
+    [b"behavior", b"scout1", b"name=", b"type=", b"5", b"world", b"uses", b"arc", b"capture", b"/>"]
+)
+PUT = st.sampled_from([b"strange", b"", b"x ", b"type=", b"wish", b"-1", b"text</a>"])
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(WORDS, PUT, st.integers(0, 12))
+def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: bytes, put: bytes, which: int) -> None:
+    parts = SHIPPED[0].read_bytes().split(word)
+    at = 1 + which % (len(parts) - 1)
+    text = word.join(parts[:at]) + put + word.join(parts[at:])
+    try:
+        outline(text)
+    except MissionInvalid:
+        return
+    draft = Draft("mission.xml", Step(text))
+    assert len(tree_rows(draft)) == sum(node.tag != "parameter" for node in draft.mission)
+    assert len(problem_rows(draft.problems)) == len(draft.problems)
+    for node in draft.mission:
+        property_rows(properties(draft.mission, node, {}))
+        offers(draft.mission, node.path)
+    assert draft.problems or draft.rehearsal is not None

@@ -295,3 +295,11 @@ def test_every_key_has_a_test_and_says_what_it_does() -> None:
     assert missing == []
     assert len(keys_help()) == len(DesignApp.BINDINGS)
     assert all(len(line) > 25 for line in keys_help())
+
+
+def test_the_how_to_tells_every_key() -> None:
+    names = {"plus": "+", "minus": "-", "greater_than_sign": ">", "less_than_sign": "<", "question_mark": "?"}
+    page = (ROOT / "docs" / "how-to" / "design-a-mission.md").read_text()
+    told = set(re.findall(r"`(\S+)`", "".join(line for line in page.splitlines() if line.startswith("| `"))))
+    keys = [one.key.split(",")[0] for one in DesignApp.BINDINGS if isinstance(one, Binding)]
+    assert {names.get(key, key) for key in keys} <= told
