@@ -13,6 +13,7 @@ Rules of this file:
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -303,16 +304,20 @@ class Draft:
 
     def element_of(self, fault: Fault) -> Path:
         """Return the element a problem is about: the last one that begins before its place."""
-        best: Path = ()
+        positions, paths = self._beginnings
+        return paths[max(0, bisect.bisect_right(positions, (fault.line, fault.column)) - 1)]
+
+    @cached_property
+    def _beginnings(self) -> tuple[list[tuple[int, int]], list[Path]]:
+        """Return line and column of every element in the order of the text, and the elements."""
+        text, line, before = self.text, 1, 0
+        positions, paths = [], []
         for node in self.mission:
-            if _position(self.text, node.begin) <= (fault.line, fault.column):
-                best = node.path
-        return best
-
-
-def _position(text: bytes, at: int) -> tuple[int, int]:
-    begin = text.rfind(b"\n", 0, at) + 1
-    return text.count(b"\n", 0, at) + 1, len(text[begin:at].decode("utf-8-sig")) + 1
+            line, before = line + text.count(b"\n", before, node.begin), node.begin
+            line_begin = text.rfind(b"\n", 0, node.begin) + 1
+            positions.append((line, len(text[line_begin : node.begin].decode("utf-8-sig")) + 1))
+            paths.append(node.path)
+        return positions, paths
 
 
 # ---------------------------------------------------------------------- what commands do

@@ -169,6 +169,16 @@ def test_what_the_text_means_is_what_the_reader_reads(tmp_path: Path) -> None:
     assert draft.description.model_copy(update={"source": draft.source}) == read_mission(draft.source)
 
 
+def test_a_problem_is_about_the_element_it_stands_in() -> None:
+    """Whatever stands before it in its line, and with a byte order mark."""
+    for mark in (b"", b"\xef\xbb\xbf"):
+        text = mark + SHIPPED[0].read_bytes().replace(b'x-m="7.20"', 'x-m="ü"'.encode())
+        draft = Draft("mission.xml", Step(text))
+        (fault,) = draft.problems
+        assert draft.mission.at(draft.element_of(fault)).text("name") == "scout2"
+        assert text.splitlines()[fault.line - 1].decode()[fault.column - 1 :].startswith("x-m=")
+
+
 # ---------------------------------------------------------------------- building
 def test_a_new_mission_is_fine_and_named_as_its_file() -> None:
     assert Draft.new("night-watch.xml").mission.text("name") == "night-watch"
