@@ -447,7 +447,7 @@ def _add_resource(text: bytes, kind: str, name: str) -> Step:
             children.append(_copy(part))
     values = {**shape.attributes, "name": name}
     step = _add(text, section, NewElement("resource", values, children))
-    return Step(_with_bodies(step.text), step.touched)
+    return Step(_with_bodies(step.text, name), step.touched)
 
 
 def _add_world(text: bytes, command: AddWorld) -> Step:
@@ -458,8 +458,13 @@ def _add_world(text: bytes, command: AddWorld) -> Step:
     return Step(_with_bodies(step.text), step.touched)
 
 
-def _with_bodies(text: bytes) -> bytes:
-    """Return a text in which every simulated robot has a body: in a row near the lower wall, looking into the room."""
+def _with_bodies(text: bytes, only: str = "") -> bytes:
+    """Return a text in which simulated robots have bodies: in a row near the lower wall, looking into the room.
+
+    Args:
+        text: The text.
+        only: The one robot that shall get a body; empty: all that have none.
+    """
     world = outline(text).first("world")
     section = outline(text).first("resources")
     if world is None or section is None:
@@ -471,7 +476,7 @@ def _with_bodies(text: bytes) -> bytes:
     for resource in section.all("resource"):
         name = resource.text("name")
         is_simulated = resource.text("driver") in ("", "simulated")
-        if _network_id(resource) is None or not is_simulated or name in bodies:
+        if _network_id(resource) is None or not is_simulated or name in bodies or only not in ("", name):
             continue
         x_m = (BODY_STEP_M * (len(bodies) + 1)) % width_m or width_m / 2
         place = {"name": name, "x-m": f"{x_m:g}", "y-m": f"{min(BODY_STEP_M, depth_m) / 2:g}", "heading-deg": "90"}

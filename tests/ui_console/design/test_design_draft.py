@@ -233,6 +233,14 @@ def test_a_robot_gets_what_it_is_tied_to_the_next_network_id_and_a_body() -> Non
     assert draft.do(Remove(robot.path)).problems == ()
 
 
+def test_a_body_that_was_removed_stays_away() -> None:
+    draft = watchers()
+    draft = draft.do(Remove(only(draft, "scout", "scout1").path)).do(AddResource("scout", "scout3"))
+    world = draft.mission.first("world")
+    assert world is not None
+    assert [body.text("name") for body in world.all("scout")] == ["scout2", "scout3"]
+
+
 def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
     draft = watchers()
     draft = draft.do(Rename(only(draft, "resource", "scout1").path, "spy"))
