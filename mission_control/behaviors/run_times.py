@@ -34,8 +34,8 @@ class RunTimes:
 def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect_s: float, given_s: float) -> RunTimes:
     """Return the run times to ask for.
 
-    A short slice holds the blind beginning and one time to detect: it is as short as still tells something of what is
-    in view already. It can be extended by one more time to detect, when something was glimpsed at its end.
+    A short slice holds the blind beginning and about one time to detect: it is as short as still tells something of
+    what is in view already. It can be extended by one more time to detect, when something was glimpsed at its end.
 
     Args:
         view_s: Shortest time for which what is looked for is in view, seconds.
@@ -46,7 +46,7 @@ def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect
 
     Example:
         >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
-        RunTimes(minimum_s=1.5, maximum_s=2.5)
+        RunTimes(minimum_s=1.25, maximum_s=2.25)
         >>> useful_run_times(view_s=2.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
         RunTimes(minimum_s=5.0, maximum_s=6.0)
 
@@ -57,8 +57,13 @@ def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect
     if not all(math.isfinite(time) and time >= 0 for time in times) or not detect_s or not given_s:
         raise ValueError(f"no run times from {times} s of view, settling, blindness, detection and the mission's own")
     short_pays = view_s > settling_s + blind_s + 2 * detect_s
-    minimum_s = min(given_s, _up(blind_s + detect_s)) if short_pays else given_s
+    minimum_s = min(given_s, max(GRAIN_S, _near(blind_s + detect_s))) if short_pays else given_s
     return RunTimes(minimum_s, _up(minimum_s + detect_s))
+
+
+def _near(time_s: float) -> float:
+    """Return the time in whole grains, rounded."""
+    return round(round(time_s / GRAIN_S) * GRAIN_S, 9)
 
 
 def _up(time_s: float) -> float:

@@ -13,7 +13,7 @@ from mission_control.experiments.geometry import EXTRAS, PASSAGES, SLICE_S, WATC
 Policy = Literal["paper", "adaptive"]
 Order = Literal["active-first", "extra-first", "interleaved"]
 
-CONSOLE_SLICE_S = 3.0  # chosen: less than a target is in view, so that none hides it; long enough to steer by sight
+CONSOLE_SLICE_S = 3.25  # chosen: less than a target is in view, so that none hides it; long enough to steer by sight
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 
 
@@ -53,7 +53,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     order: Order = "active-first"
     driven: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1.0
     noise: Annotated[float, msgspec.Meta(ge=0, le=10)] = 1.0
-    frames_wanted: Annotated[int, msgspec.Meta(ge=1, le=100)] = 6
+    frames_wanted: Annotated[int, msgspec.Meta(ge=1, le=100)] = 7
 
     @property
     def passage(self) -> Passage:

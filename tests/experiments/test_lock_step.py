@@ -95,7 +95,7 @@ def test_watchers_of_the_adaptive_policy_ask_for_what_they_worked_out(tmp_path: 
     run_trial(Condition(policy="adaptive"), 1, 0, trace=file)
     lines = [json.loads(line) for line in file.read_text().splitlines()]
     asked = {line["arc"]: (line["min_run"], line["max_run"]) for line in lines if line["ev"] == "request"}
-    assert asked == dict.fromkeys(("watch-scout1-capture", "watch-scout2-capture"), (1.25, 2.0))
+    assert asked == dict.fromkeys(("watch-scout1-capture", "watch-scout2-capture"), (1.25, 2.25))
     assert lines[0]["discipline"] == "time"
 
 
