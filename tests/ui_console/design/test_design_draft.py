@@ -145,6 +145,8 @@ def test_every_offer_can_be_taken_or_says_why_not_and_touches_what_it_added(draf
         after = draft.do(offer.build(given))
     except Refusal:
         return
+    if after is draft:
+        return  # the behavior has just this ARC already
     assert after.mission.at(after.step.touched).tag in (*offer.label.split(), "behavior", "resource")
 
 
