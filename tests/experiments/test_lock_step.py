@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
 from pathlib import Path
-from typing import Any
 
 import pytest
+from trace_judge import judge
 
 from mission_control.experiments.conditions import PAPERS, Condition
 from mission_control.experiments.harness import run_all
 from mission_control.experiments.surveillance import TrialOrder, run_order, run_surveillance
 from mission_control.experiments.trial import Trial, run_trial
-
-ROOT = Path(__file__).parents[2]
-
-
-def judge() -> Any:
-    path = Path(os.environ.get("SCOUT_TRACE_CHECK", ROOT.parent / "shared" / "trace" / "trace_check.py"))
-    if not path.is_file():
-        pytest.skip(f"the judge of traces is not at {path}; name it in SCOUT_TRACE_CHECK")
-    spec = importlib.util.spec_from_file_location("trace_check", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def sound(trial: Trial) -> Trial:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from trace_judge import judge
 
 from backbone.bus.clock import run_virtual
 from backbone.component_database.messages import UnknownType
@@ -19,18 +18,6 @@ from backbone.placer.messages import AskPlacement, ListPlacements, NotPlaced, Pl
 from resource_pool.simulation.whole_mission import MissionFell, RunningMission, mission_in_one_process
 
 ROOT = Path(__file__).parents[2]
-
-
-def judge() -> Any:
-    path = Path(os.environ.get("SCOUT_TRACE_CHECK", ROOT.parent / "shared" / "trace" / "trace_check.py"))
-    if not path.is_file():
-        pytest.skip(f"the judge of traces is not at {path}; name it in SCOUT_TRACE_CHECK")
-    spec = importlib.util.spec_from_file_location("trace_check", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")

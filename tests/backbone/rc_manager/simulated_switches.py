@@ -9,15 +9,12 @@ from __future__ import annotations
 import copy
 import functools
 import heapq
-import importlib.util
 import itertools
-import os
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import pytest
+from trace_judge import judge
 
 from backbone.rc_manager.decisions import (
     ConnectArc,
@@ -211,18 +208,3 @@ def _up_to_date(module: ModuleType) -> Any:
                 self._cache.clear()
 
     return UpToDate
-
-
-@functools.cache
-def judge() -> ModuleType:
-    """Return the independent judge of traces, as a module; skip the test if it is not on this machine."""
-    beside = Path(__file__).resolve().parents[4] / "shared" / "trace" / "trace_check.py"
-    path = Path(os.environ.get("SCOUT_TRACE_CHECK", beside))
-    if not path.is_file():
-        pytest.skip(f"the judge of traces is not at {path}; name it in SCOUT_TRACE_CHECK")
-    spec = importlib.util.spec_from_file_location("trace_check", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
