@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 SLOW_WEIGHT = 0.08  # chosen: a standing body is forgotten after about half a second
-FAST_WEIGHT = 0.3  # chosen: light that changed meanwhile is a third learned, a body that passes stays below the bar
 FAST_FRAMES = 8  # chosen: 0.27 s at 30 frames a second, the price of every swap-in
+MOVING_SHARE = 0.25  # chosen: of the first pictures; where more than so many differ from the others, something passes
 LEAST_DIFFERENCE = 28.0  # chosen: grey levels; above the blurred noise of a 13 dB link
 MEAN_DIFFERENCES = 4.5  # chosen: in units of the mean difference, so that a noisy link raises the bar
 ROW_SHARE = 0.55  # chosen: a torn row changes as a whole, a body never fills more than half of one
@@ -222,6 +222,9 @@ class MotionDetector:
     def _settle(self, picture: NDArray[np.float32]) -> None:
         """Take one of the first pictures after a swap; after the last of them there is an average again.
 
+        Where these pictures agree, the scene stands still, and is learned as it is now: who left or came meanwhile
+        does not move. Where they do not agree something passes, and the old view stays to tell it from.
+
         If enough of them show the old view, only those count; otherwise the view is new, and a slipped picture
         cannot be told from a turned robot. Their median is taken, which a few bad ones do not move; while most of
         them are not like it, one more picture is waited for.
@@ -238,7 +241,8 @@ class MotionDetector:
             del self._fresh[0]
             return
         if old is not None and counted is same:
-            cv2.accumulateWeighted(median, old, FAST_WEIGHT)
+            differ = sum(cv2.absdiff(median, fresh) > LEAST_DIFFERENCE for fresh in counted)
+            np.copyto(old, median, where=differ <= MOVING_SHARE * len(counted))
         else:
             self._average = median
         self._fresh.clear()

@@ -114,6 +114,16 @@ def test_after_a_swap_a_changed_view_is_learned_without_an_alarm() -> None:
     assert not any(look_at([room(2)] * 60, detector))
 
 
+@pytest.mark.parametrize("stood_frames", [5, 15, 40])
+def test_who_left_or_came_while_the_robot_was_away_does_not_move_now(stood_frames: int) -> None:
+    """What the slice before ended with may be gone, what was not there may stand there: neither is an alarm."""
+    detector = MotionDetector()
+    look_at([room()] * 30 + [with_block(room(), 120)] * stood_frames, detector)
+    for now in (room(), with_block(room(), 200)):
+        detector.swapped_in()
+        assert not any(look_at([now] * 40, detector))
+
+
 def test_the_view_is_remembered_over_a_swap() -> None:
     """What moves right after the swap is found as soon as the fast frames are over."""
     detector = MotionDetector()
