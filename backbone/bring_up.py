@@ -41,6 +41,7 @@ from backbone.creator.messages import (
     RestartPolicy,
     creator_name,
 )
+from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError, LinkError, Refusal
@@ -355,7 +356,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
         "component_database": lambda _: {"types": types},
         "placer": lambda _: {},
-        "creator": lambda host: {"tags": list(host.tags)},
+        "creator": lambda host: {"tags": list(host.tags), "preload": arc_modules(description.types)},
         "dependency_database": lambda _: {"resources": resources},
         "rc_manager": lambda _: {
             **description.core_parameters("rc_manager"),

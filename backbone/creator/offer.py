@@ -9,14 +9,15 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from backbone import run_files
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
-from backbone.component_database.messages import ListTypes, Types, UnknownType
+from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import TYPE, ProcessFell, RestartPolicy, creator_name
+from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.naming import Subsystem, legal
@@ -51,17 +52,19 @@ async def offer(mission: str, endpoint: str, host: str, tags: Sequence[str]) -> 
         asyncio.get_running_loop().add_signal_handler(number, end)
     try:
         keeper.use(bus)
+        answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
+        types = [counted.component_type for counted in answered.types]
         launch = Launch(
             mission=mission,
             subsystem=Subsystem.BACKBONE,
             name=creator_name(host),
             type=TYPE,
-            class_path=await _creator_class(bus),
+            class_path=_creator_class(types),
             host=host,
             endpoint=endpoint,
             clock_origin_monotonic_s=clock.origin_monotonic_s,
             clock_rate=clock.rate,
-            parameters={"tags": list(tags)},
+            parameters={"tags": list(tags), "preload": arc_modules(types)},
             requester=source,
             run_directory=str(directory),
         )
@@ -73,14 +76,13 @@ async def offer(mission: str, endpoint: str, host: str, tags: Sequence[str]) -> 
         await zygote.close()
 
 
-async def _creator_class(bus: ZenohBus) -> str:
+def _creator_class(types: Iterable[ComponentType]) -> str:
     """Return the class of creators in this mission.
 
     Raises:
         UnknownType: The mission has no type ``creator``.
     """
-    types = (await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)).types
-    found = [counted.component_type.class_path for counted in types if counted.component_type.name == TYPE]
+    found = [component_type.class_path for component_type in types if component_type.name == TYPE]
     if not found:
         raise UnknownType(f"the mission has no component type {TYPE!r}")
     return found[0]

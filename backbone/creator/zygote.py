@@ -33,6 +33,7 @@ from backbone.creator.zygote_process import (
     Kill,
     ZygoteSettings,
     frame,
+    fresh_interpreter,
     log_path,
     serve,
 )
@@ -41,7 +42,6 @@ from backbone.errors import BackboneError
 log = logging.getLogger(__name__)
 
 FORK_TRIES = 2  # chosen: a zygote killed while it forks is replaced once; twice in a row is no accident
-_FRESH = "from backbone.creator.zygote_process import main; main()"
 _answer_decoder = msgspec.msgpack.Decoder(Answer)
 
 
@@ -257,7 +257,7 @@ def _spawn(settings: ZygoteSettings) -> _Body:
             path.parent.mkdir(parents=True, exist_ok=True)
             output = path.open("ab")
         process = subprocess.Popen(  # noqa: S603  our own interpreter, our own program
-            [sys.executable, "-c", _FRESH, str(its.fileno()), msgspec.json.encode(settings).decode()],
+            fresh_interpreter(its.fileno(), settings),
             pass_fds=[its.fileno()],
             stdin=subprocess.DEVNULL,
             stdout=output,

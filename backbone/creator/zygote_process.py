@@ -134,6 +134,12 @@ def main() -> NoReturn:
     serve(socket.socket(fileno=int(sys.argv[1])), settings)
 
 
+def fresh_interpreter(descriptor: int, settings: ZygoteSettings) -> list[str]:
+    """Return the command that runs ``main`` in an interpreter of its own."""
+    program = f"from {__name__} import main; main()"
+    return [sys.executable, "-c", program, str(descriptor), msgspec.json.encode(settings).decode()]
+
+
 @dataclass(frozen=True, slots=True)
 class _Sweep:
     """A component that has ended and of which something may be left.
@@ -185,15 +191,33 @@ class _ZygoteProcess:
             sys.path[:] = self._settings.import_path
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a second thread must not be there at a fork
         for module in self._settings.preload:
-            try:
-                importlib.import_module(module)
-            except ImportError as error:  # the component that needs it will say so itself
-                log.warning("not preloaded: %s", error)
+            self._preload(module)
         gc.collect()
         gc.freeze()  # the collector would write into pages the components share
         self._channel.setblocking(False)
         self._selector.register(self._channel, selectors.EVENT_READ)
         self._selector.register(self._signals, selectors.EVENT_READ)
+
+    def _preload(self, module: str) -> None:
+        try:
+            importlib.import_module(module)
+        except Exception as error:  # the component that needs it will say so itself
+            log.warning("%s is not preloaded: %r", module, error)
+        if process_table.threads() > 1:
+            log.warning("%s starts threads when it is imported, and a process with threads cannot fork", module)
+            self._begin_anew_without(module)
+
+    def _begin_anew_without(self, module: str) -> NoReturn:
+        """Go on as a fresh interpreter that has not imported the module; orders that wait are still to be read."""
+        settings = msgspec.structs.replace(
+            self._settings,
+            preload=tuple(other for other in self._settings.preload if other != module),
+            import_path=tuple(sys.path),
+        )
+        self._channel.set_inheritable(True)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os.execv(sys.executable, fresh_interpreter(self._channel.fileno(), settings))  # noqa: S606  our own program
 
     # Orders
     def _read_orders(self) -> None:

@@ -1,0 +1,53 @@
+"""A zygote imports beforehand what it is told, and stays able to fork whatever those modules do."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+
+from backbone.component.launch import Launch
+from backbone.component.process import EXIT_REFUSED
+from backbone.creator.zygote import Zygote
+from backbone.naming import Subsystem
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(60)]
+
+MODULES = {
+    "arc_that_is_well": "",
+    "arc_with_a_bug": "1 / 0",
+    "arc_with_a_thread": "import threading, time\nthreading.Thread(target=time.sleep, args=(60,), daemon=True).start()",
+    "another_arc": "",
+}
+PROBE = """
+import json, os, sys
+from pathlib import Path
+found = {"modules": [m for m in %r if m in sys.modules], "threads": len(os.listdir("/proc/self/task"))}
+Path(__file__).with_suffix(".json").write_text(json.dumps(found))
+"""
+
+
+async def test_what_fails_or_starts_threads_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, text in {**MODULES, "probe": PROBE % list(MODULES)}.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    zygote = await Zygote.spawn_fresh(run_directory=str(tmp_path / "run"), preload=MODULES)
+    ended: asyncio.Future[tuple[int, int]] = asyncio.get_running_loop().create_future()
+    zygote.on_exit = lambda pid, code: ended.set_result((pid, code))
+    try:
+        before = zygote.pid
+        launch = Launch("m", Subsystem.BACKBONE, "one", "one", "probe:NoComponent", "here", "tcp/127.0.0.1:1", 0.0, 1.0)
+        pid = await zygote.fork(launch)
+        assert await asyncio.wait_for(ended, 20) == (pid, EXIT_REFUSED)
+        told = (tmp_path / "run" / "log" / "zygote.log").read_text()
+        assert zygote.pid == before
+    finally:
+        await zygote.close()
+    assert json.loads((tmp_path / "probe.json").read_text()) == {
+        "modules": ["arc_that_is_well", "another_arc"],
+        "threads": 1,
+    }
+    assert "arc_with_a_bug is not preloaded" in told
+    assert "arc_with_a_thread starts threads" in told
