@@ -9,7 +9,15 @@ import tempfile
 from pathlib import Path
 
 from backbone.errors import Refusal
-from ui_console.design.draft import Draft, FileChanged
+from ui_console.design.commands import DesignRefused
+from ui_console.design.draft import Draft
+
+
+class FileChanged(DesignRefused):
+    """The file is no longer what was opened or saved last."""
+
+    code = "design.file_changed"
+    remedy = "Save it under another name, or save again to overwrite."
 
 
 class NotSaved(Refusal):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from backbone.mission.edit import NewElement, Node, Path
 from backbone.mission.schema import vocabulary
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
-from ui_console.design.draft import (
+from ui_console.design.commands import (
     Add,
     AddBehavior,
     AddResource,

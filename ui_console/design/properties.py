@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from backbone.mission.edit import Node, Path
 from backbone.mission.schema import enumerations, vocabulary
 from ui_console.design.catalogue import ClassFacts, Role, entries
-from ui_console.design.draft import Command, Rename, SetParameter, SetValue
+from ui_console.design.commands import Command, Rename, SetParameter, SetValue
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
 WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "scout")

@@ -1,6 +1,6 @@
 """The designer in a terminal: tree, properties, problems or the first minute, and keys for all of it.
 
-Widgets are thin: what may be added is in ``offers``, what may be set in ``properties``, what commands do in ``draft``.
+Widgets are thin: what may be added is in ``offers``, what may be set in ``properties``, what commands do in ``effects``.
 """
 
 from __future__ import annotations
@@ -20,10 +20,11 @@ from textual.widgets import Footer, Static
 from backbone.errors import Refusal
 from backbone.mission.edit import Node, Path
 from ui_console.design.catalogue import ClassFacts, TypeEntry, description, entries, stock_classes
+from ui_console.design.commands import Command, Move, Remove, SetValue
 from ui_console.design.dialogs import CSS as DIALOG_CSS
 from ui_console.design.dialogs import Ask, Picker, Reading, Sure
-from ui_console.design.draft import Command, Draft, FileChanged, Move, Remove, SetValue
-from ui_console.design.file import save
+from ui_console.design.draft import Draft
+from ui_console.design.file import FileChanged, save
 from ui_console.design.lines import key_of, path_of, problem_rows, property_rows, rehearsal_rows, tree_rows
 from ui_console.design.offers import Asked, Offer, offers
 from ui_console.design.properties import Property, properties

@@ -13,7 +13,7 @@ from backbone.errors import Refusal
 from backbone.mission.edit import NewElement, Node, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
-from ui_console.design.draft import (
+from ui_console.design.commands import (
     Add,
     AddBehavior,
     AddResource,
@@ -22,8 +22,6 @@ from ui_console.design.draft import (
     Claim,
     Command,
     DesignRefused,
-    Draft,
-    FileChanged,
     Move,
     NameTaken,
     NothingToUndo,
@@ -31,9 +29,10 @@ from ui_console.design.draft import (
     Rename,
     SetParameter,
     SetValue,
-    Step,
 )
-from ui_console.design.file import NotSaved, save
+from ui_console.design.draft import Draft
+from ui_console.design.effects import Step
+from ui_console.design.file import FileChanged, NotSaved, save
 from ui_console.design.lines import problem_rows, property_rows, tree_rows
 from ui_console.design.offers import free_name, offers
 from ui_console.design.properties import properties

@@ -1,0 +1,372 @@
+"""What commands do: a text and a command in, another text and what was touched out.
+
+Pure. The text is the only truth: what stands where is read from it anew for each change.
+
+Rules of this file:
+
+* A command is done whole or refused whole. A refusal is typed and says what to do.
+* Refused is what cannot be written or would lose what was meant: a place, a name that is another's. What is
+  only wrong yet, an empty section, a wish for nobody, is a problem, told as ``scout-backbone check`` tells it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from backbone.mission.edit import NewElement, Node, Path, add, move, outline, place_for, remove, set_attribute
+from backbone.mission.report import told
+from backbone.mission.tables import NETWORK_ID, WORLD
+from backbone.naming import legal
+from ui_console.design.catalogue import stock_resource, stock_type
+from ui_console.design.commands import (
+    Add,
+    AddBehavior,
+    AddResource,
+    AddType,
+    AddWorld,
+    Claim,
+    Command,
+    DesignRefused,
+    Move,
+    NameTaken,
+    Remove,
+    Rename,
+    SetParameter,
+    SetValue,
+)
+
+LAST_NETWORK_ID = 254  # as the reader has it
+BODY_STEP_M = 1.0  # chosen: so far apart the first places of robots are, half of it from the wall; none touch
+WORLD_NAMED_BY = (WORLD, "localizer")  # parameters whose value is the world's name
+RADIO_RATE = {"period-s": "0.1", "packet-time-s": "0.002"}  # chosen: as mission.xml, a fiftieth of a radio
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One state of the text.
+
+    Attributes:
+        text: The bytes of the file.
+        touched: What was added or changed last; the cursor belongs there.
+    """
+
+    text: bytes
+    touched: Path = ()
+
+
+def carry_out(step: Step, command: Command) -> Step:
+    """Return the text after a command, and what it touched.
+
+    Raises:
+        Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: it cannot be done.
+    """
+    match command:
+        case Add(parent, element, at):
+            return _add(step.text, parent, element, at)
+        case AddType(name):
+            return _add_type(step.text, name)
+        case AddBehavior():
+            return _add_behavior(step.text, command)
+        case Claim():
+            return _claim(step.text, command)
+        case AddResource(kind, name):
+            return _add_resource(step.text, kind, name)
+        case AddWorld():
+            return _add_world(step.text, command)
+        case Remove(path):
+            return _remove(step.text, path)
+        case Move(path, parent, at):
+            return _move(step.text, path, parent, at)
+        case SetValue(path, attribute, value):
+            return Step(set_attribute(step.text, path, attribute, value), path)
+        case SetParameter():
+            return _set_parameter(step.text, command)
+        case Rename(path, name):
+            return _rename(step.text, path, name)
+
+
+def _add(text: bytes, parent: Path, element: NewElement, at: int | None = None) -> Step:
+    node = outline(text).at(parent)
+    after = add(text, parent, element, at)
+    return Step(after, (*parent, place_for(node, element.tag, at)))
+
+
+def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
+    """Return a text that has this section of the mission, and where it stands."""
+    root = outline(text)
+    found = root.first(tag)
+    if found is None:
+        text = add(text, (), NewElement(tag))
+        found = outline(text).first(tag)
+    if found is None:
+        raise AssertionError(f"<{tag}> was added and is not there")
+    return text, found.path
+
+
+def _add_type(text: bytes, name: str) -> Step:
+    text, section = _section(text, "types")
+    for declared in outline(text).at(section).all("type"):
+        if declared.text("name") == name:
+            return Step(text, declared.path)
+    known = stock_type(name)
+    if known is None:
+        raise DesignRefused(
+            f"no type {told(name)} is declared, and the project brings none along",
+            remedy="Add a <type> with its class first.",
+        )
+    for other in dict.fromkeys([*known.text("uses").split(), *(needed.text("type") for needed in known.all("needs"))]):
+        if stock_type(other) is not None:
+            text = _add_type(text, other).text
+    return _add(text, section, _copy(known))
+
+
+def _copy(node: Node) -> NewElement:
+    return NewElement(node.tag, dict(node.attributes), [_copy(child) for child in node.children])
+
+
+def _add_behavior(text: bytes, command: AddBehavior) -> Step:
+    _free(outline(text), "behavior", command.name)
+    parent = command.parent
+    if outline(text).at(parent).tag == "mission":
+        text, parent = _section(text, "behaviors")
+    marked = _Marked(text, parent)
+    text = _add_type(marked.text, command.type).text
+    values = {"type": command.type, "name": command.name, "priority": str(command.priority)}
+    return _add(text, marked.now(text), NewElement("behavior", values))
+
+
+class _Marked:
+    """Finds an element again after other sections of the file were added or filled."""
+
+    def __init__(self, text: bytes, path: Path) -> None:
+        self.text, self._below = text, path[1:]
+        root = outline(text)
+        self._tag = root.at(path[:1]).tag if path else ""
+        self._before = sum(child.tag == self._tag for child in root.children[: path[0]]) if path else 0
+
+    def now(self, text: bytes) -> Path:
+        return (*outline(text).all(self._tag)[self._before].path, *self._below) if self._tag else ()
+
+
+def _claim(text: bytes, command: Claim) -> Step:
+    node = outline(text).at(command.behavior)
+    if node.tag != "behavior":
+        raise DesignRefused(f"a <{node.tag}> claims no ARC", remedy="Pick a behavior.")
+    marked = _Marked(text, command.behavior)
+    text = _add_type(text, command.kind).text
+    path = marked.now(text)
+    arc = outline(text).at(path).first("arc")
+    if arc is not None:
+        text = set_attribute(text, arc.path, "kind", command.kind)
+        return Step(set_attribute(text, arc.path, "minimum-runtime-s", command.minimum_runtime_s), arc.path)
+    values = {"kind": command.kind, "minimum-runtime-s": command.minimum_runtime_s, **RADIO_RATE}
+    return _add(text, path, NewElement("arc", values))
+
+
+def _add_resource(text: bytes, kind: str, name: str) -> Step:
+    _free(outline(text), "resource", name)
+    text = _add_type(text, kind).text
+    text, section = _section(text, "resources")
+    root = outline(text)
+    shape = stock_resource(kind)
+    if shape is None:
+        return _add(text, section, NewElement("resource", {"type": kind, "name": name}))
+    children = []
+    for part in shape.children:
+        if part.tag == "uses":
+            there = [
+                one.text("name") for one in root.at(section).all("resource") if one.text("type") == part.text("type")
+            ]
+            if there:
+                children.append(NewElement("uses", {"type": part.text("type"), "name": there[0]}))
+        elif part.text("name") == NETWORK_ID:
+            children.append(NewElement("parameter", {"name": NETWORK_ID, "value": str(_free_network_id(root))}))
+        else:
+            children.append(_copy(part))
+    values = {**shape.attributes, "name": name}
+    step = _add(text, section, NewElement("resource", values, children))
+    return Step(_with_bodies(step.text, name), step.touched)
+
+
+def _add_world(text: bytes, command: AddWorld) -> Step:
+    marked = _Marked(text, ())
+    text = _add_type(marked.text, "simulated_world").text
+    room = NewElement("room", {"width-m": command.width_m, "depth-m": command.depth_m})
+    step = _add(text, (), NewElement("world", {"name": "world", "type": "simulated_world"}, [room]))
+    return Step(_with_bodies(step.text), step.touched)
+
+
+def _with_bodies(text: bytes, only: str = "") -> bytes:
+    """Return a text in which simulated robots have bodies: in a row near the lower wall, looking into the room.
+
+    Args:
+        text: The text.
+        only: The one robot that shall get a body; empty: all that have none.
+    """
+    world = outline(text).first("world")
+    section = outline(text).first("resources")
+    if world is None or section is None:
+        return text
+    bodies = [body.text("name") for body in world.all("scout")]
+    room = world.first("room")
+    depth_m = _number(room.text("depth-m") if room is not None else "", 2.0)
+    width_m = _number(room.text("width-m") if room is not None else "", 2.0)
+    for resource in section.all("resource"):
+        name = resource.text("name")
+        is_simulated = resource.text("driver") in ("", "simulated")
+        if _network_id(resource) is None or not is_simulated or name in bodies or only not in ("", name):
+            continue
+        x_m = (BODY_STEP_M * (len(bodies) + 1)) % width_m or width_m / 2
+        place = {"name": name, "x-m": f"{x_m:g}", "y-m": f"{min(BODY_STEP_M, depth_m) / 2:g}", "heading-deg": "90"}
+        text = add(text, world.path, NewElement("scout", place))
+        bodies.append(name)
+    return text
+
+
+def _number(value: str, otherwise: float) -> float:
+    try:
+        found = float(value)
+    except ValueError:
+        return otherwise
+    return found if 0 < found <= 1000 else otherwise
+
+
+def _network_id(resource: Node) -> str | None:
+    return next((one.text("value") for one in resource.all("parameter") if one.text("name") == NETWORK_ID), None)
+
+
+def _free_network_id(root: Node) -> int:
+    taken = {_network_id(node) for node in root if node.tag == "resource"}
+    free = next((number for number in range(1, LAST_NETWORK_ID + 1) if str(number) not in taken), None)
+    if free is None:
+        raise DesignRefused(f"all {LAST_NETWORK_ID} network ids are taken", remedy="Remove a robot first.")
+    return free
+
+
+def _remove(text: bytes, path: Path) -> Step:
+    node = outline(text).at(path)
+    text = remove(text, path)
+    if node.tag == "resource":
+        world = outline(text).first("world")
+        bodies = (
+            [] if world is None else [body for body in world.all("scout") if body.text("name") == node.text("name")]
+        )
+        marked = _Marked(text, path[:-1])
+        for body in bodies[:1]:
+            text = remove(text, body.path)
+        parent = marked.now(text)
+    else:
+        parent = path[:-1]
+    siblings = outline(text).at(parent).children
+    return Step(text, (*parent, min(path[-1], len(siblings) - 1)) if siblings else parent)
+
+
+def _move(text: bytes, path: Path, parent: Path, at: int) -> Step:
+    root = outline(text)
+    node = root.at(path)
+    after = move(text, path, parent, at)
+    depth = len(path) - 1
+    if len(parent) > depth and parent[:depth] == path[:-1] and parent[depth] > path[-1]:
+        parent = (*parent[:depth], parent[depth] - 1, *parent[depth + 1 :])
+    target = outline(after).at(parent)
+    number = min(max(at, 0), len(target.children) - 1)
+    if target.children[number].tag != node.tag:
+        raise AssertionError(f"<{node.tag}> was moved and is not where it should be")
+    return Step(after, (*parent, number))
+
+
+def _set_parameter(text: bytes, command: SetParameter) -> Step:
+    node = outline(text).at(command.path)
+    found = next((one for one in node.all("parameter") if one.text("name") == command.name), None)
+    if found is None:
+        if command.value is None:
+            return Step(text, command.path)
+        new = NewElement("parameter", {"name": command.name, "value": command.value})
+        return Step(add(text, command.path, new), command.path)
+    if command.value is None:
+        return Step(remove(text, found.path), command.path)
+    return Step(set_attribute(text, found.path, "value", command.value), command.path)
+
+
+# ---------------------------------------------------------------------- names
+def _free(root: Node, tag: str, name: str) -> None:
+    """Refuse a name that is illegal, or another's of its kind.
+
+    Raises:
+        IllegalName: It does not follow the rule for names.
+        NameTaken: Another has it.
+    """
+    legal(name)
+    kinds = _ONE_SPACE if tag in _ONE_SPACE else (tag,)
+    for node in root:
+        if node.tag in kinds and node.text("name") == name and _is_named(root, node):
+            raise NameTaken(f"a {node.tag} has the name {told(name)} already")
+
+
+_ONE_SPACE = ("resource", "behavior", "world")  # components of the mission, which all have different names
+
+
+def _is_named(root: Node, node: Node) -> bool:
+    """Say whether the element has a name of its own, so is no mention of another's."""
+    return node.tag not in ("wish", "uses", "parameter") and node is not root
+
+
+def _rename(text: bytes, path: Path, name: str) -> Step:
+    root = outline(text)
+    node = root.at(path)
+    old = node.text("name")
+    if name == old:
+        return Step(text, path)
+    if node.tag in ("wish", "uses", "parameter"):
+        return Step(set_attribute(text, path, "name", name), path)
+    if node.tag == "scout" and old:
+        owner = next((one for one in root if one.tag == "resource" and one.text("name") == old), None)
+        node = owner or node
+    _free(root, node.tag, name)
+    text = set_attribute(text, node.path, "name", name)
+    for other, attribute, value in _mentions(root, node, old, name):
+        text = set_attribute(text, other.path, attribute, value)
+    return Step(text, path)
+
+
+def _mentions(root: Node, node: Node, old: str, new: str) -> Iterator[tuple[Node, str, str]]:
+    """Yield each element that refers to another by its name, the attribute, and what that shall be."""
+    find = _MENTIONS.get(node.tag)
+    for other in root:
+        for attribute in [] if find is None else find(node, other):
+            words = other.text(attribute).split()
+            if old and old in words:
+                yield other, attribute, " ".join(new if word == old else word for word in words)
+
+
+def _of_type(_node: Node, other: Node) -> list[str]:
+    match other.tag:
+        case "service" | "resource" | "world" | "behavior" | "needs" | "wish" | "uses":
+            return ["type"]
+        case "arc":
+            return ["kind"]
+        case "type":
+            return ["uses"]
+        case _:
+            return []
+
+
+def _of_resource(node: Node, other: Node) -> list[str]:
+    if other.tag == "scout":
+        return ["name"]
+    is_mention = other.tag in ("wish", "uses") and other.text("type") == node.text("type")
+    return ["name"] if is_mention else []
+
+
+def _of_world(_node: Node, other: Node) -> list[str]:
+    return ["value"] if other.tag == "parameter" and other.text("name") in WORLD_NAMED_BY else []
+
+
+_MENTIONS: dict[str, Callable[[Node, Node], list[str]]] = {
+    "host": lambda _node, other: ["host"] if other.tag in ("service", "resource", "world") else [],
+    "type": _of_type,
+    "resource": _of_resource,
+    "world": _of_world,
+    "target": lambda _node, other: ["carried-by"] if other.tag == "scout" else [],
+}
