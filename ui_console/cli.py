@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ui_console.console_events import ConsoleEvent
     from ui_console.design.draft import Draft
     from ui_console.observer import Observer
-    from ui_console.web.protocol import Pass
+    from ui_console.web.door import Pass
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
@@ -149,7 +149,7 @@ def serve(
     connect: Connect = None,
 ) -> None:
     """Serve the console as a web page, for browsers, tablets and phones."""
-    from ui_console.web.protocol import WrongOperator, passes_for, read_operator
+    from ui_console.web.door import WrongOperator, passes_for, read_operator
 
     try:
         passes = passes_for([read_operator(one) for one in operator or []], priority)
@@ -301,11 +301,12 @@ async def _look_once(mission: str | None, connect: str | None, user: str) -> int
 async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, Pass], site: _Site) -> int:
     import msgspec
 
+    from ui_console.web.door import Doorkeeper
     from ui_console.web.hub import WebHub
-    from ui_console.web.protocol import Doorkeeper
 
     try:
-        from ui_console.web.server import CannotListen, WebServer
+        from ui_console.web.reception import CannotListen
+        from ui_console.web.server import WebServer
     except ModuleNotFoundError as missing:
         say(f"{missing.name} is not installed; install scout-backbone[web]")
         return ExitCode.USAGE

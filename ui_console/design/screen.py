@@ -1,6 +1,7 @@
 """The designer in a terminal: tree, properties, problems or the first minute, and keys for all of it.
 
-Widgets are thin: what may be added is in ``offers``, what may be set in ``properties``, what commands do in ``effects``.
+Widgets are thin: what may be added is in ``offers``, what may be set in ``properties``, what commands do in
+``effects``.
 """
 
 from __future__ import annotations

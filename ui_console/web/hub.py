@@ -27,10 +27,11 @@ from ui_console.observer import Observer
 from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.teleoperation import Teleoperation
 from ui_console.views import AlarmKind
+from ui_console.web.door import Fault, Offence, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
 from ui_console.web.pictures import jpeg, packet
-from ui_console.web.protocol import Fault, Offence, Welcome
+from ui_console.web.protocol import Intent
 
 log = logging.getLogger(__name__)
 
@@ -60,7 +61,7 @@ class WebHub:
         self.clock = clock
         self.team = TeamModel(launch.mission)
         self.observer: Observer[NoParameters] = Observer(launch, bus, clock, show=self._heard, user=launch.name)
-        self.operators: dict[Operator, None] = {}
+        self.guests: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False)
         self._launch, self._bus, self._join = launch, bus, join
         self._kind, self._away_after_s = kind, away_after_s
@@ -77,7 +78,7 @@ class WebHub:
     def enter(self, welcome: Welcome) -> Operator:
         """Return a new operator, who is told everything there is."""
         operator = Operator(self, welcome)
-        self.operators[operator] = None
+        self.guests[operator] = None
         welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
         self._tell_tables([operator.outbox])
@@ -87,13 +88,21 @@ class WebHub:
         self.attention_changed()
         return operator
 
-    async def leave(self, operator: Operator, reason: str) -> None:
+    async def leave(self, guest: Operator, reason: str) -> None:
         """Let an operator go: the wheels stop, the robot is given back."""
-        self.operators.pop(operator, None)
-        if not self.operators:
+        self.guests.pop(guest, None)
+        if not self.guests:
             self._somebody.clear()
-        await operator.leave(reason)
-        self._say("web", f"{operator.welcome.user} left: {reason}")
+        await guest.leave(reason)
+        self._say("web", f"{guest.welcome.user} left: {reason}")
+
+    async def obey(self, guest: Operator, intent: Intent) -> None:
+        """Do what an operator asks; what takes time goes on beside."""
+        guest.obey(intent)
+
+    def refused(self, guest: Operator) -> None:
+        """Stop the wheels of an operator that is thrown out."""
+        guest.stop()
 
     def offended(self, who: str, offence: Offence) -> None:
         """Have the operators know of a visitor that did what it must not.
@@ -117,8 +126,8 @@ class WebHub:
             await self._somebody.wait()
             now_s = self.clock.now_s()
             if turn % TEAM_EVERY == 0:
-                self._tell_tables([operator.outbox for operator in self.operators])
-            for operator in self.operators:
+                self._tell_tables([operator.outbox for operator in self.guests])
+            for operator in self.guests:
                 operator.refresh(now_s)
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
@@ -143,7 +152,7 @@ class WebHub:
 
     def watching_changed(self) -> None:
         """Listen to the pictures that somebody watches and that somebody's grant delivers, and to no others."""
-        watched = {robot for operator in self.operators for robot in operator.outbox.watched}
+        watched = {robot for operator in self.guests for robot in operator.outbox.watched}
         wanted = {robot: arc for robot, arc in self._arcs.items() if robot in watched}
         for robot, (arc, stream) in list(self._streams.items()):
             if wanted.get(robot) != arc:
@@ -154,7 +163,7 @@ class WebHub:
 
     def attention_changed(self) -> None:
         """Note whether anybody at all looks after the mission."""
-        self.team.alarms.attention(any(one.is_there for one in self.operators), self.clock.now_s())
+        self.team.alarms.attention(any(one.is_there for one in self.guests), self.clock.now_s())
 
     # ------------------------------------------------------------------ within
     def _heard(self, event: ConsoleEvent) -> None:
@@ -163,7 +172,7 @@ class WebHub:
             rcs = event.schedule.rcs
             self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
             self.watching_changed()
-            for operator in self.operators:
+            for operator in self.guests:
                 operator.schedule_heard()
 
     def _listen(self, robot: str, arc: str) -> Subscription:
@@ -176,7 +185,7 @@ class WebHub:
         return self._bus.subscribe(at, Conversation.FRAMES, Frame, arrived, latest=True)
 
     def _show_picture(self, frame: Frame) -> None:
-        watchers = [operator for operator in self.operators if frame.robot in operator.outbox.watched]
+        watchers = [operator for operator in self.guests if frame.robot in operator.outbox.watched]
         if not watchers:
             return
         number = self._numbers[frame.robot] = self._numbers.get(frame.robot, 0) + 1

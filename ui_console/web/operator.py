@@ -25,6 +25,7 @@ from ui_console.observer import Observer
 from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
 from ui_console.views import view_json
+from ui_console.web.door import Welcome
 from ui_console.web.outbox import Outbox
 from ui_console.web.protocol import (
     Acknowledge,
@@ -43,7 +44,6 @@ from ui_console.web.protocol import (
     StopWheels,
     TakeOver,
     Watch,
-    Welcome,
 )
 
 log = logging.getLogger(__name__)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ui_console.web.protocol import (
+from ui_console.web.door import (
     BURST,
     FAULTS_FORGIVEN,
     LOGIN_WITHIN_S,
@@ -17,33 +17,29 @@ from ui_console.web.protocol import (
     RATE_HZ,
     Doorkeeper,
     Fault,
-    LetGo,
     Offence,
     Pass,
-    SetParameter,
-    Steer,
-    StopWheels,
     Visitor,
-    Watch,
     Welcome,
     WrongOperator,
     new_token,
     passes_for,
     read_operator,
 )
+from ui_console.web.protocol import Intent, LetGo, SetParameter, Steer, StopWheels, Watch, understand
 
 TOKEN = "the-right-one"  # noqa: S105  opens nothing
 
 
-def visitor(granted: Pass | None = None, now_s: float = 0.0) -> Visitor:
-    return Visitor(Doorkeeper({TOKEN: granted or Pass("", 100)}), now_s)
+def visitor(granted: Pass | None = None, now_s: float = 0.0) -> Visitor[Intent]:
+    return Visitor(Doorkeeper({TOKEN: granted or Pass("", 100)}), understand, now_s)
 
 
 def hello(**more: Any) -> bytes:
     return json.dumps({"do": "hello", "token": TOKEN, **more}).encode()
 
 
-def welcomed() -> Visitor:
+def welcomed() -> Visitor[Intent]:
     one = visitor()
     assert isinstance(one.heard(hello(user="anna"), 0.0), Welcome)
     return one

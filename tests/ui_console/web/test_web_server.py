@@ -27,10 +27,11 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import Holder, RcView, Schedule
 from resource_pool.messages import Drive, Halt
-from ui_console.web import server as web_server
+from ui_console.web import reception
+from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Pass
 from ui_console.web.hub import WebHub
-from ui_console.web.protocol import MAX_MESSAGE_BYTES, Doorkeeper, Pass
-from ui_console.web.server import CannotListen, WebServer
+from ui_console.web.reception import CannotListen
+from ui_console.web.server import WebServer
 
 MISSION = "web-test"
 HIGH, LOW, ANYBODY = "high-token", "low-token", "anybody"
@@ -217,7 +218,7 @@ async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back
         anna.socket.transport.abort()
         await stage.placer.wait(lambda: arc.released)
         assert isinstance(arc.commands[-1][2], Halt)
-        await stage.placer.wait(lambda: not stage.hub.operators)
+        await stage.placer.wait(lambda: not stage.hub.guests)
 
 
 async def test_who_loses_the_robot_is_told_who_took_it_and_why(stage: Stage) -> None:
@@ -258,7 +259,7 @@ async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: S
             await anna.wait(lambda: len(anna.view.get("robots", [])) == 3, "robots")
             await anna.say(do="watch", robots=[*robots, "scout9"])
             await ben.say(do="watch", robots=["scout2"])
-            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.operators) == 5)
+            await stage.placer.wait(lambda: sum(len(one.outbox.watched) for one in stage.hub.guests) == 5)
             for number in range(40):
                 for arc in arcs.values():
                     arc.publish(bytes([number]) * (WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, number)
@@ -270,7 +271,7 @@ async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: S
             await anna.wait(lambda: len(anna.view["drawn"]) == 3, "the latency from lens to screen")
             await anna.say(do="watch", robots=[])
             await ben.say(do="watch", robots=[])
-            await stage.placer.wait(lambda: not any(one.outbox.watched for one in stage.hub.operators))
+            await stage.placer.wait(lambda: not any(one.outbox.watched for one in stage.hub.guests))
             packed = stage.hub.pictures_packed
             arcs["scout2"].publish(bytes(WIDTH_PX * HEIGHT_PX), WIDTH_PX, HEIGHT_PX, 99)
             await stage.clock.sleep_s(0.1)
@@ -348,9 +349,9 @@ async def test_others_do_not_notice_one_that_stops_reading(stage: Stage) -> None
             for said in ({"do": "hello", "token": LOW}, {"do": "take", "robot": "scout2"}):
                 body = json.dumps(said).encode()
                 deaf.sendall(bytes([0x81, 0x80 | len(body)]) + bytes(4) + body)  # masked with zeros
-            await stage.placer.wait(lambda: len(stage.hub.operators) == 2)
+            await stage.placer.wait(lambda: len(stage.hub.guests) == 2)
             await anna.wait(lambda: anna.has_alarm("ben at 127.0.0.1 has read nothing"), "alarm")
-            await stage.placer.wait(lambda: len(stage.hub.operators) == 1)
+            await stage.placer.wait(lambda: len(stage.hub.guests) == 1)
             await stage.placer.wait(lambda: not stage.placer.arcs)
         finally:
             deaf.close()
@@ -369,11 +370,11 @@ async def test_who_says_nothing_at_all_is_let_go(stage: Stage) -> None:
 @pytest.mark.parametrize("limit", ["MOST_OPERATORS", "MOST_STRANGERS"])
 async def test_only_so_many_are_served(stage: Stage, monkeypatch: pytest.MonkeyPatch, limit: str) -> None:
     async with stage.browser() as anna, stage.connection():
-        monkeypatch.setattr(web_server, limit, 1)
+        monkeypatch.setattr(reception, limit, 1)
         with pytest.raises(InvalidStatus, match="503"):
             async with stage.connection():
                 pytest.fail("was let in")
-        await anna.wait(lambda: anna.has_alarm("found 1 operators and 1 strangers there"), "alarm")
+        await anna.wait(lambda: anna.has_alarm("found 1 guests and 1 strangers there"), "alarm")
 
 
 async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage) -> None:
@@ -417,7 +418,7 @@ async def test_why_is_answered(stage: Stage) -> None:
 async def test_the_recording_says_who_came_and_who_left(stage: Stage) -> None:
     async with stage.browser(ANYBODY, user="Carla"):
         pass
-    await stage.placer.wait(lambda: not stage.hub.operators)
+    await stage.placer.wait(lambda: not stage.hub.guests)
     await stage.placer.wait(lambda: any("Carla left" in row.what for row in stage.hub.team.log()))
     told = [row.what for row in stage.hub.team.log() if row.subject == "web"]
     assert told == ["Carla came, with priority 10", "Carla left: the browser has gone away"]

@@ -1,0 +1,238 @@
+"""Who comes in, and what is heard of them: bytes and a time in, a typed intent or a typed offence out.
+
+Rules of this file: no socket, no bus, no clock; times are seconds of the machine, which never run backwards.
+
+* Nothing but the token is understood before the token was right, and it must come within ``LOGIN_WITHIN_S``.
+* An offence that is fatal is the last thing heard of a visitor: whatever comes after it means nothing.
+* Who says more than ``RATE_HZ`` for longer than ``BURST`` messages floods; nobody's message makes another's wait.
+"""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, Generic, TypeVar
+
+import msgspec
+
+MAX_MESSAGE_BYTES = 4096  # chosen: ten times what a parameter's value is
+LOGIN_WITHIN_S = 5.0  # chosen: a page sends the token as soon as it is connected
+RATE_HZ = 200.0  # chosen: 20 drives a second, and 30 drawn pictures a second of each of four robots, leave a third
+BURST = 200.0  # chosen: what a page that was held up for a second says at once
+FAULTS_FORGIVEN = 5  # chosen: an old page in a browser's memory is told to reload, not thrown out
+TOKEN_BYTES = 24  # chosen: 192 bits; nobody guesses them
+
+MAX_USER = 63  # as long as a component's name
+ShortText = Annotated[str, msgspec.Meta(max_length=MAX_USER)]
+IntentT = TypeVar("IntentT")
+"""What a page of this kind may ask for."""
+
+
+class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="hello"):
+    """The first message: who is there.
+
+    Attributes:
+        token: As printed where the server was started.
+        user: Who it is, for the record; a token that was made for somebody has that name instead.
+        priority: Asked for; the token's own is the most.
+    """
+
+    token: Annotated[str, msgspec.Meta(max_length=256)]
+    user: ShortText = ""
+    priority: int | None = None
+
+
+class Fault(StrEnum):
+    """What a visitor did wrong."""
+
+    TOKEN = "token"  # noqa: S105  the word for it, not one
+    LATE = "late"  # no token in time
+    OVERSIZED = "oversized"
+    MALFORMED = "malformed"
+    FLOOD = "flood"
+    SLOW = "slow"  # does not read what it is sent
+    CROWD = "crowd"  # too many visitors
+    ORIGIN = "origin"  # a page of another site
+
+
+@dataclass(frozen=True, slots=True)
+class Offence:
+    """A message that is not obeyed.
+
+    Attributes:
+        fault: Of which kind.
+        line: What happened, for people; without the visitor's own words.
+        remedy: What to do about it.
+        is_fatal: True: the connection has to end.
+    """
+
+    fault: Fault
+    line: str
+    remedy: str
+    is_fatal: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Welcome:
+    """The token was right.
+
+    Attributes:
+        user: Who it is.
+        priority: Of the robots this visitor takes over.
+    """
+
+    user: str
+    priority: int
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """What a token is good for.
+
+    Attributes:
+        user: Whom it is for; empty: whoever has it says a name.
+        priority: The most that may be asked for.
+    """
+
+    user: str
+    priority: int
+
+
+class Doorkeeper:
+    """Knows the tokens."""
+
+    def __init__(self, passes: Mapping[str, Pass]) -> None:
+        self._passes = {token.encode(): granted for token, granted in passes.items()}
+
+    def open_with(self, token: str) -> Pass | None:
+        """Return what the token is good for; takes as long for a wrong one as for a right one of its length."""
+        found = None
+        for known, granted in self._passes.items():
+            if hmac.compare_digest(known, token.encode("utf-8", "surrogatepass")):
+                found = granted
+        return found
+
+
+def new_token() -> str:
+    """Return a token nobody can guess."""
+    return secrets.token_urlsafe(TOKEN_BYTES)
+
+
+def passes_for(operators: Iterable[tuple[str, int]], priority: int) -> dict[str, Pass]:
+    """Return new tokens: one for each operator with a priority of their own, else one for all."""
+    named = [Pass(user, own) for user, own in operators]
+    return {new_token(): granted for granted in named or [Pass("", priority)]}
+
+
+class WrongOperator(ValueError):
+    """An operator is not written as ``NAME=PRIORITY``."""
+
+
+def read_operator(text: str) -> tuple[str, int]:
+    """Return an operator's name and priority.
+
+    Raises:
+        WrongOperator: It is not ``NAME=PRIORITY``, with a whole number from 0.
+
+    Example:
+        >>> read_operator("anna=120")
+        ('anna', 120)
+    """
+    user, _equals, priority = text.rpartition("=")
+    if not 0 < len(user) <= MAX_USER or not priority.isdecimal():
+        raise WrongOperator(f"{text!r} is not NAME=PRIORITY, such as anna=120")
+    return user, int(priority)
+
+
+class Visitor(Generic[IntentT]):
+    """One connection, from the first byte on.
+
+    Args:
+        doorkeeper: Knows the tokens.
+        understand: Decodes a message; raises ``msgspec.DecodeError`` if it means nothing.
+        now_s: When it connected.
+    """
+
+    def __init__(
+        self, doorkeeper: Doorkeeper, understand: Callable[[bytes | str], Hello | IntentT], now_s: float
+    ) -> None:
+        self._understand = understand
+        self._doorkeeper, self._came_s = doorkeeper, now_s
+        self._room, self._room_at_s = BURST, now_s
+        self._faults = 0
+        self.welcome: Welcome | None = None
+        """None until the token was right."""
+        self.is_out = False
+        """True after a fatal offence."""
+
+    @property
+    def must_log_in_by_s(self) -> float | None:
+        """When the token must have come; None: it has."""
+        return None if self.welcome is not None else self._came_s + LOGIN_WITHIN_S
+
+    def heard(self, data: str | bytes, now_s: float) -> Welcome | IntentT | Offence | None:
+        """Return what a message means; None: nothing any more.
+
+        Args:
+            data: One message as it came.
+            now_s: When.
+        """
+        if self.is_out:
+            return None
+        if not self._has_room(now_s):
+            return self._out(Fault.FLOOD, f"sent more than {RATE_HZ:.0f} messages a second", "Reload the page.")
+        if len(data) > MAX_MESSAGE_BYTES:
+            return self.oversized()
+        try:
+            said = self._understand(data)
+        except (msgspec.DecodeError, UnicodeError, RecursionError):
+            return self._malformed()
+        if isinstance(said, Hello):
+            return self._log_in(said) if self.welcome is None else self._malformed()
+        if self.welcome is None:
+            return self._out(Fault.TOKEN, "spoke before it showed a token", "Open the address that serve printed.")
+        return said
+
+    def oversized(self) -> Offence:
+        """Return what to make of a message that was too long to be read."""
+        return self._out(Fault.OVERSIZED, f"sent a message of more than {MAX_MESSAGE_BYTES} bytes", "Reload the page.")
+
+    def late(self) -> Offence:
+        """Return what to make of a visitor without a token at ``must_log_in_by_s``."""
+        return self._out(Fault.LATE, f"showed no token within {LOGIN_WITHIN_S:.0f} s", "Load the page again.")
+
+    def slow(self, behind_s: float) -> Offence:
+        """Return what to make of a visitor that reads nothing."""
+        line = f"has read nothing for {behind_s:.0f} s"
+        return self._out(Fault.SLOW, line, "Come closer to the access point, or show fewer pictures.")
+
+    def _log_in(self, hello: Hello) -> Welcome | Offence:
+        granted = self._doorkeeper.open_with(hello.token)
+        if granted is None:
+            return self._out(Fault.TOKEN, "showed a wrong token", "Open the address that serve printed.")
+        user = granted.user or " ".join(hello.user.split()) or "somebody"
+        wished = granted.priority if hello.priority is None else hello.priority
+        self.welcome = Welcome(user, min(max(wished, 0), granted.priority))
+        return self.welcome
+
+    def _has_room(self, now_s: float) -> bool:
+        self._room = min(BURST, self._room + RATE_HZ * (now_s - self._room_at_s))
+        self._room_at_s = now_s
+        if self._room < 1.0:
+            return False
+        self._room -= 1.0
+        return True
+
+    def _malformed(self) -> Offence:
+        self._faults += 1
+        line = "sent a message that means nothing"
+        if self.welcome is None or self._faults > FAULTS_FORGIVEN:
+            return self._out(Fault.MALFORMED, line, "Load the page again, without the browser's memory.")
+        return Offence(Fault.MALFORMED, line, "Load the page again, without the browser's memory.", is_fatal=False)
+
+    def _out(self, fault: Fault, line: str, remedy: str) -> Offence:
+        self.is_out = True
+        return Offence(fault, line, remedy)

@@ -1,0 +1,277 @@
+"""Sockets of a page: connections in, messages to and fro; what they mean is decided elsewhere."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Sized
+from contextlib import asynccontextmanager
+from typing import Generic, Protocol, TypeVar
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import CloseCode
+from websockets.http11 import Request, Response
+
+from backbone.errors import Refusal
+from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Fault, Hello, IntentT, Offence, Visitor, Welcome
+from ui_console.web.outbox import Outbox
+from ui_console.web.site import SOCKET_PATH, Answer, Site, is_own_page
+
+OPEN_WITHIN_S = 5.0  # chosen: a request is a few lines
+PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
+READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
+CLOSE_WITHIN_S = 1.0  # chosen: who does not say goodbye is cut off
+MOST_OPERATORS = 32  # chosen: more browsers than a team has people
+MOST_STRANGERS = 16  # chosen: who has shown no token yet; apart, so that they never take an operator's place
+MOST_UNREAD = 8  # messages read ahead of what is obeyed
+SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
+FATAL_CODES = {
+    Fault.OVERSIZED: CloseCode.MESSAGE_TOO_BIG,
+    Fault.MALFORMED: CloseCode.INVALID_DATA,
+    Fault.SLOW: CloseCode.TRY_AGAIN_LATER,
+    Fault.CROWD: CloseCode.TRY_AGAIN_LATER,
+}
+KEEPALIVE_REASON = "keepalive ping timeout"
+
+
+class CannotListen(Refusal):
+    """The address cannot be had."""
+
+    code = "web.address"
+    remedy = "Choose another address with --host, or another port with --port."
+
+
+class Guest(Protocol):
+    """A person at a page, from the right token to the end of the connection."""
+
+    welcome: Welcome
+    outbox: Outbox
+    news: asyncio.Event
+    """Set when there is something to send."""
+
+
+GuestT = TypeVar("GuestT", bound=Guest)
+HeardT_contra = TypeVar("HeardT_contra", contravariant=True)
+
+
+class House(Protocol[GuestT, HeardT_contra]):
+    """What is behind the door."""
+
+    @property
+    def guests(self) -> Sized:
+        """Who is there."""
+
+    def enter(self, welcome: Welcome) -> GuestT:
+        """Return a new guest."""
+
+    async def obey(self, guest: GuestT, intent: HeardT_contra) -> None:
+        """Do what a guest asks; nothing more is heard of that guest until it is done."""
+
+    def refused(self, guest: GuestT) -> None:
+        """A guest did what ends its visit; what it set going ends now."""
+
+    async def leave(self, guest: GuestT, reason: str) -> None:
+        """Let a guest go."""
+
+    def offended(self, who: str, offence: Offence) -> None:
+        """Have the guests know of a visitor that did what it must not."""
+
+
+class Reception(Generic[GuestT, IntentT]):
+    """Serves a page and its socket.
+
+    Args:
+        house: Whom the guests come to.
+        doorkeeper: Knows the tokens.
+        site: The page.
+        understand: Decodes what the page says.
+    """
+
+    def __init__(
+        self,
+        house: House[GuestT, IntentT],
+        doorkeeper: Doorkeeper,
+        site: Site,
+        understand: Callable[[bytes | str], Hello | IntentT],
+    ) -> None:
+        self._house, self._doorkeeper, self._site, self._understand = house, doorkeeper, site, understand
+        self._strangers = 0
+
+    @asynccontextmanager
+    async def open(self, host: str, port: int) -> AsyncIterator[Server]:
+        """Let browsers come, until left or the server is closed.
+
+        Args:
+            host: Address to listen at.
+            port: Port; 0: any that is free.
+
+        Raises:
+            CannotListen: The address cannot be had.
+        """
+        async with await self._listen(host, port) as server:
+            yield server
+
+    async def _listen(self, host: str, port: int) -> Server:
+        try:
+            return await serve(
+                self._meet,
+                host,
+                port,
+                process_request=self._answer,
+                compression=None,
+                server_header=None,
+                open_timeout=OPEN_WITHIN_S,
+                ping_interval=PING_EVERY_S,
+                ping_timeout=READ_WITHIN_S,
+                close_timeout=CLOSE_WITHIN_S,
+                max_size=MAX_MESSAGE_BYTES,
+                max_queue=MOST_UNREAD,
+                write_limit=SEND_AHEAD_BYTES,
+            )
+        except OSError as error:
+            raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the file asked for; None: it is the page's socket."""
+        if request.path.partition("?")[0] != SOCKET_PATH:
+            return _response(self._site.answer(request.path, request.headers.get("If-None-Match", "")))
+        if not is_own_page(request.headers.get("Origin", ""), request.headers.get("Host", "")):
+            remedy = "Close that page; only this server's own may connect."
+            self._house.offended(_who(connection), Offence(Fault.ORIGIN, "shows a page of another site", remedy))
+            return connection.respond(403, "A page of another site may not connect.\n")
+        if len(self._house.guests) >= MOST_OPERATORS or self._strangers >= MOST_STRANGERS:
+            line = f"found {len(self._house.guests)} guests and {self._strangers} strangers there"
+            self._house.offended("a browser", Offence(Fault.CROWD, line, "Close some pages."))
+            return connection.respond(503, "Too many are connected.\n")
+        return None
+
+    async def _meet(self, connection: ServerConnection) -> None:
+        """Serve one connection to its end."""
+        visitor = Visitor(self._doorkeeper, self._understand, _now_s())
+        self._strangers += 1
+        try:
+            welcome = await self._wait_welcome(connection, visitor)
+        finally:
+            self._strangers -= 1
+        if welcome is not None:
+            await self._serve(connection, visitor, welcome)
+
+    async def _wait_welcome(self, connection: ServerConnection, visitor: Visitor[IntentT]) -> Welcome | None:
+        try:
+            async with asyncio.timeout_at(visitor.must_log_in_by_s):
+                said = visitor.heard(await connection.recv(), _now_s())
+        except TimeoutError:
+            said = visitor.late()
+        except ConnectionClosed as closed:
+            if _was_oversized(closed):
+                self._house.offended(_who(connection), visitor.oversized())
+            return None
+        if isinstance(said, Welcome):
+            return said
+        if isinstance(said, Offence):
+            await self._refuse(connection, _who(connection), said)
+        return None
+
+    async def _serve(self, connection: ServerConnection, visitor: Visitor[IntentT], welcome: Welcome) -> None:
+        guest = self._house.enter(welcome)
+        who = f"{welcome.user} at {_who(connection)}"
+        writing = asyncio.create_task(self._write(connection, visitor, guest, who), name=f"web: to {who}")
+        reason = "the browser has gone away"
+        try:
+            reason = await self._read(connection, visitor, guest, who)
+        finally:
+            writing.cancel()
+            await self._house.leave(guest, reason)
+            await asyncio.wait({writing})
+        if not writing.cancelled():
+            writing.result()
+
+    async def _read(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> str:
+        """Obey the browser until the connection ends; return why it did."""
+        while True:
+            try:
+                data = await connection.recv()
+            except ConnectionClosed as closed:
+                return self._farewell(visitor, closed, who)
+            said = visitor.heard(data, _now_s())
+            match said:
+                case Offence():
+                    if said.is_fatal:
+                        self._house.refused(guest)
+                    await self._refuse(connection, who, said)
+                    if said.is_fatal:
+                        return said.line
+                case Welcome() | None:
+                    continue
+                case _:
+                    await self._house.obey(guest, said)
+
+    def _farewell(self, visitor: Visitor[IntentT], closed: ConnectionClosed, who: str) -> str:
+        if _was_oversized(closed):
+            offence = visitor.oversized()
+        elif closed.sent is not None and closed.sent.reason == KEEPALIVE_REASON:
+            offence = visitor.slow(READ_WITHIN_S)
+        else:
+            return "the browser has gone away"
+        self._house.offended(who, offence)
+        return offence.line
+
+    async def _write(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> None:
+        """Send what is newest whenever the browser takes it; one that takes nothing is cut off."""
+        outbox, news = guest.outbox, guest.news
+        try:
+            while True:
+                news.clear()
+                message = outbox.next(_now_s())
+                if message is None:
+                    await _wait_news(news, outbox.next_s())
+                    continue
+                async with asyncio.timeout(READ_WITHIN_S):
+                    await connection.send(message)
+        except TimeoutError:
+            self._house.offended(who, visitor.slow(READ_WITHIN_S))
+            connection.transport.abort()
+        except ConnectionClosed:
+            return
+
+    async def _refuse(self, connection: ServerConnection, who: str, offence: Offence) -> None:
+        self._house.offended(who, offence)
+        if offence.is_fatal:
+            code = FATAL_CODES.get(offence.fault, CloseCode.POLICY_VIOLATION)
+            await connection.close(code, f"You {offence.line}. {offence.remedy}"[:120])
+
+
+def port_of(server: Server) -> int:
+    """Return the port at which browsers can come."""
+    port: int = next(iter(server.sockets)).getsockname()[1]
+    return port
+
+
+async def _wait_news(news: asyncio.Event, until_s: float | None) -> None:
+    """Return when there is news, or at this time of the machine."""
+    try:
+        async with asyncio.timeout_at(until_s):
+            await news.wait()
+    except TimeoutError:
+        return
+
+
+def _was_oversized(closed: ConnectionClosed) -> bool:
+    return closed.sent is not None and closed.sent.code == CloseCode.MESSAGE_TOO_BIG
+
+
+def _who(connection: ServerConnection) -> str:
+    peer = connection.remote_address
+    return str(peer[0]) if peer else "somebody"
+
+
+def _now_s() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def _response(answer: Answer) -> Response:
+    headers = Headers({**answer.headers, "Content-Length": str(len(answer.body)), "Connection": "close"})
+    return Response(
+        answer.status, {200: "OK", 304: "Not Modified", 404: "Not Found"}[answer.status], headers, answer.body
+    )
