@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.companion import Companion
 from backbone.component.messages import Stop, Stopping
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
 from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
@@ -132,7 +132,8 @@ class ArcClient:
         self.granted: Resumed | None = None
         self.suspended: Suspended | None = None
         self._bus, self._listener, self._not_now = bus, listener, not_now
-        self._granted = asyncio.Event()
+        self._granted, self._suspended = asyncio.Event(), asyncio.Event()
+        self._suspended.set()
         self._frames: Subscription | None = None
 
     @classmethod
@@ -201,7 +202,7 @@ class ArcClient:
         order = Start(kind, self.arc, parameters)
         await self._bus.ask(PLACER, order, Started, within_s=START_TIME_S)
 
-    async def keep(self, clock: Clock, kind: str, parameters: dict[str, Any]) -> None:
+    async def keep(self, clock: Clock, kind: str, parameters: dict[str, Any], *, rests: bool = False) -> None:
         """Claim the ARC, and claim it again whenever it is gone, until cancelled.
 
         The listener hears ``arc_suspended`` with the reason ``lost`` for a grant that ended with its ARC.
@@ -210,12 +211,17 @@ class ArcClient:
             clock: The mission's time.
             kind: As for ``claim``.
             parameters: Made by ``claim_parameters``.
+            rests: The ARC was started with these parameters before and rests: it is only told that time is wanted
+                again, unless it is gone.
 
         Raises:
             Refusal: The ARC could not be started or its request can never be served.
         """
+        is_there = rests and await self._wake()
         while True:
-            await self._start_anew(clock, kind, parameters)
+            if not is_there:
+                await self._start_anew(clock, kind, parameters)
+            is_there = False
             companion = Companion(self._bus, self.address)
             agreeing = asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree")
             try:
@@ -243,6 +249,7 @@ class ArcClient:
                 await self._lost()
                 self.granted, self.suspended = notice, None
                 self._granted.set()
+                self._suspended.clear()
                 await self._listener.arc_resumed(notice)
             case SliceEnds():
                 return Noted(self._not_now() if self._not_now is not None and self.granted is not None else 0.0)
@@ -253,6 +260,7 @@ class ArcClient:
                     return Noted()
                 self.granted, self.suspended = None, notice
                 self._granted.clear()
+                self._suspended.set()
                 await self._listener.arc_suspended(notice)
             case AskBeat(state=state):
                 if state is not None and state.arc == self.arc:
@@ -313,6 +321,22 @@ class ArcClient:
         """Say that no time is wanted now, or that it is wanted again."""
         await self._say(WantIdle(idle))
 
+    async def rest(self) -> None:
+        """Give the RCs back and keep the ARC, which wants no time until it is kept with ``rests``.
+
+        When: while it is granted; an ARC that waits could just be about to be. Nothing is held afterwards, and to ask
+        again takes no new process.
+
+        Raises:
+            LinkError: The ARC did not confirm it; release it.
+        """
+        await self.idle()
+        try:
+            async with asyncio.timeout(REPLY_TIME_S):
+                await self._suspended.wait()
+        except TimeoutError:
+            raise ReplyTimeout(f"{self.arc} still holds its RCs {REPLY_TIME_S:g} s after it was told to rest") from None
+
     async def want_runtime(self, minimum_runtime_s: float, maximum_runtime_s: float = 0.0) -> None:
         """Ask for other run times from the next slice on."""
         await self._say(WantRuntime(minimum_runtime_s, maximum_runtime_s))
@@ -331,6 +355,15 @@ class ArcClient:
             await self._bus.ask(PLACER, StopComponent(self.arc, reason), Ended, within_s=START_TIME_S)
         except Refusal as refusal:
             log.info("%s was gone already: %s", self.arc, refusal.detail)
+
+    async def _wake(self) -> bool:
+        """Have an ARC that rests ask again; return False if it is not certain that it does."""
+        try:
+            await self.idle(False)
+        except (LinkError, Refusal) as error:
+            log.info("%s does not wake up: %s", self.arc, error)
+            return False
+        return True
 
     async def _start_anew(self, clock: Clock, kind: str, parameters: dict[str, Any]) -> None:
         """Start the ARC; one that an earlier life of the owner left behind is ended first."""

@@ -44,6 +44,7 @@ from resource_pool.messages import (
     Suspended,
     Suspending,
     SwappedOut,
+    WantIdle,
 )
 
 WITHIN_S = 5.0
@@ -59,6 +60,7 @@ class FakeArc:
         self.commands: list[tuple[float, int, Message]] = []
         self.refusal: Refusal | None = None
         self.released = ""
+        self.is_idle = False
         self.rcs = {"scout": parameters["wish"].get("scout", "scout3"), "framegrabber": "grabber1"}
         bus.serve(self.address, ArcQuestion | Stop, self._answer)
         bus.declare_alive(self.address)
@@ -98,6 +100,11 @@ class FakeArc:
         match asked.body:
             case Release(reason=reason):
                 self.granted, self.released = False, reason
+                return Accepted()
+            case WantIdle(idle=idle):
+                self.is_idle = idle
+                if idle and self.granted:
+                    self.bus.start(self.suspend("self", "", deadline_s=0.0))
                 return Accepted()
             case Stop():
                 return Stopping()

@@ -141,6 +141,9 @@ def serve(
         list[str] | None,
         typer.Option(help="NAME=PRIORITY: a token for this operator alone; again for each. Default: one for all."),
     ] = None,
+    design: Annotated[
+        str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
+    ] = "",
     kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim.")] = KINDS["terminal"],
     away_after: Annotated[
         float, typer.Option(help="Give a robot back when its operator touched nothing for so many seconds; 0: never.")
@@ -148,7 +151,7 @@ def serve(
     mission: Mission = None,
     connect: Connect = None,
 ) -> None:
-    """Serve the console as a web page, for browsers, tablets and phones."""
+    """Serve the console, or with --design the mission designer, as a web page: for browsers, tablets and phones."""
     from ui_console.web.door import WrongOperator, passes_for, read_operator
 
     try:
@@ -156,7 +159,13 @@ def serve(
     except WrongOperator as wrong:
         say(f"--operator {wrong}")
         raise typer.Exit(ExitCode.USAGE) from wrong
-    run(lambda: _serve(mission, connect, passes, _Site(host, port, kind, away_after)))
+    site = _Site(host, port, kind, away_after)
+    if design:
+        if mission is not None or connect is not None:
+            say("--design serves a mission file; --mission and --connect are for missions that are up")
+            raise typer.Exit(ExitCode.USAGE)
+        run(lambda: _serve_design(design, passes, site))
+    run(lambda: _serve(mission, connect, passes, site))
 
 
 @app.command()
@@ -237,7 +246,7 @@ async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[
     )
     bus = await _open_bus(launch, clock)
     see = session.see if sees else None
-    console = Teleoperation(launch, bus, clock, show=session.show, see=see, user=looks.user)
+    console = Teleoperation(launch, bus, clock, show=session.show, see=see, keeps_arc=True, user=looks.user)
     _end_on_signals(console)
     await session.run(console)
     if console.refusal is not None and console.given_back is None:
@@ -320,19 +329,54 @@ async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, 
     hub = WebHub(launch, bus, clock, join, kind=site.kind, away_after_s=site.away_after_s)
     interrupted = _end_on_signals(hub.observer)
 
-    def ready(port: int) -> None:
-        for token, granted in passes.items():
-            who = f"{granted.user}: " if granted.user else ""
-            _write_line(f"{who}http://{_shown(site.host)}:{port}/#token={token}".encode())
-        if site.host not in LOOPBACK:
-            say("whoever can listen on the way to this address can read what is sent: use it on networks you trust")
-
     try:
-        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, ready)
+        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, lambda port: _tell_where(site, port, passes))
     except CannotListen:
         await bus.close()
         raise
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+
+
+async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> int:
+    from backbone.bus.clock import MissionClock
+    from backbone.mission.reader import MissionInvalid
+    from ui_console.design.look_up import look_up
+    from ui_console.web.design_room import DesignRoom
+    from ui_console.web.door import Doorkeeper
+
+    try:
+        from ui_console.web.design_server import DesignServer, begin
+    except ModuleNotFoundError as missing:
+        say(f"{missing.name} is not installed; install scout-backbone[web]")
+        return ExitCode.USAGE
+    try:
+        draft, kept = begin(file)
+    except MissionInvalid as invalid:
+        say(str(invalid))
+        return ExitCode.MISSION_INVALID
+    if kept.path.exists():
+        say(f"goes on with what was not saved, from {kept.path}")
+    end, came = asyncio.Event(), set[signal.Signals]()
+
+    def ended(number: signal.Signals) -> None:
+        came.add(number)
+        end.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, ended, number)
+    room = DesignRoom(draft, kept, look_up, MissionClock.started_now())
+    server = DesignServer(room, Doorkeeper(passes))
+    await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end)
+    return ExitCode.INTERRUPTED if signal.SIGINT in came else ExitCode.DONE
+
+
+def _tell_where(site: _Site, port: int, passes: Mapping[str, Pass]) -> None:
+    """Print the page's address for each token, as soon as browsers can come."""
+    for token, granted in passes.items():
+        who = f"{granted.user}: " if granted.user else ""
+        _write_line(f"{who}http://{_shown(site.host)}:{port}/#token={token}".encode())
+    if site.host not in LOOPBACK:
+        say("whoever can listen on the way to this address can read what is sent: use it on networks you trust")
 
 
 def _shown(host: str) -> str:

@@ -86,6 +86,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         work: Run once the console is ready, instead of waiting for somebody to end it; its end is the console's.
         takes: Claim at once.
         watches: Also tell what happens to others.
+        keeps_arc: Keep the ARC when the robot is given back, so that it is there at once when it is taken again.
         user: Who drives, for the record; empty: the console's name.
     """
 
@@ -103,14 +104,18 @@ class Teleoperation(Observer[TeleoperationParameters]):
         work: Callable[[Teleoperation], Awaitable[None]] | None = None,
         takes: bool = True,
         watches: bool = True,
+        keeps_arc: bool = False,
         user: str = "",
     ) -> None:
         super().__init__(launch, bus, clock, show=show, watches=watches, user=user)
-        self._see, self._work, self._takes = see, work, takes
+        self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
+        self._claimed: tuple[str, dict[str, Any]] | None = None
+        self._rests = False
         self._keeping: asyncio.Task[None] | None = None
         self._frames: Subscription | None = None
-        self._releasing = False
+        self._giving_back = asyncio.Lock()
+        self._is_asking = self._takes_next = False
         self._asked_s = 0.0
         self._grants = 0
         self._decided = asyncio.Event()
@@ -131,7 +136,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     @property
     def is_held(self) -> bool:
         """True while commands pass."""
-        return self._arc is not None and self._arc.granted is not None
+        return self._keeping is not None and self._arc is not None and self._arc.granted is not None
 
     @property
     def is_ready(self) -> bool:
@@ -139,17 +144,26 @@ class Teleoperation(Observer[TeleoperationParameters]):
         return self.state is LifeState.READY
 
     def take(self) -> None:
-        """Claim the robot, unless it is claimed or just being given back."""
-        if self._keeping is not None or self._releasing:
+        """Claim the robot unless it is claimed; if it is just being given back, right afterwards."""
+        if self._giving_back.locked():
+            self._takes_next = True
+            self._decided.clear()
             return
-        wished = self.parameters
-        self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
+        if self._is_asking:
+            return
+        wished, rested = self.parameters, self._arc
+        claim = (wished.kind, self._claim_parameters())
+        self._rests = self._rests and self._claimed == claim
+        if not self._rests:
+            self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
+        arc, self._claimed, self._is_asking = self._arc, claim, True
+        assert arc is not None  # noqa: S101  what rests is there
         if self._see is not None:
-            self._frames = self._arc.frames(self._saw)
+            self._frames = arc.frames(self._saw)
         self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None
         self._decided.clear()
         self.show(Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
-        self._keeping = self.start_task(self._keep(self._arc), "arc")
+        self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
     async def switch(self, robot: str) -> None:
         """Claim another robot in place of the one that is claimed, which is stopped and given back first.
@@ -160,8 +174,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         async with self._switching:
             if robot != self._next_robot or (robot == self.parameters.robot and self._keeping is not None):
                 return
-            await self.give_back(f"{self.user} takes {robot}")
             self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+            await self.give_back(f"{self.user} takes {robot}", for_good=True)
             self.take()
 
     def touch(self) -> None:
@@ -211,7 +225,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def do(self, command: Command) -> bool:
         """Have one command carried out and tell what became of it; return True if it was applied."""
-        if self._arc is None:
+        if self._arc is None or self._rests:
             return False
         wanted_s = time.perf_counter()
         try:
@@ -236,28 +250,58 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Give the robot back without waiting for it."""
         self.start_task(self.give_back(), "release")
 
-    async def give_back(self, reason: str = "released") -> None:
-        """Give the robot back; afterwards the console watches until the next ``take``."""
+    async def give_back(self, reason: str = "released", *, for_good: bool = False) -> None:
+        """Give the robot back; afterwards the console watches until the next ``take``.
+
+        Args:
+            reason: For people.
+            for_good: End the ARC also if the console keeps it otherwise.
+        """
+        async with self._giving_back:
+            if self._arc is not None and (self._is_asking or for_good):
+                await self._give_back(self._arc, reason, for_good=for_good)
+        if self._takes_next and self.is_ready:
+            self._takes_next = False
+            self.take()
+
+    async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool) -> None:
         keeping, self._keeping = self._keeping, None
-        if keeping is None or self._arc is None:
-            return
-        self._releasing = True
         self._dead_man = DeadMan()
-        keeping.cancel()
-        await asyncio.wait({keeping})
+        if keeping is not None:
+            keeping.cancel()
+            await asyncio.wait({keeping})
+        confirmed = await self._let_go(arc, reason, for_good=for_good)
+        if self._frames is not None:
+            self._frames.close()
+            self._frames = None
+        if self._is_asking:
+            self._is_asking, self.given_back = False, confirmed
+            self._tell_given_back(reason, confirmed=confirmed)
+
+    async def _let_go(self, arc: ArcClient, reason: str, *, for_good: bool) -> bool:
+        """Have the ARC rest if it is kept, else end it; return whether it confirmed that."""
+        if self._keeps_arc and arc.granted is not None and not for_good:  # one that waits could just be granted
+            try:
+                await arc.rest()
+            except (LinkError, Refusal) as error:
+                log.info("%s does not rest: %s", arc.arc, error)
+            else:
+                self._rests = True
+                return True
+        confirmed = True
         try:
-            await self._arc.release(reason)
-            confirmed = True
+            await arc.release(reason)
         except LinkError as error:
             log.info("the release was not confirmed: %s", error)
             confirmed = False
-        if self._frames is not None:
-            self._frames.close()
-        self._arc, self._frames, self._releasing = None, None, False
-        self.given_back = confirmed
+        self._arc, self._rests = None, False
+        return confirmed
+
+    def _tell_given_back(self, reason: str, *, confirmed: bool) -> None:
         if self._holding:
             self.tell(self._holding, f"was given back by {self.user}: {reason}")
             self._holding = ""
+        self.report("holds no robot")
         self.show(GivenBack(self.clock.now_s(), reason, confirmed))
 
     # ------------------------------------------------------------------ the component's hooks
@@ -282,7 +326,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def drain(self) -> None:
         """Give the robot back if it was not."""
-        await self.give_back("the console ends")
+        await self.give_back("the console ends", for_good=True)
 
     def schedule_heard(self) -> None:
         """Ask why this console waits, if it does."""
@@ -292,6 +336,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
         """Tell it; see ``ArcListener``."""
+        if self._keeping is None:
+            log.info("%s was granted after it was given back", notice.arc)
+            return  # its wish for no time reached the RC manager later than its turn did; that takes the RCs back
         again, self._grants = self._grants > 0, self._grants + 1
         now_s = self.clock.now_s()
         robot = notice.rcs.get(ROBOT_KIND, "no robot")
@@ -309,13 +356,13 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def arc_suspended(self, notice: Suspended) -> None:
         """Tell it; see ``ArcListener``."""
         self._dead_man = DeadMan()
-        if not self._releasing:
+        if self._keeping is not None:
             self.report(f"waits: {notice.reason} by {notice.by}")
             self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
 
-    async def _keep(self, arc: ArcClient) -> None:
+    def _claim_parameters(self) -> dict[str, Any]:
         wished = self.parameters
-        parameters = claim_parameters(
+        return claim_parameters(
             self.address,
             path=[PathNode(self.name, wished.priority)],
             minimum_runtime_s=wished.minimum_runtime_s,
@@ -323,10 +370,18 @@ class Teleoperation(Observer[TeleoperationParameters]):
             features={} if wished.robot else ANY_CAMERA,
             console=True,
         )
+
+    async def _keep(self, arc: ArcClient, rested: ArcClient | None) -> None:
+        """Keep the ARC as it was claimed; one that rested and cannot be used any more is ended first."""
+        assert self._claimed is not None  # noqa: S101  made in take
+        kind, parameters = self._claimed
+        rests, self._rests = self._rests, False
         try:
-            await arc.keep(self.clock, wished.kind, parameters)
+            if rested is not None and not rests:
+                await rested.release("asks otherwise")
+            await arc.keep(self.clock, kind, parameters, rests=rests)
         except Refusal as refusal:
-            self._keeping = None
+            self._arc, self._keeping, self._is_asking = None, None, False
             self.refusal = refusal
             self._tell_refusal(refusal)
             self._decided.set()

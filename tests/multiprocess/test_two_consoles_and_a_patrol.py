@@ -20,7 +20,7 @@ from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.companion import Companion
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, ComponentState, Statistics
+from backbone.component.messages import AskStatistics, ComponentState, Parameters, SetParameter, Statistics
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.wire import Envelope
@@ -34,12 +34,13 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 DRIVEN_WITHIN_S = 0.150
 RESUMED_WITHIN_S = 0.300
 WAIT_S = 10.0
-PLACES = 4
-PATROL, WORLD = "mission_control/patrol", "resource_pool/world"
+A_WAY_S = 20.0
+FOR_GOOD = 0.25  # share of the releases after which the next take-over starts a new process
+PATROL, SCOUT, WORLD = "mission_control/patrol", "resource_pool/scout3", "resource_pool/world"
 TREE = re.search(r'<behavior type="surveillance".*</behavior>', MISSION_XML.read_text(), re.DOTALL)
 PATROLS = """<behavior type="patrol" name="patrol" priority="5">
       <arc kind="drive" minimum-runtime-s="1"><wish type="scout" name="scout3"/></arc>
-      <parameter name="waypoints" value="4,1.4 5,1.4 5,2.2 4,2.2"/>
+      <parameter name="waypoints" value="4,1.4 4.4,1.4 4.4,1.8 4,1.8"/>
       <parameter name="localizer" value="world"/>
     </behavior>"""
 TYPE = '<type name="surveillance"'
@@ -65,8 +66,22 @@ class Watch:
         bus.subscribe(PATROL, Conversation.EVENTS, WaypointReached, self._reached)
         bus.subscribe(PATROL, Conversation.STATUS, ComponentState, self._said)
 
+    async def reaches(self, number: int) -> None:
+        """Return when this many way points of the patrol were reached."""
+        async with asyncio.timeout(number * A_WAY_S):
+            while len(self.record()) < number:
+                self.changed.clear()
+                await self.changed.wait()
+
+    def record(self) -> list[tuple[str, int, int]]:
+        """Return robot, number and way point of each visit since the last patrol began."""
+        visits = [(visit.robot, visit.number, visit.waypoint) for visit in self.reached]
+        begins = [at for at, (_robot, number, _waypoint) in enumerate(visits) if number == 1]
+        return visits[begins[-1] :] if begins else []
+
     def _reached(self, envelope: Envelope[Any]) -> None:
         self.reached.append(envelope.body)
+        self.changed.set()
 
     def _said(self, envelope: Envelope[Any]) -> None:
         self.said.append((envelope.stamp_s, envelope.body.feedback))
@@ -126,21 +141,23 @@ class Console:
         console.take()
         async with asyncio.timeout(WAIT_S):
             await console.wait_granted()
-            assert await console.do(drive)
+            assert await console.do(drive), self.events[mark:]
         [asked], [applied] = self.since(mark, Asked), self.since(mark, CommandApplied)[:1]
         assert isinstance(self.since(mark, Granted)[0], Granted)
         return float(applied.at_s - asked.at_s)
 
-    async def give_back(self) -> float:
+    async def give_back(self, *, for_good: bool = False) -> float:
         """Return when it began to give the robot back."""
         assert self.component is not None
         mark, began_s = len(self.events), self.clock.now_s()
-        await self.component.give_back()
+        await self.component.give_back(for_good=for_good)
         assert self.since(mark, GivenBack)[0].confirmed
         return began_s
 
     def run(self, bus: Bus) -> asyncio.Task[None]:
-        self.component = Teleoperation(self.launch, bus, self.clock, show=self.show, takes=False, watches=False)
+        self.component = Teleoperation(
+            self.launch, bus, self.clock, show=self.show, takes=False, watches=False, keeps_arc=True
+        )
         return asyncio.create_task(self.component.run(), name=self.name)
 
 
@@ -176,43 +193,71 @@ async def counted(bus: Bus, address: str) -> dict[str, float]:
     return (await bus.ask(address, AskStatistics(), Statistics, within_s=2)).values
 
 
-async def at_random(mission: RunningMission, cycles: int, seed: int) -> tuple[float, float]:
-    """Return the longest time to control and to resumption; the rest of the rules is asserted here."""
+async def patrol_anew(bus: Bus, watch: Watch) -> None:
+    """Have the patrol begin from its first way point, wherever the robot is."""
+    watch.reached.clear()
+    await bus.ask(PATROL, SetParameter("rounds", 0, "the test"), Parameters, within_s=2)
+
+
+@dataclass
+class Measured:
+    """How long things took, seconds."""
+
+    driven: list[float] = field(default_factory=list)
+    resumed: list[float] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        return f"driven {_summary(self.driven)}\nresumed {_summary(self.resumed)}"
+
+
+def _summary(times_s: list[float]) -> str:
+    ordered = sorted(times_s)
+    late = ordered[max(0, round(0.99 * len(ordered)) - 1)]
+    return (
+        f"{len(ordered)} times: {statistics.median(ordered) * 1e3:.0f} ms (median), {late * 1e3:.0f} ms (99 %), "
+        f"{ordered[-1] * 1e3:.0f} ms (most)"
+    )
+
+
+async def at_random(mission: RunningMission, cycles: int, seed: int) -> Measured:
+    """Return how long control and resumption took; the rest of the rules is asserted here."""
     dice = random.Random(seed)
-    driven: list[float] = []
-    resumed: list[float] = []
+    took = Measured()
     async with two_consoles(mission) as (low, high, watch, bus):
         await watch.says("patrols", 0.0)
+        await patrol_anew(bus, watch)
         before = await counted(bus, PATROL)
         for cycle in range(cycles):
             first = dice.choice([low, high])
             drive = Drive(dice.uniform(-6, 6), dice.uniform(-6, 6))
             asked_s = first.clock.now_s()
-            driven.append(await first.take_and_drive(drive))
+            took.driven.append(await first.take_and_drive(drive))
             _at_s, why = await watch.says("suspended", asked_s)
             assert f"higher by {first.name}-drive" in why, (cycle, why)
             await asyncio.sleep(dice.uniform(0.0, 0.2))
             if first is low and dice.random() < 0.5:
                 mark = len(low.events)
-                driven.append(await high.take_and_drive(drive))
+                took.driven.append(await high.take_and_drive(drive))
                 assert (await low.hears(mark, Lost)).by == "console-high-drive"
                 assert low.component is not None
                 assert not await low.component.do(Drive(6, 6)), "commands of who lost the robot are refused"
-                await high.give_back()
-            began_s = await first.give_back()
+                await high.give_back(for_good=dice.random() < FOR_GOOD)
+            began_s = await first.give_back(for_good=dice.random() < FOR_GOOD)
             again_s, _said = await watch.says("patrols", began_s)
-            resumed.append(again_s - began_s)
+            took.resumed.append(again_s - began_s)
             await asyncio.sleep(dice.uniform(0.0, 0.3))
-        after, world = await counted(bus, PATROL), await counted(bus, WORLD)
-    record = [(visit.number, visit.waypoint) for visit in watch.reached]
-    print(f"driven {statistics.median(driven) * 1e3:.0f} ms (median), {max(driven) * 1e3:.0f} ms (most)")
-    print(f"resumed {statistics.median(resumed) * 1e3:.0f} ms (median), {max(resumed) * 1e3:.0f} ms (most)")
-    print(f"{len(record)} way points")
+        await watch.reaches(1)
+        disturbed = watch.record()
+        after, world, scout = [await counted(bus, at) for at in (PATROL, WORLD, SCOUT)]
+        await patrol_anew(bus, watch)
+        await watch.reaches(len(disturbed))
+        undisturbed = watch.record()
+    stale = f"{world['stale_packets']:.0f} stale packets on the air, {scout['refused_stale']:.0f} refused before"
+    print(f"{took}\n{len(disturbed)} way points; {stale}")
     assert world["stale_packets"] == 0
     assert after["times_suspended"] - before["times_suspended"] >= cycles
-    first_number = record[0][0] if record else 1
-    assert record == [(number, (number - 1) % PLACES) for number in range(first_number, first_number + len(record))]
-    return max(driven), max(resumed)
+    assert disturbed == undisturbed[: len(disturbed)]
+    return took
 
 
 async def test_a_few_random_take_overs_by_two_consoles(mission: RunningMission) -> None:
@@ -222,5 +267,5 @@ async def test_a_few_random_take_overs_by_two_consoles(mission: RunningMission) 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 async def test_two_hundred_random_take_overs_by_two_consoles(mission: RunningMission) -> None:
-    driven_s, resumed_s = await at_random(mission, 200, seed=2)
-    assert (driven_s < DRIVEN_WITHIN_S, resumed_s < RESUMED_WITHIN_S) == (True, True), mission.story()
+    took = await at_random(mission, 200, seed=2)
+    assert (max(took.driven) < DRIVEN_WITHIN_S, max(took.resumed) < RESUMED_WITHIN_S) == (True, True), mission.story()

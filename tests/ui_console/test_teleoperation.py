@@ -13,7 +13,7 @@ from fake_resource_pool import FakeArc, FakePlacer
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.launch import Launch
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import Parameters, SetParameter, StoryEvent
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
@@ -21,7 +21,7 @@ from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
-from ui_console.console_events import Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.console_events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
 from ui_console.driving import drive_towards
 from ui_console.script import read_script
 from ui_console.scripted import ScriptDriver
@@ -142,6 +142,83 @@ def test_released_with_one_call_the_robot_is_free_and_can_be_taken_again(placer_
                 assert not placer.arcs
                 assert events[-1] == GivenBack(placer.clock.now_s(), "released", True)
                 driven.take()
+
+    placer_world(scene)
+
+
+def test_a_console_that_keeps_its_arc_asks_again_without_a_new_one(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        events: list[ConsoleEvent] = []
+        async with beside(console(placer, events.append, keeps_arc=True)) as driven:
+            await placer.wait(lambda: placer.arcs)
+            [arc] = placer.arcs.values()
+            for turn in range(1, 4):
+                await arc.grant()
+                assert await driven.do(FORWARD)
+                await driven.give_back()
+                assert (arc.is_idle, arc.granted, driven.is_held) == (True, False, False)
+                assert events[-1] == GivenBack(placer.clock.now_s(), "released", True)
+                assert not await driven.do(FORWARD)
+                driven.take()
+                await placer.wait(lambda: not arc.is_idle)
+                assert len([event for event in events if isinstance(event, GivenBack)]) == turn
+            assert placer.started == [arc.name]
+            assert not [event for event in events if isinstance(event, Lost)]
+        assert not placer.arcs, "nothing is left behind"
+
+    placer_world(scene)
+
+
+def test_an_arc_that_rested_and_is_gone_is_started_anew(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None, keeps_arc=True)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            await driven.give_back()
+            [name] = placer.arcs
+            await placer.kill(name)
+            driven.take()
+            await placer.wait(lambda: driven.is_held)
+            assert placer.started == [name, name]
+
+    placer_world(scene)
+
+
+def test_an_arc_that_rested_is_ended_when_something_else_is_asked_for(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, lambda event: None, keeps_arc=True)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            await driven.give_back()
+            await placer.bus.ask(driven.address, SetParameter("priority", 7, "anna"), Parameters, within_s=1)
+            driven.take()
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            assert arc.parameters["path"] == [["console-7", 7]]
+            await driven.give_back()
+            await driven.switch("scout2")
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            assert arc.parameters["wish"] == {"scout": "scout2"}
+
+    placer_world(scene)
+
+
+def test_taken_again_while_it_is_being_given_back_the_robot_is_asked_for_afterwards(
+    placer_world: Any, beside: Any
+) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        events: list[ConsoleEvent] = []
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, events.append)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            driven.begin_release()
+            await asyncio.sleep(0)
+            driven.take()
+            await driven.wait_granted()
+            assert driven.is_held
+            own = [type(event) for event in events if isinstance(event, Asked | Granted | GivenBack)]
+            assert own == [Asked, Granted, GivenBack, Asked, Granted]
 
     placer_world(scene)
 

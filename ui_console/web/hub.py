@@ -148,7 +148,7 @@ class WebHub:
             parameters=wished,
         )
         bus = await self._join(launch)
-        return Teleoperation(launch, bus, self.clock, show=show, watches=False, user=welcome.user)
+        return Teleoperation(launch, bus, self.clock, show=show, watches=False, keeps_arc=True, user=welcome.user)
 
     def watching_changed(self) -> None:
         """Listen to the pictures that somebody watches and that somebody's grant delivers, and to no others."""
