@@ -193,7 +193,7 @@ async def test_who_takes_a_robot_drives_it_and_who_lets_go_stops_it(stage: Stage
         await anna.say(do="release")
         await anna.wait(lambda: not anna.view["own"]["is_asked"], "given back")
         [arc] = stage.placer.arcs.values()
-        assert arc.is_idle and not arc.granted, "it holds nothing and is there at once when it is wanted again"
+        assert (arc.is_idle, arc.granted) == (True, False), "it holds nothing and is there at once"
 
 
 async def test_when_nothing_is_heard_for_a_moment_the_wheels_stop_by_the_servers_clock(stage: Stage) -> None:
