@@ -1,10 +1,15 @@
 """Which run times are worth asking for, to see what is in view for a while through a shared frequency.
 
-Pure. While something is in view for ``view_s``, a slice sees it that overlaps this time by ``detect_s`` after its
-first ``blind_s``. With N equals that each run for ``run_s`` and settle for ``settling_s``, the share of phases in
-which one of the slices of one robot does is ``(view_s + run_s - blind_s - 2 detect_s) / (N (run_s + settling_s))``.
-It falls with ``run_s`` if and only if ``view_s > settling_s + blind_s + 2 detect_s``: then slices should be as short
-as still tell something, otherwise they should be as long as the mission allows.
+Pure. A slice that is made longer as soon as something is glimpsed need hold no more than its blind beginning and a
+few frames to glimpse in. It detects what is in view for ``view_s`` unless that leaves before ``blind_s + detect_s``
+of it, or comes after its end. With N equals that each run for ``run_s`` and settle for ``settling_s``, the share of
+phases in which one of the slices of one robot detects it is
+``(view_s + run_s - blind_s - detect_s) / (N (run_s + settling_s))``. It falls with ``run_s`` if and only if
+``view_s > settling_s + blind_s + detect_s``: then slices should be as short as still glimpse, otherwise they should
+be as long as the mission allows.
+
+Short run times are drawn anew for each slice: equals that all ask for fixed times make a schedule with a period, and
+what takes a multiple of it to pass is seen every time or never.
 
 Source: RAM 2002, "Experiments" (behaviors that work out the run times they ask for are its stated next step); the
 formula: chosen, for slices in turn.
@@ -14,8 +19,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from random import Random
 
-GRAIN_S = 0.25  # chosen: times of views are guesses, and run times that hardly differ make schedules nobody can read
+GLIMPSE_FRAMES = (2, 4)  # chosen: one good frame in two is likely, in four certain; longer slices come less often
+EXTENSION = 1.5  # chosen: times to detect; a burst of bad frames falls into many of them
+GRAIN_S = 0.001  # chosen: finer times say nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,49 +31,55 @@ class RunTimes:
     """What to ask for.
 
     Attributes:
-        minimum_s: Shortest useful time, seconds.
-        maximum_s: End of extensions, at least the minimum.
+        shortest_s: Least useful time, seconds.
+        longest_s: Longest time worth asking for without having seen anything; at least the shortest.
+        maximum_s: End of extensions.
     """
 
-    minimum_s: float
+    shortest_s: float
+    longest_s: float
     maximum_s: float
 
+    def drawn_s(self, dice: Random) -> float:
+        """Return the minimum run time to ask for next, seconds; drawn only if there is anything to draw."""
+        if self.shortest_s == self.longest_s:
+            return self.shortest_s
+        return _whole_grains(dice.uniform(self.shortest_s, self.longest_s))
 
-def useful_run_times(*, view_s: float, settling_s: float, blind_s: float, detect_s: float, given_s: float) -> RunTimes:
+
+def useful_run_times(
+    *, view_s: float, settling_s: float, blind_s: float, frame_s: float, detect_s: float, given_s: float
+) -> RunTimes:
     """Return the run times to ask for.
-
-    A short slice holds the blind beginning and about one time to detect: it is as short as still tells something of
-    what is in view already. It can be extended by one more time to detect, when something was glimpsed at its end.
 
     Args:
         view_s: Shortest time for which what is looked for is in view, seconds.
         settling_s: Time from a switch to the first picture, seconds.
         blind_s: Time from the first picture to the first that tells something, seconds.
+        frame_s: Time from one sound picture to the next, on average, seconds.
         detect_s: Time from the first picture with it to certainty, seconds, above 0.
         given_s: Run time the mission gives; no longer one is asked for, but for extensions.
 
     Example:
-        >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
-        RunTimes(minimum_s=1.25, maximum_s=2.25)
-        >>> useful_run_times(view_s=2.0, settling_s=0.3, blind_s=0.5, detect_s=0.8, given_s=5.0)
-        RunTimes(minimum_s=5.0, maximum_s=6.0)
+        >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, frame_s=0.1, detect_s=0.8, given_s=5.0)
+        RunTimes(shortest_s=0.7, longest_s=0.9, maximum_s=2.1)
+        >>> useful_run_times(view_s=1.5, settling_s=0.3, blind_s=0.5, frame_s=0.1, detect_s=0.8, given_s=5.0)
+        RunTimes(shortest_s=5.0, longest_s=5.0, maximum_s=6.2)
 
     Raises:
-        ValueError: A time is negative or not finite, or ``detect_s`` or ``given_s`` is 0.
+        ValueError: A time is negative or not finite, or ``frame_s``, ``detect_s`` or ``given_s`` is 0.
     """
-    times = (view_s, settling_s, blind_s, detect_s, given_s)
-    if not all(math.isfinite(time) and time >= 0 for time in times) or not detect_s or not given_s:
-        raise ValueError(f"no run times from {times} s of view, settling, blindness, detection and the mission's own")
-    short_pays = view_s > settling_s + blind_s + 2 * detect_s
-    minimum_s = min(given_s, max(GRAIN_S, _near(blind_s + detect_s))) if short_pays else given_s
-    return RunTimes(minimum_s, _up(minimum_s + detect_s))
+    times = (view_s, settling_s, blind_s, frame_s, detect_s, given_s)
+    if not all(math.isfinite(time) and time >= 0 for time in times) or not (frame_s and detect_s and given_s):
+        raise ValueError(
+            f"no run times from {times} s of view, settling, blindness, one picture, detection and the mission's own"
+        )
+    short_pays = view_s > settling_s + blind_s + detect_s
+    least, most = (blind_s + frames * frame_s if short_pays else given_s for frames in GLIMPSE_FRAMES)
+    longest_s = min(given_s, most)
+    maximum_s = longest_s + EXTENSION * detect_s
+    return RunTimes(*map(_whole_grains, (min(given_s, least), longest_s, maximum_s)))
 
 
-def _near(time_s: float) -> float:
-    """Return the time in whole grains, rounded."""
-    return round(round(time_s / GRAIN_S) * GRAIN_S, 9)
-
-
-def _up(time_s: float) -> float:
-    """Return the time in whole grains, rounded up."""
-    return round(math.ceil(time_s / GRAIN_S - 1e-9) * GRAIN_S, 9)
+def _whole_grains(time_s: float) -> float:
+    return max(GRAIN_S, round(round(time_s / GRAIN_S) * GRAIN_S, 9))

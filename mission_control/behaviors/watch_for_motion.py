@@ -6,6 +6,7 @@ Source: RAM 2002, "Experiments": Scouts watch a room for anything that moves.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from random import Random
 from typing import Annotated, Any
 
 import msgspec
@@ -13,10 +14,11 @@ import numpy as np
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behavior_tree import ArcNeed
-from mission_control.behaviors.run_times import useful_run_times
+from mission_control.behaviors.run_times import RunTimes, useful_run_times
 from mission_control.messages import MotionSeen, Region
 from mission_control.vision.motion_detection import FAST_FRAMES, VOTES, MotionDetector
 from resource_pool.arc_client import Frame
@@ -35,6 +37,7 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
         settling_s: Time from a switch to the first picture, mission seconds; for that.
         frame_rate_hz: Pictures a second; for that.
         clean_share: Share of the pictures that tell something, above 0 to 1; for that.
+        seed: Of the run times, which are drawn.
     """
 
     again_after_s: float = 1.0
@@ -43,6 +46,7 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
     settling_s: Annotated[float, msgspec.Meta(ge=0)] = 0.3
     frame_rate_hz: Annotated[float, msgspec.Meta(gt=0)] = 15.0
     clean_share: Annotated[float, msgspec.Meta(gt=0, le=1)] = 0.75
+    seed: int = 0
 
 
 class WatchForMotion(Behavior[WatchParameters]):
@@ -55,32 +59,34 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._detector = MotionDetector()
         self._robot, self._events, self._last_told_s = "", 0, -float("inf")
         self._certain_frames, self._told_in_slice = 0, False
+        self._times: RunTimes | None = None
+        self._dice = Random(f"{self.name} {self.parameters.seed}")
+        self._asked_until_s = self._longest_until_s = 0.0
+        self._maximum_s = 0.0
 
     def need(self) -> ArcNeed | None:
         """Claim for as long as is of use for what is looked for."""
         need, given = super().need(), self.parameters
-        if need is None or given.view_s == 0:
-            return need
-        times = useful_run_times(
-            view_s=given.view_s,
-            settling_s=given.settling_s,
-            blind_s=FAST_FRAMES / given.frame_rate_hz,
-            detect_s=self._frames_s(VOTES - 1 + given.frames_wanted),
-            given_s=need.minimum_runtime_s,
-        )
-        return msgspec.structs.replace(need, minimum_runtime_s=times.minimum_s, maximum_runtime_s=times.maximum_s)
-
-    def not_now(self) -> float:
-        """Ask for more if something was glimpsed and is not certain yet; what is told needs no more."""
-        if self._told_in_slice or not self._detector.has_glimpsed:
-            return 0.0
-        return self._frames_s(max(1, self.parameters.frames_wanted - self._certain_frames))
+        if need is not None and given.view_s > 0:
+            self._times = run_times(given, need.minimum_runtime_s)
+            need = msgspec.structs.replace(
+                need,
+                minimum_runtime_s=self._times.drawn_s(self._dice),
+                maximum_runtime_s=self._times.maximum_s,
+            )
+        self._maximum_s = need.maximum_runtime_s if need is not None else 0.0
+        return need
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:
-        """Adapt to what changed while others had the robot."""
+        """Adapt to what changed while others had the robot, and draw for how long to ask next."""
         self._robot = rcs.get("scout", "") or self._robot
         self._detector.swapped_in()
         self._certain_frames, self._told_in_slice = 0, False
+        self._longest_until_s = self.clock.now_s() + self._maximum_s
+        granted = self.arc.granted if self.arc is not None else None
+        self._asked_until_s = granted.until_s if granted is not None else 0.0
+        if self._times is not None and self._times.shortest_s < self._times.longest_s:
+            self.start_task(self._ask_next_for(self._times.drawn_s(self._dice)), "run time")
         self._say()
 
     async def suspended(self, reason: str, by: str) -> None:
@@ -104,14 +110,36 @@ class WatchForMotion(Behavior[WatchParameters]):
             self._say()
         elif self._detector.frames % REPORT_EVERY_FRAMES == 0:
             self._say()
+        self._ask_for_more(frame.captured_s)
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, the events, and the pictures that were too torn to judge."""
         return {**super().statistics(), "events": self._events, "frames_rejected": self._detector.rejected}
 
-    def _frames_s(self, clean_frames: int) -> float:
-        """Return how long it takes until there are so many pictures that tell something."""
-        return clean_frames / (self.parameters.frame_rate_hz * self.parameters.clean_share)
+    def _ask_for_more(self, captured_s: float) -> None:
+        """Have the slice last until it is certain, if something was glimpsed; what is told needs no more."""
+        votes = self._detector.votes
+        if self._told_in_slice or not votes or not votes[-1]:
+            return
+        missing = max(0, VOTES - 1 - sum(votes)) + max(1, self.parameters.frames_wanted - self._certain_frames)
+        until_s = min(captured_s + frames_s(self.parameters, missing + 1), self._longest_until_s)
+        if until_s > self._asked_until_s:
+            self._asked_until_s = until_s
+            self.start_task(self._ask_until(until_s), "longer")
+
+    async def _ask_until(self, until_s: float) -> None:
+        assert self.arc is not None  # noqa: S101  pictures come through it
+        try:
+            await self.arc.want_longer(until_s)
+        except (Refusal, LinkError) as error:  # then it ends as it would have
+            self.story.note(self.arc.arc, f"its slice was not made longer: {error}")
+
+    async def _ask_next_for(self, minimum_s: float) -> None:
+        assert self.arc is not None  # noqa: S101  it was granted
+        try:
+            await self.arc.want_runtime(minimum_s, self._maximum_s)
+        except (Refusal, LinkError) as error:  # the next slice is as long as this one
+            self.story.note(self.arc.arc, f"its run time was not changed: {error}")
 
     def _found(self) -> dict[str, Any]:
         return {"robot": self._robot, "events": self._events, "last_event_s": self._last_told_s}
@@ -121,3 +149,28 @@ class WatchForMotion(Behavior[WatchParameters]):
 
     def _say(self) -> None:
         self.report(f"watching through {self._robot or 'no robot yet'}: {self._seen()}")
+
+
+def run_times(given: WatchParameters, given_s: float) -> RunTimes:
+    """Return which run times are of use for what is in view for ``given.view_s``.
+
+    Args:
+        given: Of the behavior.
+        given_s: Run time the mission gives, seconds.
+
+    Raises:
+        ValueError: ``view_s`` is not finite, or ``given_s`` is not above 0.
+    """
+    return useful_run_times(
+        view_s=given.view_s,
+        settling_s=given.settling_s,
+        blind_s=FAST_FRAMES / given.frame_rate_hz,
+        frame_s=frames_s(given, 1),
+        detect_s=frames_s(given, VOTES - 1 + given.frames_wanted),
+        given_s=given_s,
+    )
+
+
+def frames_s(given: WatchParameters, sound_frames: int) -> float:
+    """Return how long it takes until there are so many pictures that tell something, seconds, on average."""
+    return sound_frames / (given.frame_rate_hz * given.clean_share)

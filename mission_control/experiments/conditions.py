@@ -13,7 +13,7 @@ from mission_control.experiments.geometry import EXTRAS, PASSAGES, SLICE_S, WATC
 Policy = Literal["paper", "adaptive"]
 Order = Literal["active-first", "extra-first", "interleaved"]
 
-CONSOLE_SLICE_S = 3.25  # chosen: less than a target is in view, so that none hides it; long enough to steer by sight
+CONSOLE_SLICE_S = 2.0  # chosen: half the time a Pioneer is in view, so that none hides it; one can steer by sight
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 
 
@@ -31,9 +31,9 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         active: Scouts that watch.
         extra: Scouts that consoles hold, of the mission's own priority.
         channels: Video frequencies, each with a framegrabber.
-        policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers work out their run times and ask
-            for more on a glimpse, equals get equal time, and consoles ask for at most ``CONSOLE_SLICE_S`` and want
-            no air while nobody drives.
+        policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers work out their run times, draw
+            each, and ask for more on a glimpse, equals get equal time, and consoles ask for at most
+            ``CONSOLE_SLICE_S`` and want no air while nobody drives.
         target: ``pioneer`` or ``person``.
         speed_m_s: Of the target; 0: that of the papers.
         slice_s: Run time that watchers and consoles are given, seconds.

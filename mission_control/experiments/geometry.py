@@ -98,6 +98,11 @@ def in_view(passage: Passage, watcher: Point, *, least_m: float = 0.0) -> list[I
     return [*there, ((whole_m - last_m) / passage.speed_m_s, (whole_m - first_m) / passage.speed_m_s)]
 
 
+def shortest_view_s(passage: Passage, watcher: Point) -> float:
+    """Return the shortest time for which the passing target is in the watcher's view, seconds."""
+    return min(end_s - begin_s for begin_s, end_s in in_view(passage, watcher))
+
+
 def is_in_view(passage: Passage, watcher: Point, since_departure_s: float) -> bool:
     """Say whether the target is in the watcher's view at this time, at least in part."""
     return any(begin_s <= since_departure_s <= end_s for begin_s, end_s in in_view(passage, watcher))

@@ -12,7 +12,15 @@ from xml.sax.saxutils import quoteattr
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from mission_control.experiments.conditions import Condition
-from mission_control.experiments.geometry import EXTRAS, FRAME_RATE_HZ, PATH, ROOM_M, SETTLING_S, WATCHERS, in_view
+from mission_control.experiments.geometry import (
+    EXTRAS,
+    FRAME_RATE_HZ,
+    PATH,
+    ROOM_M,
+    SETTLING_S,
+    WATCHERS,
+    shortest_view_s,
+)
 
 MISSION_PRIORITY = 10
 """Of the mission among the consoles, and of the consoles that hold the extra Scouts: they are equals."""
@@ -106,9 +114,7 @@ def _lines(condition: Condition) -> Iterator[str]:
     yield from _world(condition)
     yield "  <behaviors>"
     for robot, place in zip(condition.watching, WATCHERS, strict=False):
-        yield from _watcher(
-            condition, robot, min(end_s - begin_s for begin_s, end_s in in_view(condition.passage, place))
-        )
+        yield from _watcher(condition, robot, shortest_view_s(condition.passage, place))
     yield "  </behaviors>"
     yield "</mission>"
 

@@ -1,42 +1,80 @@
 """What the geometry alone promises: schedule phases, views, settling and the frames a detector needs, drawn many times.
 
 Pure; no component runs, no picture is drawn. It knows of the system what stands in its documents: slices in turn
-(or of equal time), their settling, the frames a detector is blind for after each swap, the certain frames wanted,
-and that bad frames come in bursts.
+or of equal time, their settling, the frames a detector is blind for after each swap, the certain frames wanted,
+that a glimpse makes a slice longer, and that bad frames come in bursts.
 
 Source: SCHEDULING.md, section 6: a trial's outcome depends on the phase between target and schedule, the order of
-slots, the time each view lasts, the time a picture needs to settle and the frames the detector needs.
+slots, the time each view lasts, the time a picture needs to settle and the frames the detector needs. Its rule 13:
+equal time.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from random import Random
+from statistics import fmean
 
-from mission_control.behaviors.run_times import useful_run_times
+from mission_control.behaviors.run_times import RunTimes
+from mission_control.behaviors.watch_for_motion import WatchParameters, frames_s, run_times
 from mission_control.experiments.conditions import Condition
-from mission_control.experiments.geometry import FRAME_RATE_HZ, SETTLING_S, WATCHERS, Interval, in_view
+from mission_control.experiments.geometry import (
+    FRAME_RATE_HZ,
+    SETTLING_S,
+    WATCHERS,
+    Interval,
+    Point,
+    in_view,
+    shortest_view_s,
+)
 from mission_control.experiments.operator import Hands
 from mission_control.vision.motion_detection import FAST_FRAMES, VOTERS, VOTES
 
 SAMPLES = 2000  # chosen: a standard error of 1 %, a third of that of 200 trials
-SWITCH_S = 0.002  # measured: the last packet of a hold
 BAD_SHARE, BAD_BURST_S = 0.25, 0.15  # SCHEDULING.md, section 6, at noise 1
 LEAST_M = 0.1  # measured: so much of a target must be in view before its region is large enough
-CLEAN_SHARE = 0.75  # of the watchers' parameters
-ADAPTED_SLICE_S = 1.25  # chosen: about what watchers work out; only the spread of phases depends on it
-ASK_BEFORE_END_S = 0.2  # resource_pool.aggregate_resource_controller: when "not now" can be said
+DRIVE_S = 5.0  # of the consoles' parameters
+TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: by less than that nobody is ahead of anybody
 
 
 @lru_cache(maxsize=256)
 def predicted(condition: Condition, samples: int = SAMPLES) -> float:
     """Return the share of passages that are detected, for this condition; the same at each call."""
     dice = Random(f"prediction {samples}")
-    return sum(_Sample(condition, dice).is_detected() for _ in range(samples)) / samples
+    return sum(_is_detected(condition, dice) for _ in range(samples)) / samples
+
+
+def watcher_parameters(condition: Condition, watcher: Point) -> WatchParameters:
+    """Return what a behavior is told that watches from this place."""
+    if condition.policy == "paper":
+        return WatchParameters(frames_wanted=condition.frames_wanted)
+    return WatchParameters(
+        frames_wanted=condition.frames_wanted,
+        view_s=round(shortest_view_s(condition.passage, watcher), 2),
+        settling_s=SETTLING_S,
+        frame_rate_hz=FRAME_RATE_HZ,
+    )
+
+
+def departs_s(condition: Condition, phase: float) -> float:
+    """Return when the target departs after the schedule's first turn began, seconds.
+
+    Slices in turn: within the first round. Equal time: within a round that begins half a round after the first turn,
+    when drawn run times have come apart.
+
+    Args:
+        condition: What is tried.
+        phase: 0 to 1, of a round: one slice of each, or as many of each as make their times equal.
+    """
+    asked_s = [fmean((times.shortest_s, times.longest_s)) for times in _asked(condition)]
+    longest_s = max(asked_s)
+    if condition.policy == "paper":
+        return phase * sum(one_s + SETTLING_S for one_s in asked_s)
+    return (0.5 + phase) * sum(longest_s / one_s * (one_s + SETTLING_S) for one_s in asked_s)
 
 
 class Bursts:
@@ -55,16 +93,28 @@ class Bursts:
         return self.is_bad
 
 
+def _asked(condition: Condition) -> Iterator[RunTimes]:
+    """Yield what watchers and consoles ask for, in the order of their first turns."""
+    for robot in condition.in_turn:
+        parameters = None
+        if robot in condition.watching:
+            parameters = watcher_parameters(condition, WATCHERS[condition.watching.index(robot)])
+        if parameters is not None and parameters.view_s > 0:
+            yield run_times(parameters, condition.slice_s)
+        else:
+            asked_s = condition.slice_s if parameters is not None else condition.console_slice_s
+            yield RunTimes(asked_s, asked_s, asked_s)
+
+
 @dataclass(slots=True)
 class _Claimant:
-    robot: str
-    minimum_s: float
-    maximum_s: float
+    times: RunTimes
+    asks_s: float
+    stamp: tuple[float, int]
     views: Sequence[Interval] = ()
     hands: Hands | None = None
     changes_s: float = math.inf
     had_s: float = 0.0
-    since: int = 0
 
     @property
     def wants(self) -> bool:
@@ -72,140 +122,122 @@ class _Claimant:
 
 
 @dataclass(slots=True)
-class _Watch:
-    """One slice of a watcher: its detector's state."""
+class _Slice:
+    """A slice from its grant on, with the state of a watcher's detector."""
 
-    wanted: int
+    longest_until_s: float
     frames: int = 0
     certain: int = 0
     votes: deque[bool] = field(default_factory=lambda: deque(maxlen=VOTERS))
 
-    def look(self, is_seen: bool, is_bad: bool) -> bool:
-        """Take one frame; return whether there are enough certain ones now."""
+    def look(self, is_seen: bool, is_bad: bool) -> None:
+        """Take one frame."""
         self.frames += 1
-        if self.frames <= FAST_FRAMES or is_bad:
-            return False
-        self.votes.append(is_seen)
-        self.certain += is_seen and sum(self.votes) >= VOTES
-        return self.certain >= self.wanted
+        if self.frames > FAST_FRAMES and not is_bad:
+            self.votes.append(is_seen)
+            self.certain += is_seen and sum(self.votes) >= VOTES
+
+    def missing(self, wanted: int) -> int:
+        """Return how many certain or nearly certain frames must come yet; 0 as long as nothing is glimpsed."""
+        if not self.votes or not self.votes[-1]:
+            return 0
+        return max(0, VOTES - 1 - sum(self.votes)) + wanted - self.certain
 
 
-def departs_s(condition: Condition, phase: float) -> float:
-    """Return when the target departs after the schedule's first turn began, seconds.
-
-    Args:
-        condition: What is tried.
-        phase: 0 to 1, of a round: slices in turn, one of each; with equal time as many of each as make it equal.
-    """
-    watcher_s, console_s = condition.slice_s, condition.console_slice_s
-    if condition.policy == "adaptive":
-        watcher_s = min(watcher_s, ADAPTED_SLICE_S)
-    switch_s = SETTLING_S + SWITCH_S
-    most_s = max(watcher_s, console_s) if condition.extra else watcher_s
-    if condition.policy == "paper":
-        watching_s, driving_s = watcher_s + switch_s, console_s + switch_s
-    else:
-        watching_s, driving_s = (most_s / slice_s * (slice_s + switch_s) for slice_s in (watcher_s, console_s))
-    round_s = condition.active * watching_s + condition.extra * driving_s
-    first_s = 0.0 if condition.policy == "paper" else round_s / 2
-    return first_s + phase * round_s
-
-
-class _Sample:
-    """One passage at a random phase."""
-
-    def __init__(self, condition: Condition, dice: Random) -> None:
-        self._condition, self._dice = condition, dice
-        self._departs_s = departs_s(condition, dice.random())
-        self._over_s = self._departs_s + condition.passage.lasts_s
-        self._bursts = Bursts(condition.noise, dice)
-        self._channels: list[list[_Claimant]] = [[] for _ in range(condition.channels)]
-        for number, robot in enumerate(condition.in_turn):
-            fewest = min(self._channels, key=len)
-            fewest.append(self._claimant(robot, number))
-
-    def is_detected(self) -> bool:
-        return any(self._channel_detects(claimants) for claimants in self._channels)
-
-    def _claimant(self, robot: str, number: int) -> _Claimant:
-        condition = self._condition
+def _is_detected(condition: Condition, dice: Random) -> bool:
+    """Say whether a passage at a random phase is detected."""
+    departs = departs_s(condition, dice.random())
+    bursts = Bursts(condition.noise, dice)
+    channels: list[list[_Claimant]] = [[] for _ in range(condition.channels)]
+    for number, (robot, times) in enumerate(zip(condition.in_turn, _asked(condition), strict=True)):
+        one = _Claimant(times, times.drawn_s(dice), (0.0, number))
         if robot in condition.watching:
             place = WATCHERS[condition.watching.index(robot)]
-            views = [
-                (b + self._departs_s, e + self._departs_s)
-                for b, e in in_view(condition.passage, place, least_m=LEAST_M)
-            ]
-            least_s = most_s = condition.slice_s
-            if condition.policy == "adaptive":
-                view_s = min(e - b for b, e in in_view(condition.passage, place))
-                times = useful_run_times(
-                    view_s=view_s,
-                    settling_s=SETTLING_S,
-                    blind_s=FAST_FRAMES / FRAME_RATE_HZ,
-                    detect_s=(VOTES - 1 + condition.frames_wanted) / (FRAME_RATE_HZ * CLEAN_SHARE),
-                    given_s=condition.slice_s,
-                )
-                least_s, most_s = times.minimum_s, times.maximum_s
-            return _Claimant(robot, least_s, most_s, views, since=number)
-        if condition.policy == "paper":
-            return _Claimant(robot, condition.slice_s, condition.slice_s, since=number)
-        hands = Hands(self._dice.randrange(2**31), condition.driven, 5.0)
-        asked_s = condition.console_slice_s
-        return _Claimant(robot, asked_s, asked_s, hands=hands, changes_s=hands.next_change_s())
+            views = in_view(condition.passage, place, least_m=LEAST_M)
+            one.views = [(begin_s + departs, end_s + departs) for begin_s, end_s in views]
+        elif condition.policy == "adaptive":
+            one.hands = Hands(dice.randrange(2**31), condition.driven, DRIVE_S)
+            one.changes_s = one.hands.next_change_s()
+        min(channels, key=len).append(one)
+    over_s = departs + condition.passage.lasts_s
+    return any(_Channel(condition, claimants, bursts, dice).detects(over_s) for claimants in channels)
 
-    def _channel_detects(self, claimants: list[_Claimant]) -> bool:
-        now_s, served = 0.0, len(claimants)
-        last: _Claimant | None = None
-        watch: _Watch | None = None
-        while now_s < self._over_s:
-            for one in claimants:
-                self._catch_up(one, now_s, claimants)
-            waiting = [one for one in claimants if one.wants]
-            if not waiting:
-                now_s = min(one.changes_s for one in claimants)
+
+class _Channel:
+    """One video frequency and those who share it."""
+
+    def __init__(self, condition: Condition, claimants: list[_Claimant], bursts: Bursts, dice: Random) -> None:
+        self._condition, self._claimants, self._bursts, self._dice = condition, claimants, bursts, dice
+        self._parameters = WatchParameters(frames_wanted=condition.frames_wanted)
+        self._running: _Claimant | None = None
+        self._slice = _Slice(0.0)
+        self._served = len(claimants)
+
+    def detects(self, over_s: float) -> bool:
+        """Let them run until then, one after the other; return whether one of them detects the target."""
+        now_s = 0.0
+        while now_s < over_s:
+            self._catch_up(now_s)
+            rivals = [one for one in self._claimants if one.wants]
+            if not rivals:
+                now_s = min(one.changes_s for one in self._claimants)
                 continue
-            chosen = self._next(waiting)
-            served += 1
-            if chosen is not last:
+            chosen = min(rivals, key=lambda one: self._seniority(one, rivals, now_s)) if now_s else rivals[0]
+            asked_s = chosen.asks_s
+            if chosen is not self._running:
+                self._served += 1
+                if self._running is not None:
+                    self._running.stamp = (now_s, self._served)
                 now_s += SETTLING_S
-                watch = _Watch(self._condition.frames_wanted)
-            last, begin_s = chosen, now_s
-            end_s = now_s + chosen.minimum_s
+                self._running, self._slice = chosen, _Slice(now_s + chosen.times.maximum_s)
+                chosen.asks_s = chosen.times.drawn_s(self._dice)
+            end_s = now_s + asked_s
             if chosen.hands is not None:
                 end_s = min(end_s, max(now_s, chosen.changes_s))
-            elif watch is not None and chosen.views:
-                end_s, detected = self._watch(chosen, watch, now_s, end_s)
-                if detected:
+            elif chosen.views:
+                end_s, is_certain = self._watch(chosen, now_s, end_s)
+                if is_certain:
                     return True
-            chosen.had_s += end_s - begin_s
-            chosen.since = served
-            now_s = end_s + SWITCH_S
+            chosen.had_s += end_s - now_s
+            now_s = end_s
         return False
 
-    def _next(self, waiting: list[_Claimant]) -> _Claimant:
+    def _seniority(self, one: _Claimant, rivals: Sequence[_Claimant], now_s: float) -> tuple[bool, float, float, int]:
+        """Return the key among equals: smaller comes first. Who runs and had its slice comes after its equals."""
+        is_running = one is self._running
+        stamp = (now_s, 0) if is_running else one.stamp
         if self._condition.policy == "paper":
-            return min(waiting, key=lambda one: one.since)
-        average_s = sum(one.had_s for one in waiting) / len(waiting) + 1e-6
-        eligible = [one for one in waiting if one.had_s <= average_s]
-        return min(eligible, key=lambda one: (one.had_s + one.minimum_s, one.since))
+            return (False, 0.0, *stamp)
+        is_late = one.had_s > fmean(rival.had_s for rival in rivals) + TOLERANCE_S
+        deadline_s = one.had_s + one.asks_s + (TOLERANCE_S if is_running else 0.0)
+        return (is_late, round(deadline_s, 6), *stamp)
 
-    def _catch_up(self, one: _Claimant, now_s: float, claimants: list[_Claimant]) -> None:
-        while one.hands is not None and one.changes_s <= now_s:
-            one.hands.change()
-            one.changes_s += one.hands.next_change_s()
-            if one.hands.is_driving:
-                others = [other.had_s for other in claimants if other is not one and other.wants]
-                one.had_s = max(one.had_s, sum(others) / len(others)) if others else one.had_s
+    def _catch_up(self, now_s: float) -> None:
+        """Let consoles begin and stop that did until now; who comes again has no credit for the time it was away."""
+        for one in self._claimants:
+            while one.hands is not None and one.changes_s <= now_s:
+                one.hands.change()
+                one.changes_s += one.hands.next_change_s()
+                if one.hands.is_driving:
+                    others_s = [other.had_s for other in self._claimants if other is not one and other.wants]
+                    one.had_s = max(one.had_s, fmean(others_s)) if others_s else one.had_s
+                    self._served += 1
+                    one.stamp = (now_s, self._served)
+                elif one is self._running:
+                    self._running = None
 
-    def _watch(self, chosen: _Claimant, watch: _Watch, begin_s: float, end_s: float) -> tuple[float, bool]:
-        most_s = begin_s + chosen.maximum_s
-        frame_s = begin_s + self._dice.random() / FRAME_RATE_HZ
+    def _watch(self, one: _Claimant, now_s: float, end_s: float) -> tuple[float, bool]:
+        """Return when the slice ends, and whether it is certain of the target."""
+        frame_s = now_s + self._dice.random() / FRAME_RATE_HZ
+        wanted = self._condition.frames_wanted
         while frame_s < end_s:
-            is_seen = any(b <= frame_s <= e for b, e in chosen.views)
-            if watch.look(is_seen, self._bursts.next_is_bad()):
+            is_seen = any(begin_s <= frame_s <= over_s for begin_s, over_s in one.views)
+            self._slice.look(is_seen, self._bursts.next_is_bad())
+            if self._slice.certain >= wanted:
                 return end_s, True
+            missing = self._slice.missing(wanted)
+            if missing:
+                wish_s = min(frame_s + frames_s(self._parameters, missing + 1), self._slice.longest_until_s)
+                end_s = max(end_s, wish_s)
             frame_s += 1.0 / FRAME_RATE_HZ
-            if end_s - ASK_BEFORE_END_S <= frame_s and end_s < most_s and any(watch.votes):
-                missing = max(1, self._condition.frames_wanted - watch.certain)
-                end_s = min(most_s, end_s + max(ASK_BEFORE_END_S, missing / (FRAME_RATE_HZ * CLEAN_SHARE)))
         return end_s, False

@@ -30,7 +30,7 @@ from mission_control.experiments.mission_file import (
     watcher_of,
 )
 from mission_control.experiments.operator import Operator
-from mission_control.experiments.prediction import SWITCH_S, departs_s
+from mission_control.experiments.prediction import departs_s
 from mission_control.messages import MotionSeen
 from resource_pool.messages import WorldState
 from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
@@ -95,7 +95,7 @@ def draw(condition: Condition, seed: int, number: int) -> Draw:
     phase, world_seed = dice.random(), dice.randrange(2**31)
     if condition.channels == 1 and condition.policy == "paper":
         turn = phase * len(condition.robots)
-        turn_s = condition.slice_s + SETTLING_S + SWITCH_S
+        turn_s = condition.slice_s + SETTLING_S
         return Draw(int(turn), round(turn % 1.0 * turn_s * FRAMES_PER_S), world_seed)
     return Draw(0, round(departs_s(condition, phase) * FRAMES_PER_S), world_seed)
 
@@ -159,12 +159,15 @@ class _Trial:
         for place in range(len(turns)):
             robot = turns[(self._draw.first + place) % len(turns)]
             if robot in condition.watching:
-                order, arc = watchers[watcher_of(robot)], f"{watcher_of(robot)}-capture"
+                order, arc = self._watcher(watchers[watcher_of(robot)]), f"{watcher_of(robot)}-capture"
             else:
                 order, arc = self._console(robot), f"console-{robot}-video_drive"
             asked = self._requested[arc] = asyncio.Event()
             await running.start(order)
             await asked.wait()
+
+    def _watcher(self, order: Start) -> Start:
+        return msgspec.structs.replace(order, parameters={**order.parameters, "seed": self._draw.world_seed})
 
     def _console(self, robot: str) -> Start:
         condition = self._condition

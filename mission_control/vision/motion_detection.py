@@ -13,6 +13,7 @@ on simulated links of 13 to 40 dB, where they gave no false alarm.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -171,9 +172,9 @@ class MotionDetector:
         self._votes.clear()
 
     @property
-    def has_glimpsed(self) -> bool:
-        """Whether any of the last ``VOTERS`` pictures since the swap had a region, certain or not."""
-        return any(self._votes)
+    def votes(self) -> Sequence[bool]:
+        """Whether each of the last ``VOTERS`` judged pictures since the swap had a region, newest last."""
+        return self._votes
 
     @property
     def stages(self) -> Stages | None:
