@@ -113,7 +113,18 @@ class Draft:
         Raises:
             Refusal: ``DesignRefused``, ``EditRefused`` or ``IllegalName``: it cannot be done.
         """
-        step = carry_out(self.step, command)
+        return self._after(carry_out(self.step, command))
+
+    def taken_from(self, text: bytes) -> Draft:
+        """Return the draft that has what the file holds now; what it had before can be had again by undo.
+
+        Raises:
+            MissionInvalid: It is no XML.
+        """
+        outline(text)
+        return replace(self._after(Step(text)), saved=text)
+
+    def _after(self, step: Step) -> Draft:
         if step.text == self.text:
             return self
         return replace(self, step=step, past=(*self.past, self.step)[-UNDO_MOST:], future=())

@@ -47,13 +47,18 @@ def save(draft: Draft, path: Path, *, overwrite: bool = False) -> Draft:
         known = draft.saved if path == Path(draft.source) else None
         if not overwrite and holds is not None and holds not in (known, draft.text):
             raise FileChanged(f"{path} holds something else than was opened or saved last")
-        _replace(target, draft.text)
+        replace_file(target, draft.text)
     except OSError as error:
         raise NotSaved(f"{path}: {error.strerror or error}") from error
     return draft.kept(str(path))
 
 
-def _replace(target: Path, text: bytes) -> None:
+def replace_file(target: Path, text: bytes) -> None:
+    """Have a file hold these bytes: whoever reads it meanwhile sees all of the old or all of the new; its mode stays.
+
+    Raises:
+        OSError: The system refused; the file is as it was.
+    """
     descriptor, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
     try:
         with os.fdopen(descriptor, "wb") as file:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from backbone.mission.edit import NewElement, Node, Path
+from backbone.mission.report import told, told_names
 from backbone.mission.schema import vocabulary
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
 from ui_console.design.commands import (
@@ -62,6 +63,23 @@ class Offer:
     asks: tuple[Asked, ...]
     build: Callable[[Sequence[str]], Command]
 
+    @property
+    def must_ask(self) -> bool:
+        """Something is asked that has no proposal, or several answers that make sense."""
+        return any(not asked.proposed or len(asked.choices) > 1 for asked in self.asks)
+
+    def command(self, answers: Sequence[str]) -> Command:
+        """Return the command these answers make; none at all: what is proposed.
+
+        Raises:
+            DesignRefused: There is not one for each question, or they make no sense.
+        """
+        if not answers:
+            answers = [asked.proposed for asked in self.asks]
+        if len(answers) != len(self.asks):
+            raise DesignRefused(f"{self.label} asks for {len(self.asks)} answers, not {len(answers)}")
+        return self.build(answers)
+
 
 def offers(mission: Node, path: Path) -> list[Offer]:
     """Return what may be added: in an element first, then in those above it, each kind at the nearest that can hold it.
@@ -75,6 +93,26 @@ def offers(mission: Node, path: Path) -> list[Offer]:
         for offer in _offers(mission, mission.at(path[:depth])):
             found.setdefault(offer.label, offer)
     return list(found.values())
+
+
+def offer_at(mission: Node, path: Path, label: str) -> Offer:
+    """Return the offer of this label at an element; for what belongs in an ARC a behavior stands for its ARC.
+
+    Raises:
+        DesignRefused: It cannot be added there.
+        EditRefused: There is no such element.
+    """
+    arc = mission.at(path).first("arc")
+    for place in (path, *(() if arc is None else (arc.path,))):
+        for offer in offers(mission, place):
+            if offer.label == label:
+                return offer
+    kind = label.partition(" ")[0]
+    holders = [f"<{tag}>" for tag, rule in vocabulary().items() if kind in rule.children]
+    raise DesignRefused(
+        f"{told(label)} cannot be added to <{mission.at(path).tag}> or what it stands in",
+        remedy=f"It belongs in {told_names(holders)}." if holders else "Choose something else.",
+    )
 
 
 def free_name(mission: Node, wished: str) -> str:

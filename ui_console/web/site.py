@@ -7,6 +7,7 @@ anywhere else.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from urllib.parse import urlsplit
@@ -16,9 +17,23 @@ FILES = {
     "/console.css": ("console.css", "text/css; charset=utf-8"),
     "/main.js": ("main.js", "text/javascript; charset=utf-8"),
     "/link.js": ("link.js", "text/javascript; charset=utf-8"),
+    "/login.js": ("login.js", "text/javascript; charset=utf-8"),
     "/driving.js": ("driving.js", "text/javascript; charset=utf-8"),
     "/pictures.js": ("pictures.js", "text/javascript; charset=utf-8"),
     "/tables.js": ("tables.js", "text/javascript; charset=utf-8"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
+}
+DESIGN_FILES = {
+    "/": ("design.html", "text/html; charset=utf-8"),
+    "/console.css": ("console.css", "text/css; charset=utf-8"),
+    "/design.css": ("design.css", "text/css; charset=utf-8"),
+    "/link.js": ("link.js", "text/javascript; charset=utf-8"),
+    "/login.js": ("login.js", "text/javascript; charset=utf-8"),
+    "/design.js": ("design.js", "text/javascript; charset=utf-8"),
+    "/design_tree.js": ("design_tree.js", "text/javascript; charset=utf-8"),
+    "/design_drag.js": ("design_drag.js", "text/javascript; charset=utf-8"),
+    "/design_panels.js": ("design_panels.js", "text/javascript; charset=utf-8"),
+    "/design_dialogs.js": ("design_dialogs.js", "text/javascript; charset=utf-8"),
     "/icon.svg": ("icon.svg", "image/svg+xml"),
 }
 SOCKET_PATH = "/socket"
@@ -47,12 +62,16 @@ class Answer:
 
 
 class Site:
-    """The files of the page, read from the package."""
+    """The files of a page, read from the package.
 
-    def __init__(self) -> None:
+    Args:
+        files: Path of the address → name of the file and its type.
+    """
+
+    def __init__(self, files: Mapping[str, tuple[str, str]] = FILES) -> None:
         folder = resources.files("ui_console.web").joinpath("page")
         self._answers: dict[str, Answer] = {}
-        for path, (name, kind) in FILES.items():
+        for path, (name, kind) in files.items():
             body = folder.joinpath(name).read_bytes()
             tag = f'"{hashlib.sha256(body).hexdigest()[:16]}"'
             self._answers[path] = Answer(200, {**SAFETY, "Content-Type": kind, "ETag": tag}, body)

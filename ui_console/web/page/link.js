@@ -7,14 +7,14 @@ const NOT_LET_IN = 1008;
 
 /** One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets (isUp, why). */
 export class Link {
-  constructor({ heard, saw, changed }) {
+  constructor({ heard, saw, changed, silentMs = SILENT_MS }) {
     Object.assign(this, { heard, saw, changed });
     this.socket = null;
     this.isUp = false;
     this.waitMs = AGAIN_FIRST_MS;
     this.timer = 0;
     this.heardAt = 0;
-    setInterval(() => { if (this.isUp && performance.now() - this.heardAt > SILENT_MS) this.giveUp(); }, 250);
+    setInterval(() => { if (this.isUp && performance.now() - this.heardAt > silentMs) this.giveUp(); }, 250);
   }
 
   open(hello) {

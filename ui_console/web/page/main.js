@@ -2,6 +2,7 @@
 
 import { Driving } from "./driving.js";
 import { Link } from "./link.js";
+import { Login } from "./login.js";
 import { Cards } from "./pictures.js";
 import { Tables, seconds } from "./tables.js";
 
@@ -19,36 +20,7 @@ const driving = new Driving({
 });
 
 // ---------------------------------------------------------------- coming in
-find("login").addEventListener("submit", (event) => {
-  event.preventDefault();
-  enter(find("login-token").value.trim(), find("login-user").value.trim());
-});
-
-function enter(token, user) {
-  sessionStorage.setItem("token", token);
-  sessionStorage.setItem("user", user);
-  find("login").hidden = true;
-  link.open({ token, user });
-}
-
-function begin() {
-  const given = new URLSearchParams(location.hash.slice(1));
-  if (given.has("token")) {
-    sessionStorage.setItem("token", given.get("token"));
-    if (given.has("user")) sessionStorage.setItem("user", given.get("user"));
-    history.replaceState(null, "", location.pathname); // so that no picture of the screen shows the token
-  }
-  const token = sessionStorage.getItem("token");
-  if (token) enter(token, sessionStorage.getItem("user") ?? "");
-  else askWho("");
-}
-
-function askWho(why) {
-  find("login-why").textContent = why;
-  find("login").hidden = false;
-  find("console").hidden = true;
-  find("login-token").focus();
-}
+const login = new Login({ form: find("login"), enter: (hello) => link.open(hello) });
 
 function changed(isUp, why, isRefused = false) {
   const shown = find("link");
@@ -58,7 +30,7 @@ function changed(isUp, why, isRefused = false) {
   document.body.classList.toggle("is-down", !isUp);
   if (isUp) { find("console").hidden = false; cards.watch(); return; }
   driving.letGo();
-  if (isRefused) { sessionStorage.removeItem("token"); askWho(why); }
+  if (isRefused) { find("console").hidden = true; login.ask(why); }
 }
 
 // ---------------------------------------------------------------- what is heard
@@ -147,4 +119,4 @@ addEventListener("pointerdown", () => {
   say({ do: "here", is_there: true });
 }, true);
 
-begin();
+login.begin();

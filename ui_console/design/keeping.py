@@ -1,0 +1,113 @@
+"""The draft file: what is not saved yet, beside the mission file, so that no reload, restart or power cut loses it.
+
+It is there only while there is something to lose. It holds the text and what the mission file held when it was
+opened or saved last, so that somebody else's change is seen also after a restart; the steps to undo are not kept.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+import msgspec
+
+from backbone.errors import Refusal
+from backbone.mission.document import MAX_BYTES
+from backbone.mission.edit import outline
+from backbone.mission.report import MissionInvalid
+from ui_console.design.draft import Draft
+from ui_console.design.effects import Step
+from ui_console.design.file import replace_file
+
+FORMAT = 1
+MOST_BYTES = 4 * MAX_BYTES  # two texts in Base64 and what is around them
+
+
+class DraftUnreadable(Refusal):
+    """The draft file is none, or cannot be read."""
+
+    code = "design.draft_unreadable"
+    remedy = "Remove it to begin with what the mission file holds."
+
+
+class DraftNotKept(Refusal):
+    """What is not saved could not be kept either; it is only in the server's memory."""
+
+    code = "design.draft_not_kept"
+    remedy = "Save the mission, or free the disk."
+
+
+class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    format: int
+    text: bytes
+    saved: bytes | None
+
+
+class DraftFile:
+    """What is kept of one draft; only whoever keeps it writes there.
+
+    Args:
+        source: The mission file.
+    """
+
+    def __init__(self, source: str) -> None:
+        self.path = path_of_draft(source)
+        self._source = source
+        self._wrote: bytes | None = None
+
+    def resume(self) -> Draft | None:
+        """Return what was kept; None: nothing was.
+
+        Raises:
+            DraftUnreadable: It is no draft.
+        """
+        try:
+            if not self.path.exists():
+                return None
+            with self.path.open("rb") as file:
+                data = file.read(MOST_BYTES + 1)
+            kept = msgspec.json.decode(data, type=_Kept)
+            outline(kept.text)
+        except OSError as error:
+            raise DraftUnreadable(f"{self.path}: {error.strerror or error}") from error
+        except (msgspec.DecodeError, MissionInvalid) as error:
+            raise DraftUnreadable(f"{self.path} is no draft of a mission") from error
+        if kept.format != FORMAT or len(data) > MOST_BYTES:
+            raise DraftUnreadable(f"{self.path} is no draft that this program wrote")
+        self._wrote = data
+        return Draft(self._source, Step(kept.text), saved=kept.saved)
+
+    def keep(self, draft: Draft) -> None:
+        """Have the draft file hold this draft, or be away if there is nothing to lose.
+
+        Raises:
+            DraftNotKept: The system refused, or another designer keeps its draft there.
+        """
+        try:
+            there = self.path.read_bytes() if self.path.exists() else None
+            if there is not None and there != self._wrote:
+                raise DraftNotKept(
+                    f"{self.path} is another designer's", remedy="End the other one, then save or change something."
+                )
+            if draft.is_changed:
+                data = msgspec.json.encode(_Kept(FORMAT, draft.text, draft.saved))
+                if data != there:
+                    replace_file(self.path, data)
+                self._wrote = data
+            else:
+                with contextlib.suppress(FileNotFoundError):
+                    self.path.unlink()
+                self._wrote = None
+        except OSError as error:
+            raise DraftNotKept(f"{self.path}: {error.strerror or error}") from error
+
+
+def path_of_draft(source: str) -> Path:
+    """Return where the draft of a mission file is kept.
+
+    Example:
+        >>> str(path_of_draft("missions/guard.xml"))
+        'missions/.guard.xml.draft'
+    """
+    path = Path(source)
+    return path.with_name(f".{path.name}.draft")

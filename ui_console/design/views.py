@@ -1,0 +1,299 @@
+"""A draft as a page shows it: plain values, ready for JSON.
+
+Pure: a draft in, views out. What they say is what the terminal's designer says, for both ask ``offers``,
+``properties``, ``catalogue`` and the draft itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import msgspec
+
+from backbone.dry_run import DryRun
+from backbone.mission.edit import Node, Path
+from backbone.mission.schema import vocabulary
+from backbone.rc_manager.rehearsal import Run
+from ui_console.design.catalogue import ClassFacts, Role, TypeEntry, description, entries
+from ui_console.design.draft import Draft
+from ui_console.design.lines import summary
+from ui_console.design.offers import Offer, offers
+from ui_console.design.properties import class_of, properties
+
+ROLES_ADDED = (Role.BEHAVIOR, Role.ARC, Role.RESOURCE)
+GROUPS = {Role.BEHAVIOR: "behaviors", Role.ARC: "ARCs", Role.RESOURCE: "resources"}
+WISHES, ROOM = "wishes", "the room"
+OF_THE_WORLD = ("room", "furniture", "ramp", "landmark", "dark", "air", "target", "scout")
+"""What stands in a world, in the order in which a room is thought of."""
+
+
+class ElementRow(msgspec.Struct, frozen=True):
+    """One element of the tree.
+
+    Attributes:
+        path: Where it stands.
+        tag: Its tag.
+        told: What tells it from its siblings.
+        problems: What is wrong with it or with one of its parameters, with what to do about it.
+    """
+
+    path: Path
+    tag: str
+    told: str
+    problems: tuple[str, ...]
+
+
+class ProblemRow(msgspec.Struct, frozen=True):
+    """One problem, as ``scout-backbone check`` tells it.
+
+    Attributes:
+        line: Of the text as it would be saved, from 1.
+        column: From 1.
+        message: What is wrong.
+        remedy: What to do about it.
+        path: The element it is about.
+    """
+
+    line: int
+    column: int
+    message: str
+    remedy: str
+    path: Path
+
+
+class PaletteRow(msgspec.Struct, frozen=True):
+    """Something that may be added somewhere.
+
+    Attributes:
+        label: Its offer's, see ``offers``.
+        group: Under which heading.
+        name: What is shown.
+        tag: Of the element that it becomes.
+        type: Component type whose class can be looked up; empty: none.
+        is_known: Whether its class was looked up.
+        doc: What it is, as lines.
+    """
+
+    label: str
+    group: str
+    name: str
+    tag: str
+    type: str
+    is_known: bool
+    doc: tuple[str, ...]
+
+
+class AskedView(msgspec.Struct, frozen=True):
+    """Something to be asked, as ``offers.Asked``."""
+
+    name: str
+    doc: str
+    proposed: str
+    choices: tuple[str, ...]
+
+
+class OfferView(msgspec.Struct, frozen=True):
+    """Something that may be added here, or above."""
+
+    label: str
+    doc: str
+    asks: tuple[AskedView, ...]
+
+
+class PropertyView(msgspec.Struct, frozen=True):
+    """One thing that can be set, as ``properties.Property``."""
+
+    name: str
+    value: str | None
+    default: str | None
+    is_missing: bool
+    is_parameter: bool
+    doc: str
+    choices: tuple[str, ...]
+
+
+class ElementView(msgspec.Struct, frozen=True):
+    """All about the element a person has chosen.
+
+    Attributes:
+        path: Where it stands.
+        tag: Its tag.
+        told: What tells it from its siblings.
+        line: Its line in the text.
+        doc: What its tag means.
+        type_doc: What its component's class says of itself, as lines; may be empty.
+        properties: What can be set.
+        offers: What may be added to it, or to those above it.
+    """
+
+    path: Path
+    tag: str
+    told: str
+    line: int
+    doc: str
+    type_doc: tuple[str, ...]
+    properties: tuple[PropertyView, ...]
+    offers: tuple[OfferView, ...]
+
+
+class TurnView(msgspec.Struct, frozen=True):
+    """From when to when a resource was somebody's.
+
+    Attributes:
+        from_s: When its RCs began to settle.
+        open_s: When it could be used; ``to_s`` if never.
+        to_s: When it was free again.
+        who: Whose.
+    """
+
+    from_s: float
+    open_s: float
+    to_s: float
+    who: str
+
+
+class RehearsalRow(msgspec.Struct, frozen=True):
+    """One ARC or resource and its turns."""
+
+    name: str
+    is_arc: bool
+    turns: tuple[TurnView, ...]
+
+
+class RehearsalView(msgspec.Struct, frozen=True):
+    """What the mission would do at first.
+
+    Attributes:
+        end_s: For how long, mission seconds.
+        rows: ARCs, then resources.
+        told: What became of each request, a line each.
+        never: Requests that never run and components without a host, with the reason.
+    """
+
+    end_s: float
+    rows: tuple[RehearsalRow, ...]
+    told: tuple[str, ...]
+    never: tuple[str, ...]
+
+
+def tree_view(draft: Draft) -> list[ElementRow]:
+    """Return every element but parameters, in the order of the text, each with its problems."""
+    about: dict[Path, list[str]] = {}
+    for fault in draft.problems:
+        path = draft.element_of(fault)
+        shown = path[:-1] if draft.mission.at(path).tag == "parameter" else path
+        about.setdefault(shown, []).append(f"{fault.message} ({fault.remedy})")
+    return [
+        ElementRow(node.path, node.tag, summary(node), tuple(about.get(node.path, ())))
+        for node in draft.mission
+        if node.tag != "parameter"
+    ]
+
+
+def problems_view(draft: Draft) -> list[ProblemRow]:
+    """Return all problems in the order of the text."""
+    return [
+        ProblemRow(fault.line, fault.column, fault.message, fault.remedy, draft.element_of(fault))
+        for fault in draft.problems
+    ]
+
+
+def places() -> dict[str, list[str]]:
+    """Return for each tag which may stand in it."""
+    return {tag: list(rule.children) for tag, rule in vocabulary().items()}
+
+
+def palette(mission: Node, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
+    """Return what can be dragged into the tree: component types, wishes for resources, what a room is made of.
+
+    Args:
+        mission: The designed file.
+        facts: Class path → what the class says of itself.
+    """
+    at_hand = entries(mission)
+    found = [_type_row(entry, facts) for role in ROLES_ADDED for entry in at_hand if entry.role is role]
+    found += [
+        PaletteRow(f"wish {kind}", WISHES, kind, "wish", "", is_known=True, doc=(vocabulary()["wish"].documentation,))
+        for kind in dict.fromkeys(need for entry in at_hand if entry.role is Role.ARC for need in entry.needs)
+    ]
+    tags = (*(() if mission.first("world") is not None else ("world",)), *OF_THE_WORLD)
+    return found + [
+        PaletteRow(tag, ROOM, tag, tag, "", is_known=True, doc=(vocabulary()[tag].documentation,)) for tag in tags
+    ]
+
+
+def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> ElementView:
+    """Return all about one element.
+
+    Args:
+        draft: The draft.
+        path: The element; must be there.
+        facts: Class path → what the class says of itself.
+    """
+    mission = draft.mission
+    node = mission.at(path)
+    rule = vocabulary().get(node.tag)
+    found = properties(mission, node, facts)
+    told = [
+        PropertyView(one.name, one.value, one.default, one.is_missing, one.is_parameter, one.doc, one.choices)
+        for one in found
+    ]
+    known = facts.get(class_of(mission, node)) if node.text("type") else None
+    return ElementView(
+        path,
+        node.tag,
+        summary(node),
+        node.line,
+        "" if rule is None else rule.documentation,
+        () if known is None else tuple(known.doc.splitlines()),
+        tuple(told),
+        tuple(offer_view(offer) for offer in offers(mission, path)),
+    )
+
+
+def offer_view(offer: Offer) -> OfferView:
+    """Return an offer without the way it is taken."""
+    asks = tuple(AskedView(one.name, one.doc, one.proposed, one.choices) for one in offer.asks)
+    return OfferView(offer.label, offer.doc, asks)
+
+
+def rehearsal_view(dry: DryRun) -> RehearsalView:
+    """Return who would run when."""
+    seen = dry.timetable
+    arcs = [
+        RehearsalRow(one.arc, is_arc=True, turns=tuple(_turn(run, ", ".join(run.uses)) for run in seen.of_arc(one.arc)))
+        for one in dry.claimed
+    ]
+    rcs = [
+        RehearsalRow(rc, is_arc=False, turns=tuple(_turn(run, run.arc) for run in seen.runs if rc in run.uses))
+        for rc in seen.utilization()
+    ]
+    told = [
+        f"{one.arc}: {one.turns} turns, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
+        for one in dry.claimed
+        if not one.never_runs
+    ]
+    never = [
+        f"{one.arc} never runs: {one.refused or 'nothing of what it needs is ever left over'}"
+        for one in dry.claimed
+        if one.never_runs
+    ]
+    never += [f"{one.name} has no host: {'; '.join(one.reasons)}" for one in dry.placed if not one.host]
+    return RehearsalView(seen.end_s, tuple(arcs + rcs), tuple(told), tuple(never))
+
+
+def _type_row(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> PaletteRow:
+    tag = "arc" if entry.role is Role.ARC else str(entry.role)
+    return PaletteRow(
+        f"{tag} {entry.name}",
+        GROUPS[entry.role],
+        entry.name,
+        tag,
+        entry.name,
+        is_known=entry.class_path in facts,
+        doc=tuple(description(entry, facts)),
+    )
+
+
+def _turn(run: Run, who: str) -> TurnView:
+    return TurnView(run.connect_s, run.free_s if run.grant_s is None else run.grant_s, run.free_s, who)

@@ -1,0 +1,327 @@
+"""One mission file and the people who design it in their browsers: they share the draft, and each has a cursor.
+
+What a change does is decided in ``designing``; here it is done in turn, told to all, and kept beside the file.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any, assert_never
+
+import msgspec
+
+from backbone.bus.interface import Clock
+from backbone.errors import Refusal
+from backbone.mission.edit import Path, outline
+from backbone.mission.reader import MissionInvalid
+from ui_console.design.catalogue import ClassFacts, entries, stock_classes
+from ui_console.design.commands import DesignRefused
+from ui_console.design.draft import Draft
+from ui_console.design.file import FileChanged, save
+from ui_console.design.keeping import DraftFile, DraftNotKept
+from ui_console.design.views import RehearsalView, element_view, rehearsal_view
+from ui_console.web.design_protocol import (
+    Change,
+    DesignIntent,
+    LookUp,
+    MoveElement,
+    ReadText,
+    Redo,
+    Rehearse,
+    RemoveElement,
+    SaveFile,
+    Select,
+    SetProperty,
+    TakeFile,
+    TakeOffer,
+    Undo,
+)
+from ui_console.web.designing import ChangedMeanwhile, MustAsk, changed, question, sections, sibling_file, touched_by
+from ui_console.web.door import Offence, Welcome
+from ui_console.web.outbox import Outbox
+
+log = logging.getLogger(__name__)
+
+BEAT_EVERY_S = 1.0  # chosen: a page says that the server is silent after five of them
+
+LookUpClasses = Callable[[Sequence[str]], Awaitable[dict[str, ClassFacts]]]
+
+
+class Designer:
+    """A person at a page.
+
+    Args:
+        welcome: Who it is.
+    """
+
+    def __init__(self, welcome: Welcome) -> None:
+        self.welcome = welcome
+        self.outbox = Outbox()
+        self.news = asyncio.Event()
+        self.at: Path = ()
+        """The element all about which is shown."""
+        self.sees_rehearsal = False
+        self.handled = 0
+        """How much that names a revision was done or refused; the page says one such thing at a time."""
+
+    def tell(self, name: str, view: Any) -> None:
+        """Have a section of the view told."""
+        self.outbox.put_section(name, msgspec.json.encode(view))
+        self.news.set()
+
+    def answer(self, **answer: Any) -> None:
+        """Have an answer told."""
+        self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
+        self.news.set()
+
+
+class DesignRoom:
+    """Serves any number of designers of one file.
+
+    Args:
+        draft: What is designed.
+        kept: Where it is kept until it is saved.
+        look_up: Asks classes for their documentation and parameters, see ``look_up.look_up``.
+        clock: Of this machine.
+    """
+
+    def __init__(self, draft: Draft, kept: DraftFile, look_up: LookUpClasses, clock: Clock) -> None:
+        self.draft = draft
+        self.revision = 1
+        self.guests: dict[Designer, None] = {}
+        self._kept, self._look_up, self._clock = kept, look_up, clock
+        self._facts: dict[str, ClassFacts] = {}
+        self._trusted = _classes_of(draft.saved)
+        self._turn = asyncio.Lock()
+        self._told: dict[str, bytes] = {}
+        self._rehearsal: tuple[int, RehearsalView | None] = (0, None)
+        self._to_keep = asyncio.Event()
+        self._keeping: asyncio.Task[None] | None = None
+        self._changed_by = ""
+
+    # ------------------------------------------------------------------ designers come and go
+    def enter(self, welcome: Welcome) -> Designer:
+        """Return a new designer, who is told everything there is."""
+        guest = Designer(welcome)
+        self.guests[guest] = None
+        guest.tell("welcome", {"user": welcome.user})
+        if self._told:
+            self._tell(guest)
+        self._tell_people()
+        return guest
+
+    async def leave(self, guest: Designer, reason: str) -> None:
+        """Let a designer go; the draft stays."""
+        self.guests.pop(guest, None)
+        log.info("%s left: %s", guest.welcome.user, reason)
+        self._tell_people()
+
+    def refused(self, guest: Designer) -> None:
+        """Nothing of a designer's goes on by itself."""
+
+    def offended(self, who: str, offence: Offence) -> None:
+        """Have the designers know of a visitor that did what it must not."""
+        log.warning("%s %s", who, offence.line)
+        for guest in self.guests:
+            guest.answer(notice=f"{who} {offence.line}", remedy=offence.remedy)
+
+    # ------------------------------------------------------------------ what pages ask for
+    async def obey(self, guest: Designer, intent: DesignIntent) -> None:
+        """Do what a designer asks, one after the other; what is refused is told to that one."""
+        try:
+            async with self._turn:
+                await self._do(guest, intent)
+        except MustAsk as must:
+            if isinstance(intent, TakeOffer):
+                guest.answer(**question(intent, must.offer))
+        except FileChanged as refusal:
+            guest.answer(file_changed=refusal.detail, name=intent.name if isinstance(intent, SaveFile) else "")
+        except MissionInvalid as invalid:
+            guest.answer(refused=str(invalid.faults[0]), remedy="Mend the file, or save over it.")
+        except Refusal as refusal:
+            guest.answer(refused=refusal.detail, remedy=refusal.remedy)
+        if isinstance(intent, Change | SaveFile | TakeFile):
+            guest.handled += 1
+            guest.tell("handled", guest.handled)
+
+    async def _do(self, guest: Designer, intent: DesignIntent) -> None:
+        match intent:
+            case Select(path=path):
+                guest.at = self.draft.mission.nearest(path)
+                self._tell_element(guest)
+            case TakeOffer() | SetProperty() | MoveElement() | RemoveElement() | Undo() | Redo():
+                await self._change(guest, intent)
+            case SaveFile():
+                await self._save(guest, intent)
+            case TakeFile(revision=revision):
+                self._must_be(revision)
+                opened = await asyncio.to_thread(Draft.opened, self.draft.source)
+                await self._show(self.draft.taken_from(opened.text), guest.welcome.user)
+            case Rehearse(is_shown=is_shown):
+                guest.sees_rehearsal = is_shown
+                await self._rehearse()
+            case LookUp(type=name):
+                await self._learn_type(name)
+            case ReadText():
+                guest.answer(
+                    text=self.draft.text.decode("utf-8-sig"),
+                    line=self.draft.mission.at(guest.at).line,
+                    source=self.draft.source,
+                )
+            case _:
+                assert_never(intent)
+
+    async def _change(self, guest: Designer, change: Change) -> None:
+        self._must_be(change.revision)
+        before = self.draft
+        after = await asyncio.to_thread(changed, before, change)
+        if after is before:
+            return
+        guest.at = touched_by(change, before, after)
+        await self._show(after, guest.welcome.user)
+
+    async def _save(self, guest: Designer, intent: SaveFile) -> None:
+        self._must_be(intent.revision)
+        path = sibling_file(self.draft.source, intent.name)
+        kept = await asyncio.to_thread(save, self.draft, path, overwrite=intent.overwrite)
+        if kept.source != self.draft.source:
+            await self._keep(self.draft.kept(self.draft.source))  # what is saved elsewhere has nothing to lose here
+            self._kept = DraftFile(kept.source)
+        await self._show(kept, guest.welcome.user)
+        await self._keep(kept)
+        guest.answer(saved=kept.source, problems=len(kept.problems))
+
+    def _must_be(self, revision: int) -> None:
+        if revision != self.revision:
+            by = f" by {self._changed_by}" if self._changed_by else ""
+            raise ChangedMeanwhile(f"the mission was changed{by} meanwhile")
+
+    async def _learn_type(self, name: str) -> None:
+        entry = next((one for one in entries(self.draft.mission) if one.name == name), None)
+        if entry is None:
+            raise DesignRefused(f"there is no type {name!r}")
+        if not entry.is_stock and entry.class_path not in self._trusted:
+            raise DesignRefused(
+                f"{entry.class_path} was not in the file when this server began, and to look it up runs its code",
+                remedy="Save the mission and start the server again.",
+            )
+        await self._learn([entry.class_path])
+
+    # ------------------------------------------------------------------ what goes on beside
+    async def prepare(self) -> None:
+        """Have all there is to tell at hand."""
+        async with self._turn:
+            await self._show(self.draft, "")
+        self._to_keep.clear()
+
+    async def learn_stock(self) -> None:
+        """Ask the project's own classes for their documentation and parameters, and tell it."""
+        facts = await self._look_up(stock_classes())
+        async with self._turn:
+            await self._known(facts)
+
+    async def beat(self) -> None:
+        """Have every page know that the server is there; until cancelled."""
+        for number in itertools.count():
+            for guest in self.guests:
+                guest.tell("beat", number)
+            await self._clock.sleep_s(BEAT_EVERY_S)
+
+    async def keep_on(self) -> None:
+        """Keep the draft beside the file whenever it has changed; until cancelled."""
+        while True:
+            await self._to_keep.wait()
+            self._to_keep.clear()
+            async with self._turn:
+                await self._keep(self.draft)
+
+    async def keep_now(self) -> None:
+        """Keep the draft as it is, if it was changed since it was kept."""
+        if self._to_keep.is_set():
+            self._to_keep.clear()
+            await self._keep(self.draft)
+
+    async def _keep(self, draft: Draft) -> None:
+        if self._keeping is not None:
+            await asyncio.wait({self._keeping})  # whoever wanted that may have been cancelled; it goes on all the same
+        self._keeping = asyncio.create_task(asyncio.to_thread(self._kept.keep, draft), name="design: keep")
+        try:
+            await asyncio.shield(self._keeping)
+        except DraftNotKept as refusal:
+            log.warning("%s", refusal)
+            for guest in self.guests:
+                guest.answer(notice=refusal.detail, remedy=refusal.remedy)
+
+    async def _learn(self, class_paths: Sequence[str]) -> None:
+        await self._known(await self._look_up(class_paths))
+
+    async def _known(self, facts: dict[str, ClassFacts]) -> None:
+        self._facts = {**self._facts, **facts}
+        self._told = await asyncio.to_thread(sections, self.draft, self._facts)
+        for guest in self.guests:
+            self._tell(guest)
+
+    # ------------------------------------------------------------------ what pages are told
+    async def _show(self, draft: Draft, user: str) -> None:
+        """Have all pages show this draft from now on."""
+        told = await asyncio.to_thread(sections, draft, self._facts)
+        self._to_keep.set()
+        if draft is not self.draft:
+            self.revision += 1
+            self._changed_by = user
+        self.draft, self._told = draft, told
+        for guest in self.guests:
+            guest.at = draft.mission.nearest(guest.at)
+            self._tell(guest)
+        await self._rehearse()
+
+    async def _rehearse(self) -> None:
+        watching = [guest for guest in self.guests if guest.sees_rehearsal]
+        if not watching:
+            return
+        if self._rehearsal[0] != self.revision:
+            self._rehearsal = (self.revision, await asyncio.to_thread(_rehearsed, self.draft))
+        for guest in watching:
+            guest.tell("rehearsal", self._rehearsal[1])
+
+    def _tell(self, guest: Designer) -> None:
+        draft = self.draft
+        for name, body in self._told.items():
+            guest.outbox.put_section(name, body)
+        status = {
+            "source": draft.source,
+            "revision": self.revision,
+            "is_changed": draft.is_changed,
+            "is_new": draft.saved is None,
+            "problems": len(draft.problems),
+            "can_undo": bool(draft.past),
+            "can_redo": bool(draft.future),
+            "changed_by": self._changed_by,
+        }
+        guest.tell("status", status)
+        self._tell_element(guest)
+
+    def _tell_element(self, guest: Designer) -> None:
+        guest.tell("element", element_view(self.draft, guest.at, self._facts))
+
+    def _tell_people(self) -> None:
+        users = sorted(guest.welcome.user for guest in self.guests)
+        for guest in self.guests:
+            guest.tell("people", users)
+
+
+def _classes_of(saved: bytes | None) -> set[str]:
+    """Return the classes that the mission file names; whoever wrote it may run code here."""
+    if saved is None:
+        return set()
+    try:
+        return {one.class_path for one in entries(outline(saved))}
+    except MissionInvalid:
+        return set()
+
+
+def _rehearsed(draft: Draft) -> RehearsalView | None:
+    return None if draft.rehearsal is None else rehearsal_view(draft.rehearsal)

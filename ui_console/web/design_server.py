@@ -1,0 +1,70 @@
+"""The designer's server: its page, its socket, and what goes on beside them. No mission needs to be up."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from pathlib import Path
+
+from ui_console.design.draft import Draft
+from ui_console.design.keeping import DraftFile
+from ui_console.web.design_protocol import DesignIntent, understand_designer
+from ui_console.web.design_room import Designer, DesignRoom
+from ui_console.web.door import Doorkeeper
+from ui_console.web.reception import Reception, port_of
+from ui_console.web.site import DESIGN_FILES, Site
+
+
+def begin(source: str) -> tuple[Draft, DraftFile]:
+    """Return the draft of a mission file: what was not saved last time, else what the file holds, else a new mission.
+
+    Raises:
+        DraftUnreadable: What was kept is no draft.
+        MissionInvalid: The file cannot be read, or not even as XML.
+    """
+    kept = DraftFile(source)
+    draft = kept.resume()
+    if draft is None:
+        draft = Draft.opened(source) if Path(source).exists() else Draft.new(source)
+    return draft, kept
+
+
+class DesignServer:
+    """Serves the designer's page and its socket.
+
+    Args:
+        room: The draft and its designers.
+        doorkeeper: Knows the tokens.
+    """
+
+    def __init__(self, room: DesignRoom, doorkeeper: Doorkeeper) -> None:
+        self._room = room
+        self._reception: Reception[Designer, DesignIntent] = Reception(
+            room, doorkeeper, Site(DESIGN_FILES), understand_designer
+        )
+
+    async def run(self, host: str, port: int, ready: Callable[[int], None], end: asyncio.Event) -> None:
+        """Serve until the event is set; what is not saved is kept beside the file.
+
+        Args:
+            host: Address to listen at.
+            port: Port; 0: any that is free.
+            ready: Called with the port once browsers can come.
+            end: Ends it.
+
+        Raises:
+            CannotListen: The address cannot be had.
+            BaseExceptionGroup: With the bug that ended it.
+        """
+        room = self._room
+        await room.prepare()
+        try:
+            async with self._reception.open(host, port) as server, asyncio.TaskGroup() as beside:
+                tasks = [beside.create_task(one(), name=f"design: {one.__name__}") for one in (room.beat, room.keep_on)]
+                tasks.append(beside.create_task(room.learn_stock(), name="design: learn_stock"))
+                ready(port_of(server))
+                await end.wait()
+                for task in tasks:
+                    task.cancel()
+        finally:
+            await room.keep_now()

@@ -1,0 +1,141 @@
+"""What a page's change does to a draft, and what all pages are then told.
+
+Pure: a draft and what was asked in, another draft or typed refusal out; a draft in, sections as JSON out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path as FilePath
+from typing import assert_never
+
+import msgspec
+
+from backbone.mission.edit import Path
+from ui_console.design.catalogue import ClassFacts
+from ui_console.design.commands import DesignRefused, Move, Remove
+from ui_console.design.draft import Draft
+from ui_console.design.offers import Offer, offer_at
+from ui_console.design.properties import Property, properties
+from ui_console.design.views import offer_view, palette, places, problems_view, tree_view
+from ui_console.web.design_protocol import (
+    Change,
+    MoveElement,
+    Redo,
+    RemoveElement,
+    SetProperty,
+    TakeOffer,
+    Undo,
+)
+
+_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*\.xml")
+
+
+class ChangedMeanwhile(DesignRefused):
+    """The draft is not the one a change was meant for."""
+
+    code = "design.changed_meanwhile"
+    remedy = "Look at it as it is now, and do it again if it is still meant."
+
+
+class MustAsk(DesignRefused):
+    """Something has to be answered before it can be added.
+
+    Attributes:
+        offer: What.
+    """
+
+    code = "design.must_ask"
+    remedy = "Answer what it asks."
+
+    def __init__(self, offer: Offer) -> None:
+        super().__init__(f"{offer.label} asks for: {', '.join(one.name for one in offer.asks)}")
+        self.offer = offer
+
+
+def changed(draft: Draft, change: Change) -> Draft:
+    """Return the draft after a change; itself if that changes nothing.
+
+    Raises:
+        MustAsk: It is to be added with answers.
+        Refusal: It cannot be done; see ``Draft.do``.
+    """
+    match change:
+        case TakeOffer(path=path, label=label, answers=answers):
+            offer = offer_at(draft.mission, path, label)
+            if offer.must_ask and not answers:
+                raise MustAsk(offer)
+            return draft.do(offer.command(answers))
+        case SetProperty(path=path, value=value):
+            return draft.do(_property(draft, change).command(path, draft.mission.at(path).tag, value.strip()))
+        case MoveElement(path=path, parent=parent, before=before):
+            return draft.do(Move(path, parent, _place(draft, path, parent, before)))
+        case RemoveElement(path=path):
+            return draft.do(Remove(path))
+        case Undo():
+            return draft.undo()
+        case Redo():
+            return draft.redo()
+        case _:
+            assert_never(change)
+
+
+def touched_by(change: Change, before: Draft, after: Draft) -> Path:
+    """Return the element that a change was about, as it stands afterwards; of a parameter the one that has it."""
+    path = before.step.touched if isinstance(change, Undo) else after.step.touched
+    path = after.mission.nearest(path)
+    return path[:-1] if after.mission.at(path).tag == "parameter" else path
+
+
+def sibling_file(source: str, name: str) -> FilePath:
+    """Return a mission file in the folder of another; an empty name is that one.
+
+    Raises:
+        DesignRefused: It would be no mission file there.
+    """
+    if not name:
+        return FilePath(source)
+    if not _FILE_NAME.fullmatch(name):
+        raise DesignRefused(
+            f"{name!r} is no name of a mission file", remedy="Write letters, digits, '.', '_', '-', and end in .xml."
+        )
+    return FilePath(source).with_name(name)
+
+
+def sections(draft: Draft, facts: Mapping[str, ClassFacts]) -> dict[str, bytes]:
+    """Return what all pages are told of a draft, as JSON by name.
+
+    Args:
+        draft: The draft.
+        facts: Class path → what the class says of itself.
+    """
+    told = {
+        "tree": tree_view(draft),
+        "problems": problems_view(draft),
+        "palette": palette(draft.mission, facts),
+        "places": places(),
+    }
+    return {name: msgspec.json.encode(view) for name, view in told.items()}
+
+
+def question(change: TakeOffer, offer: Offer) -> dict[str, object]:
+    """Return what a page has to ask before it takes an offer."""
+    return {"ask": msgspec.to_builtins(offer_view(offer)), "path": change.path}
+
+
+def _property(draft: Draft, change: SetProperty) -> Property:
+    """Return the property to set; what the class is not known to have may be set as a parameter all the same."""
+    node = draft.mission.at(change.path)
+    for one in properties(draft.mission, node, {}):
+        if (one.name, one.is_parameter) == (change.name, change.is_parameter):
+            return one
+    return Property(change.name, None, None, is_required=False, is_parameter=change.is_parameter, doc="")
+
+
+def _place(draft: Draft, path: Path, parent: Path, before: int | None) -> int:
+    """Return the number that an element gets, which is counted without the element itself."""
+    count = len(draft.mission.at(parent).children)
+    number = count if before is None else before
+    is_later_sibling = bool(path) and parent == path[:-1] and number > path[-1]
+    return number - is_later_sibling
