@@ -51,6 +51,7 @@ from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
+from backbone.operators import OperatorAction, tell_acted
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, ListPlacements, Placements, Start, Started, StopComponent
 from backbone.wire import Envelope, Message
@@ -173,6 +174,8 @@ class Launcher(Component[NoParameters]):
             return
         self.outcome.ready_after_s = time.monotonic() - self._began_s
         self.report("all ready")
+        source = self._description.source
+        tell_acted(self.bus, self.clock, OperatorAction.START_MISSION, self._description.name, f"from {source}")
         watching = asyncio.create_task(self._observer.up(self.bus, self.clock), name="observer")
         try:
             if self._options.for_s is None:
@@ -183,6 +186,11 @@ class Launcher(Component[NoParameters]):
         finally:
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
+
+    def interrupted(self) -> None:
+        """End because the operator pressed Ctrl-C."""
+        tell_acted(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
+        self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Tell of the core services' processes."""
@@ -331,8 +339,8 @@ async def _with_hub(
         own, bus, clock, keeper=keeper, description=description, options=options, observer=observer, began_s=began_s
     )
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        loop.add_signal_handler(number, launcher.end, signal.Signals(number).name)
+    loop.add_signal_handler(signal.SIGTERM, launcher.end, signal.SIGTERM.name)
+    loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
     try:
         await launcher.run()
     except BackboneError as error:

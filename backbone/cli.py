@@ -273,10 +273,13 @@ def start(
     parameters = dict(_parameter(given) for given in parameter or [])
 
     async def work() -> int:
+        from backbone.naming import component_of
+        from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Start, Started
 
-        async with visiting(mission, connect) as (bus, _clock):
+        async with visiting(mission, connect) as (bus, clock):
             started = await bus.ask(ADDRESS, Start(type_, name, parameters, host), Started, within_s=60.0)
+            tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
             print(f"{started.address} on {started.host}, process {started.pid}")
             for reason in started.reasons:
                 say(reason)
@@ -290,10 +293,12 @@ def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> No
     """Stop one component for good."""
 
     async def work() -> int:
+        from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
-        async with visiting(mission, connect) as (bus, _clock):
+        async with visiting(mission, connect) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
+            tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             print(f"{name} ended by {ended.by}")
         return ExitCode.DONE
 
@@ -317,13 +322,13 @@ def set_(
         raise typer.BadParameter("--json shows attributes; leave the value out")
 
     async def work() -> int:
-        import getpass
-
         from backbone.attributes import attributes_of, change
+        from backbone.operators import OperatorAction, login_name, tell_acted
 
-        async with visiting(mission, connect) as (bus, _clock):
+        async with visiting(mission, connect) as (bus, clock):
             if parameter is not None and value is not None:
-                lines = await change(bus, name, parameter, _value(value), getpass.getuser())
+                lines = await change(bus, name, parameter, _value(value), login_name())
+                tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {_value(value)!r}")
             else:
                 shown = await attributes_of(bus, name)
                 if as_json:

@@ -19,6 +19,7 @@ from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
 from backbone.mission_picture import holders_line, look
 from backbone.mission_screen import live_screen
+from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
 from backbone.wire import Envelope
@@ -51,6 +52,7 @@ class ConsoleObserver:
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people."""
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
+        bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, self._heard_act)
 
     def tell(self, line: str) -> None:
         """Print one line, also to whoever waits for readiness."""
@@ -84,8 +86,14 @@ class ConsoleObserver:
                     live.update(f"the nameserver does not answer: {error}", refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
+    def _heard_act(self, envelope: Envelope[Any]) -> None:
+        act: OperatorActed = envelope.body
+        self._show_event(StoryEvent(act.at_s, envelope.source, act.sentence, act.subject, envelope.cause))
+
     def _heard_event(self, envelope: Envelope[Any]) -> None:
-        event: StoryEvent = envelope.body
+        self._show_event(envelope.body)
+
+    def _show_event(self, event: StoryEvent) -> None:
         self._events.append(event)
         if not self._live:
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")

@@ -69,6 +69,14 @@ class _Looks:
 
 
 @dataclass(frozen=True)
+class _Script:
+    """What a console is driven by instead of keys, and for how long it waits for its grant."""
+
+    file: str
+    within_s: float
+
+
+@dataclass(frozen=True)
 class _Site:
     """Where a page is served, and what its operators claim."""
 
@@ -108,7 +116,7 @@ def attach(
         "minimum_runtime_s": minimum_runtime,
     }
     if script:
-        run(lambda: _drive_by_script(mission, connect, wished, script, within))
+        run(lambda: _drive_by_script(mission, connect, wished, user or _user(), _Script(script, within)))
     _need_a_terminal("attach", "--script FILE or --json")
     looks = _Looks(profile, user or _user(), is_bare=video_only, has_gamepad=gamepad)
     run(lambda: _drive_by_hand(mission, connect, {**wished, "away_after_s": away_after}, looks))
@@ -201,12 +209,13 @@ def _need_a_terminal(command: str, instead: str) -> None:
 
 
 async def _drive_by_script(
-    mission: str | None, connect: str | None, wished: dict[str, Any], script: str, within_s: float
+    mission: str | None, connect: str | None, wished: dict[str, Any], user: str, given: _Script
 ) -> int:
     from ui_console.script import WrongScript, read_script
     from ui_console.scripted import ScriptDriver, feed_from
     from ui_console.teleoperation import Teleoperation
 
+    script = given.file
     try:
         steps = None if script == "-" else read_script(await asyncio.to_thread(Path(script).read_text))
     except (OSError, UnicodeDecodeError) as error:
@@ -216,9 +225,9 @@ async def _drive_by_script(
         say(f"{script}: {wrong}")
         return ExitCode.USAGE
     launch, clock = await _launch(mission, connect, wished)
-    driver = ScriptDriver(_write_line, steps, within_s=within_s)
+    driver = ScriptDriver(_write_line, steps, within_s=given.within_s)
     bus = await _open_bus(launch, clock)
-    console = Teleoperation(launch, bus, clock, show=driver.show, work=driver.drive, watches=False)
+    console = Teleoperation(launch, bus, clock, show=driver.show, work=driver.drive, watches=False, user=user)
     if script == "-":
         feed_from(sys.stdin.fileno(), driver.feed)
     interrupted = _end_on_signals(console)
@@ -289,7 +298,9 @@ async def _look_once(mission: str | None, connect: str | None, user: str) -> int
 
     launch, clock = await _launch(mission, connect, {})
     model = ConsoleModel(launch.name, user, TeamModel(launch.mission), sees=False)
-    console: Observer[NoParameters] = Observer(launch, await _open_bus(launch, clock), clock, show=model.apply)
+    console: Observer[NoParameters] = Observer(
+        launch, await _open_bus(launch, clock), clock, show=model.apply, signs_in=False
+    )
     interrupted = _end_on_signals(console)
 
     async def end_when_listed() -> None:
@@ -398,12 +409,9 @@ async def _design(draft: Draft) -> int:
 
 def _user() -> str:
     """Return who is logged in, as far as the system knows."""
-    import getpass
+    from backbone.operators import login_name
 
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError):  # a user without a name, in a container
-        return f"uid-{os.getuid()}"
+    return login_name()
 
 
 async def _launch(mission: str | None, connect: str | None, parameters: dict[str, Any]) -> tuple[Launch, Clock]:

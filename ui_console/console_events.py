@@ -13,6 +13,7 @@ import msgspec
 
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import Leases, Schedule, Why
 from resource_pool.arc_client import StopState
 
@@ -180,6 +181,21 @@ class StoryHeard:
 
 
 @dataclass(frozen=True, slots=True)
+class ActHeard:
+    """An operator did something.
+
+    Attributes:
+        at_s: When it was heard.
+        act: What it was.
+        where: Address of the console or command it was done by.
+    """
+
+    at_s: float
+    act: OperatorActed
+    where: str
+
+
+@dataclass(frozen=True, slots=True)
 class ComponentHeard:
     """A component said how it is."""
 
@@ -299,6 +315,7 @@ TeamEvent = (
     ScheduleHeard
     | LeasesHeard
     | StoryHeard
+    | ActHeard
     | ComponentHeard
     | ComponentsListed
     | ComponentGone
@@ -324,6 +341,7 @@ _WORDS: dict[type[Any], str] = {
     ScheduleHeard: "schedule",
     LeasesHeard: "leases",
     StoryHeard: "story",
+    ActHeard: "operator",
     ComponentHeard: "component",
     ComponentsListed: "components",
     ComponentGone: "gone",
@@ -356,7 +374,16 @@ def event_json(event: ConsoleEvent) -> bytes:
     return msgspec.json.encode({"event": event_word(event), **plain})
 
 
-FOR_SCRIPTS = (ScheduleHeard, StoryHeard, StopHeard, ComponentGone, ProcessFallen, LinkTrouble, CommandRefused)
+FOR_SCRIPTS = (
+    ScheduleHeard,
+    StoryHeard,
+    ActHeard,
+    StopHeard,
+    ComponentGone,
+    ProcessFallen,
+    LinkTrouble,
+    CommandRefused,
+)
 """What a program that watches a mission is told; the rest comes several times a second."""
 
 

@@ -88,6 +88,28 @@ def drive_towards(direction: Direction, speed_rad_s: float) -> Drive:
             return Drive(turn, -turn)
 
 
+class DriveSpan:
+    """Finds where one drive of an operator begins and ends among the commands that were applied.
+
+    Laws: begin and end take turns, a begin first; only a drive begins one.
+    """
+
+    def __init__(self) -> None:
+        self._began_s: float | None = None
+
+    def begins(self, command: Command, at_s: float) -> bool:
+        """Take in a command that was applied; return True if a drive begins with it."""
+        if self._began_s is not None or not isinstance(command, Drive):
+            return False
+        self._began_s = at_s
+        return True
+
+    def ends(self, at_s: float) -> float | None:
+        """The wheels stand, or the robot is gone: return how long the drive took, seconds; None: there was none."""
+        began_s, self._began_s = self._began_s, None
+        return None if began_s is None else max(0.0, at_s - began_s)
+
+
 class DeadMan:
     """Turns key presses into commands that repeat while a key is held, and one halt after it.
 
@@ -121,6 +143,7 @@ class DeadMan:
         else:
             self._repeats, hold_s, self._next_s = 0, FIRST_HOLD_S, now_s
         self._held, self._pressed_s, self._until_s = drive, now_s, now_s + hold_s
+        self._must_halt = False  # what is held now comes in its place, and ends with one
 
     def stop(self) -> None:
         """Nothing is held any more: a halt is due at once, also if nothing was."""

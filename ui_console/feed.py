@@ -40,12 +40,14 @@ from backbone.nameserver.messages import (
     Resolved,
 )
 from backbone.naming import Subsystem, component_of
+from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases, Schedule
 from backbone.reasons import reasons_for
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.console_events import (
+    ActHeard,
     CommandRefused,
     ComponentGone,
     ComponentHeard,
@@ -98,6 +100,7 @@ class ConsoleFeed:
         bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
         bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_story)
+        bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, self._heard_act)
         bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard_status, latest=True)
         bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_life)
         watch_stops(bus, lambda stop: self._show(StopHeard(self._clock.now_s(), stop)))
@@ -293,6 +296,9 @@ class ConsoleFeed:
 
     def _heard_story(self, envelope: Envelope[Any]) -> None:
         self._show(StoryHeard(self._clock.now_s(), envelope.body))
+
+    def _heard_act(self, envelope: Envelope[Any]) -> None:
+        self._show(ActHeard(self._clock.now_s(), envelope.body, envelope.source))
 
     def _heard_status(self, envelope: Envelope[Any]) -> None:
         self._meet(envelope.body)

@@ -11,6 +11,8 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.keys import Conversation
+from backbone.operators import OperatorActed, OperatorAction
 from resource_pool.arc_client import StopState
 from ui_console.console_events import ConsoleEvent, ScheduleHeard
 from ui_console.feed import ConsoleFeed, FeedEvent
@@ -24,6 +26,7 @@ class Observer(Component[P], Generic[P]):
     Args:
         show: Called in the event loop with each event, in order.
         watches: False for one that is content with its own events.
+        signs_in: Tell the mission that its operator came and left; False where somebody else does.
         user: Who sits at it, for the record; empty: the console's name.
     """
 
@@ -35,40 +38,62 @@ class Observer(Component[P], Generic[P]):
         *,
         show: Callable[[ConsoleEvent], None],
         watches: bool = True,
+        signs_in: bool = True,
         user: str = "",
     ) -> None:
         super().__init__(launch, bus, clock)
-        self.show, self._watches = show, watches
+        self.show, self._watches, self._signs_in = show, watches, signs_in
         self.user = user or launch.name
         self.feed = ConsoleFeed(bus, clock, self._heard)
         """What it listens by, and the verbs that need no grant."""
 
-    # ------------------------------------------------------------------ verbs that need no grant
-    async def stop_robot(self, robot: str, reason: str = "") -> bool:
-        """Stop a robot, whoever holds it; return whether that is certain."""
-        self.tell(robot, f"{self.user} stops it{f': {reason}' if reason else ''}")
-        return not await self.feed.stop_robots([robot], reason, self.user)
+    # ------------------------------------------------------------------ what the operator did
+    def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
+        """Keep that the operator did this, and let the mission know: one event for each action.
 
-    async def stop_all(self, reason: str = "") -> list[str]:
+        Args:
+            action: What.
+            subject: Name of whom or what it was done to.
+            detail: For people.
+            user: Who did it; empty: who sits at this console.
+        """
+        act = OperatorActed(user or self.user, action, subject, detail, self.clock.now_s())
+        self.story.note(subject, act.sentence)
+        self.bus.publish(self.address, Conversation.EVENTS, act)
+
+    # ------------------------------------------------------------------ verbs that need no grant
+    async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
+        """Stop a robot, whoever holds it; return whether that is certain."""
+        self.acted(OperatorAction.STOP_ROBOT, robot, reason, user)
+        return not await self.feed.stop_robots([robot], reason, user or self.user)
+
+    async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
         """Stop every robot of the mission, whoever holds it; return those of which it is not certain.
 
         Those that are known are stopped at once, before anybody is asked whether there are more.
         """
-        known = self.feed.robots
-        self.tell("robots", f"{self.user} stops all: {', '.join(sorted(known)) or 'whatever there is'}")
-        unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, self.user), self.feed.find_robots())
-        return unsure + await self.feed.stop_robots(found - known, reason, self.user)
+        known, user = self.feed.robots, user or self.user
+        names = ", ".join(sorted(known)) or "whatever there is"
+        self.acted(OperatorAction.STOP_ALL, "robots", f"{names}{f', {reason}' if reason else ''}", user)
+        unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, user), self.feed.find_robots())
+        return unsure + await self.feed.stop_robots(found - known, reason, user)
 
-    async def lift_stop(self, stop: StopState) -> bool:
+    async def lift_stop(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again that was stopped; return whether it may."""
-        self.tell(stop.rc, f"{self.user} lifts stop {stop.number} by {stop.by}")
-        return await self.feed.lift(stop, self.user)
+        self.acted(OperatorAction.LIFT_STOP, stop.rc, f"stop {stop.number} by {stop.by}", user)
+        return await self.feed.lift(stop, user or self.user)
 
-    async def set_parameter(self, name: str, parameter: str, value: Any) -> bool:
+    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
         """Have a component run with another value; return whether it does."""
-        is_set = await self.feed.set_parameter(name, parameter, value, self.user)
-        self.tell(name, f"{self.user} {'set' if is_set else 'could not set'} {parameter} to {value!r}")
+        is_set = await self.feed.set_parameter(name, parameter, value, user or self.user)
+        detail = f"{parameter} = {value!r}{'' if is_set else ', which it did not take'}"
+        self.acted(OperatorAction.SET_PARAMETER, name, detail, user)
         return is_set
+
+    def acknowledged(self, count: int, key: str = "", user: str = "") -> None:
+        """Tell that the operator has seen so many alarms; those of one key, or all."""
+        if count:
+            self.acted(OperatorAction.ACKNOWLEDGE, "alarms", key or f"all {count}", user)
 
     async def why(self, name: str) -> list[str]:
         """Return for people why this robot, ARC, behavior, console or component is as it is."""
@@ -80,8 +105,23 @@ class Observer(Component[P], Generic[P]):
         if self._watches:
             self.feed.listen()
 
+    async def drain(self) -> None:
+        """Tell that the operator left."""
+        if self._signs_in:
+            self.acted(OperatorAction.DETACH, self.name)
+
     async def serve(self) -> None:
-        """Hear how things are, and then what changes."""
+        """Tell that the operator is there, then watch."""
+        self.sign_in("to watch")
+        await self.watch()
+
+    def sign_in(self, intent: str) -> None:
+        """Tell that the operator is there, and for what."""
+        if self._signs_in:
+            self.acted(OperatorAction.ATTACH, self.name, intent)
+
+    async def watch(self) -> None:
+        """Hear how things are, and then what changes; until cancelled."""
         if self._watches:
             await self.feed.run()
 

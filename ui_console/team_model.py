@@ -22,6 +22,7 @@ from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestVi
 from resource_pool.arc_client import StopState
 from ui_console.alarms import AlarmBook
 from ui_console.console_events import (
+    ActHeard,
     ComponentGone,
     ComponentHeard,
     ComponentsListed,
@@ -108,6 +109,8 @@ class TeamModel:
                 self._take_leases(leases, at_s)
             case StoryHeard(story=story):
                 self._take_story(story)
+            case ActHeard(act=act, where=where):
+                self._note(act.at_s, act.subject, act.sentence, where)
             case ComponentHeard(at_s=at_s, component=component):
                 self._take_component(component, at_s)
             case ComponentsListed(at_s=at_s, components=components, is_complete=is_complete):
@@ -441,7 +444,6 @@ class TeamModel:
                 self._parameters[key] = ParameterView(
                     name, event.address, parameter, shown, before, event.user, event.at_s
                 )
-                self._note(event.at_s, name, f"{event.user} set {parameter} to {shown}", event.address)
             elif former is None or former.value != shown:
                 self._parameters[key] = ParameterView(name, event.address, parameter, shown)
 

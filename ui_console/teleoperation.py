@@ -20,10 +20,12 @@ from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState
 from backbone.errors import LinkError, Refusal, code_of
+from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy, Why
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_client import (
+    Applied,
     ArcClient,
     ArcNotice,
     Frame,
@@ -48,13 +50,14 @@ from ui_console.console_events import (
     PictureSeen,
     WhyHeard,
 )
-from ui_console.driving import Command, DeadMan, Drive, Halt, Jump
+from ui_console.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
 from ui_console.feed import REPLY_TIME_S
 from ui_console.observer import Observer
 from ui_console.team_model import ROBOT_KIND
 
 log = logging.getLogger(__name__)
 
+ANY_ROBOT = "any robot"
 ANY_CAMERA = {ROBOT_KIND: ["camera"]}
 
 
@@ -87,6 +90,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         takes: Claim at once.
         watches: Also tell what happens to others.
         keeps_arc: Keep the ARC when the robot is given back, so that it is there at once when it is taken again.
+        signs_in: Tell the mission that its operator came and left; False where somebody else does.
         user: Who drives, for the record; empty: the console's name.
     """
 
@@ -105,9 +109,10 @@ class Teleoperation(Observer[TeleoperationParameters]):
         takes: bool = True,
         watches: bool = True,
         keeps_arc: bool = False,
+        signs_in: bool = True,
         user: str = "",
     ) -> None:
-        super().__init__(launch, bus, clock, show=show, watches=watches, user=user)
+        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
         self._claimed: tuple[str, dict[str, Any]] | None = None
@@ -119,7 +124,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._asked_s = 0.0
         self._grants = 0
         self._decided = asyncio.Event()
-        self._dead_man = DeadMan()
+        self._dead_man, self._span = DeadMan(), DriveSpan()
         self._pressed = asyncio.Event()
         self._asking_why: asyncio.Task[None] | None = None
         self._touched = asyncio.Event()
@@ -162,6 +167,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._frames = arc.frames(self._saw)
         self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None
         self._decided.clear()
+        self.acted(OperatorAction.TAKE, wished.robot or ANY_ROBOT, f"with priority {wished.priority}")
         self.show(Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
         self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
@@ -243,8 +249,23 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.show(LinkTrouble(self.clock.now_s(), str(error)))
             return False
         took_s = time.perf_counter() - wanted_s
+        self._tell_command(command, applied)
         self.show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values, took_s))
         return True
+
+    def _tell_command(self, command: Command, applied: Applied) -> None:
+        if self._span.begins(command, applied.at_s):
+            speeds = ", ".join(f"{name.partition('_')[0]} {value:+.1f}" for name, value in applied.values.items())
+            self.acted(OperatorAction.DRIVE_BEGIN, applied.rc, f"{speeds} rad/s")
+        elif isinstance(command, Jump):
+            self.acted(OperatorAction.JUMP, applied.rc)
+        elif isinstance(command, Halt):
+            self._tell_drive_ended()
+
+    def _tell_drive_ended(self, why: str = "") -> None:
+        took_s = self._span.ends(self.clock.now_s())
+        if took_s is not None:
+            self.acted(OperatorAction.DRIVE_END, self._holding, f"after {took_s:.1f} s{f', {why}' if why else ''}")
 
     def begin_release(self) -> None:
         """Give the robot back without waiting for it."""
@@ -298,15 +319,16 @@ class Teleoperation(Observer[TeleoperationParameters]):
         return confirmed
 
     def _tell_given_back(self, reason: str, *, confirmed: bool) -> None:
-        if self._holding:
-            self.tell(self._holding, f"was given back by {self.user}: {reason}")
-            self._holding = ""
+        self._tell_drive_ended(reason)
+        robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
+        self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
         self.report("holds no robot")
         self.show(GivenBack(self.clock.now_s(), reason, confirmed))
 
     # ------------------------------------------------------------------ the component's hooks
     async def serve(self) -> None:
         """Claim, then listen; the keys have a task of their own."""
+        self.sign_in(f"to drive {self.parameters.robot or ANY_ROBOT}, with priority {self.parameters.priority}")
         if self._takes:
             self.take()
         self.start_task(self._drive_while_held(), "keys")
@@ -314,7 +336,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.start_task(self._give_back_when_away(), "attention")
         if self._work is not None:
             self.start_task(self._work_and_end(self._work), "work")
-        await super().serve()
+        await self.watch()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Answer the ARC's notices."""
@@ -327,6 +349,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def drain(self) -> None:
         """Give the robot back if it was not."""
         await self.give_back("the console ends", for_good=True)
+        await super().drain()
 
     def schedule_heard(self) -> None:
         """Ask why this console waits, if it does."""
@@ -356,6 +379,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def arc_suspended(self, notice: Suspended) -> None:
         """Tell it; see ``ArcListener``."""
         self._dead_man = DeadMan()
+        self._tell_drive_ended(f"{notice.reason} by {notice.by}" if notice.by else notice.reason)
         if self._keeping is not None:
             self.report(f"waits: {notice.reason} by {notice.by}")
             self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))

@@ -11,10 +11,10 @@ from console_scenes import SCHEDULE
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Lease, Leases, Schedule
 from backbone.wire import Envelope, Message
@@ -202,15 +202,39 @@ def test_all_robots_are_stopped_also_those_not_heard_of_and_a_silent_one_is_name
     stage(scene)
 
 
-def test_what_an_operator_does_is_told_to_the_mission_with_the_name(stage: Callable[[Scene], None]) -> None:
+def test_each_thing_an_operator_does_is_one_event_with_the_name(stage: Callable[[Scene], None]) -> None:
     async def scene(on: Stage) -> None:
-        console = on.observer()
-        heard: list[str] = []
-        async with on.beside(on.manager()) as manager, on.beside(on.robot("scout1")), on.beside(console):
-            manager.bus.subscribe("*/*", Conversation.LOG, StoryEvent, lambda said: heard.append(said.body.what))
-            await console.stop_robot("scout1", "child in the room")
+        console, robot = on.observer(), on.robot("scout1")
+        watcher = on.make(Watcher, Subsystem.MISSION_CONTROL, "watch1", "watch")
+        heard: list[OperatorActed] = []
+        async with on.beside(on.manager()) as manager, on.beside(robot), on.beside(watcher):
+            manager.bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, lambda said: heard.append(said.body))
+            async with on.beside(console):
+                await on.until(lambda: "schedule" in on.words())
+                await console.stop_robot("scout1", "child in the room")
+                await console.stop_all("fire")
+                await console.lift_stop(robot.latch.state)
+                await console.set_parameter("watch1", "threshold", 30)
+                await console.set_parameter("watch1", "threshold", "high")
+                console.acknowledged(2)
+                console.acknowledged(0)
+                await on.clock.sleep_s(0.1)
+                logged = [row.what for row in on.model.log()]
             await on.clock.sleep_s(0.1)
-        assert heard == ["anna stops it: child in the room"]
+        assert {act.user for act in heard} == {"anna"}
+        assert [(act.action, act.subject, act.detail) for act in heard] == [
+            (OperatorAction.ATTACH, "console-1", "to watch"),
+            (OperatorAction.STOP_ROBOT, "scout1", "child in the room"),
+            (OperatorAction.STOP_ALL, "robots", "scout1, scout2, fire"),
+            (OperatorAction.LIFT_STOP, "scout1", "stop 1 by anna"),
+            (OperatorAction.SET_PARAMETER, "watch1", "threshold = 30"),
+            (OperatorAction.SET_PARAMETER, "watch1", "threshold = 'high', which it did not take"),
+            (OperatorAction.ACKNOWLEDGE, "alarms", "all 2"),
+            (OperatorAction.DETACH, "console-1", ""),
+        ]
+        assert logged.count("anna stops it: child in the room") == 1, "the operator's own log tells it once, too"
+        told = [event.what for event in console.story.of("scout1")]
+        assert "anna stops it: child in the room" in told
 
     stage(scene)
 

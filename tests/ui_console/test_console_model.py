@@ -25,9 +25,11 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import LifeState, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import RequestState, Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.console_events import (
+    ActHeard,
     Attention,
     CommandApplied,
     CommandRefused,
@@ -54,7 +56,7 @@ from ui_console.console_events import (
 )
 from ui_console.console_model import SILENT_S, STALE_S, ConsoleModel
 from ui_console.team_model import STARVING_S
-from ui_console.views import AlarmKind, ConsoleView, NodeState, Severity, view_json
+from ui_console.views import AlarmKind, ConsoleView, LogRow, NodeState, Severity, view_json
 
 
 def alarm_lines(shown: ConsoleModel, now_s: float = 50.0) -> list[str]:
@@ -323,7 +325,12 @@ def test_a_parameter_that_was_changed_says_what_it_was_and_who_changed_it() -> N
     changed, other = shown.team.parameters()
     assert (changed.value, changed.before, changed.changed_by) == ("30", "20", "anna")
     assert (other.value, other.changed_by) == ("1", "")
-    assert shown.log()[-1].what == "anna set t to 30"
+
+
+def test_what_operators_did_is_in_the_log_with_their_names() -> None:
+    act = OperatorActed("anna", OperatorAction.SET_PARAMETER, "watch1", "t = 30", 2.0)
+    shown = model(ActHeard(2.1, act, "ui_console/console-1"))
+    assert shown.log() == [LogRow(2.0, "watch1", "anna changes it: t = 30", "ui_console/console-1")]
 
 
 def test_consoles_that_share_a_team_see_the_same_mission_and_hold_robots_of_their_own() -> None:

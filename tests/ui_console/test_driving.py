@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.driving import FIRST_HOLD_S, REPEAT_EVERY_S, DeadMan, Drive, Halt, drive_towards
+from ui_console.driving import FIRST_HOLD_S, REPEAT_EVERY_S, DeadMan, Drive, DriveSpan, Halt, Jump, drive_towards
 
 FORWARD = drive_towards("forward", 4.0)
 TICK_S = 0.01
@@ -78,3 +78,30 @@ def test_what_will_be_due_is_due_when_it_was_said_to_be(presses: list[float]) ->
         next_s = hand.next_s
         assert next_s is not None
         assert press < next_s <= press + REPEAT_EVERY_S + 1e-9
+
+
+def test_pressed_again_right_after_a_stop_it_drives_and_waits_for_the_next_repeat() -> None:
+    hand = DeadMan()
+    hand.press(FORWARD, 1.0)
+    assert hand.due(1.0) == FORWARD
+    hand.stop()
+    hand.press(FORWARD, 1.1)
+    assert hand.due(1.1) == FORWARD
+    assert hand.next_s is not None
+    assert hand.next_s > 1.1
+    assert hand.due(1.1 + FIRST_HOLD_S) == Halt()
+
+
+@given(st.lists(st.sampled_from([FORWARD, Halt(), Jump(), None])))
+def test_the_begin_and_the_end_of_a_drive_take_turns(applied: list[Drive | Halt | Jump | None]) -> None:
+    span, told = DriveSpan(), []
+    for at_s, command in enumerate(applied):
+        if command is not None and span.begins(command, at_s):
+            assert isinstance(command, Drive)
+            told.append("begin")
+        if command is None or isinstance(command, Halt):
+            took_s = span.ends(at_s)
+            if took_s is not None:
+                assert took_s >= 0
+                told.append("end")
+    assert told == (["begin", "end"] * len(told))[: len(told)]

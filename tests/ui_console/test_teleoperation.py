@@ -17,6 +17,7 @@ from backbone.component.messages import Parameters, SetParameter, StoryEvent
 from backbone.errors import NoResponder
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
+from backbone.operators import OperatorActed, OperatorAction
 from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction
 from resource_pool.messages import Drive as ArcDrive
@@ -459,7 +460,52 @@ def test_a_hold_that_says_how_long_it_counts_ends_then_and_not_later(placer_worl
     placer_world(scene)
 
 
-def test_taking_and_giving_back_are_told_to_the_mission_with_the_users_name(placer_world: Any, beside: Any) -> None:
+def test_each_thing_a_driver_does_is_one_event_with_the_name(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        heard: list[OperatorActed] = []
+        placer.on_arc = grant_at_once
+        placer.bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, lambda said: heard.append(said.body))
+        async with beside(console(placer, lambda event: None, user="anna")) as driven:
+            await placer.wait(lambda: driven.is_held)
+            for _repeat in range(10):
+                driven.hold(FORWARD)
+                await placer.clock.sleep_s(0.05)
+            await placer.clock.sleep_s(1.0)
+            driven.jump()
+            await placer.clock.sleep_s(0.1)
+            driven.stop()
+            driven.hold(FORWARD)
+            await placer.clock.sleep_s(0.1)
+            [arc] = placer.arcs.values()
+            await arc.suspend("higher", "console-9", deadline_s=0.0)
+            await arc.grant()
+            await driven.do(FORWARD)
+            await driven.give_back()
+            await placer.clock.sleep_s(0.1)
+        await placer.clock.sleep_s(0.1)
+        assert {act.user for act in heard} == {"anna"}
+        assert [(act.action, act.subject) for act in heard] == [
+            (OperatorAction.ATTACH, "console-7"),
+            (OperatorAction.TAKE, "scout1"),
+            (OperatorAction.DRIVE_BEGIN, "scout1"),
+            (OperatorAction.DRIVE_END, "scout1"),
+            (OperatorAction.JUMP, "scout1"),
+            (OperatorAction.DRIVE_BEGIN, "scout1"),
+            (OperatorAction.DRIVE_END, "scout1"),
+            (OperatorAction.DRIVE_BEGIN, "scout1"),
+            (OperatorAction.DRIVE_END, "scout1"),
+            (OperatorAction.RELEASE, "scout1"),
+            (OperatorAction.DETACH, "console-7"),
+        ]
+        ends = [act.detail for act in heard if act.action is OperatorAction.DRIVE_END]
+        assert ends[1].endswith("higher by console-9")
+        assert ends[2].endswith("released")
+        assert "scout1 was given back by anna: released" in [f"{act.subject} {act.sentence}" for act in heard]
+
+    placer_world(scene)
+
+
+def test_that_the_robot_is_there_is_told_to_the_mission_with_the_users_name(placer_world: Any, beside: Any) -> None:
     async def scene(placer: FakePlacer) -> None:
         heard: list[tuple[str, str]] = []
         placer.on_arc = grant_at_once
@@ -470,6 +516,6 @@ def test_taking_and_giving_back_are_told_to_the_mission_with_the_users_name(plac
             await placer.wait(lambda: driven.is_held)
             await driven.give_back()
             await placer.clock.sleep_s(0.1)
-        assert heard == [("scout1", "was taken over by anna"), ("scout1", "was given back by anna: released")]
+        assert heard == [("scout1", "was taken over by anna")]
 
     placer_world(scene)

@@ -196,8 +196,8 @@ class TerminalSession:
     def acknowledge(self, key: str) -> None:
         """One alarm was seen, or all."""
         seen = self.model.acknowledge(key)
-        if seen and self._console is not None and self._console.state is LifeState.READY:
-            self._console.tell("alarms", f"{self.model.user} has seen {key or f'all {seen}'}")
+        if self._console is not None and self._console.state is LifeState.READY:
+            self._console.acknowledged(seen, key)
 
     async def stop_robot(self, robot: str) -> bool:
         """Emergency stop of one robot."""

@@ -19,6 +19,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LifeState
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.operators import OperatorAction
 from backbone.wire import Envelope
 from resource_pool.arc_client import Frame
 from ui_console.console_events import ConsoleEvent, ScheduleHeard
@@ -60,7 +61,9 @@ class WebHub:
     ) -> None:
         self.clock = clock
         self.team = TeamModel(launch.mission)
-        self.observer: Observer[NoParameters] = Observer(launch, bus, clock, show=self._heard, user=launch.name)
+        self.observer: Observer[NoParameters] = Observer(
+            launch, bus, clock, show=self._heard, signs_in=False, user=launch.name
+        )
         self.guests: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False)
         self._launch, self._bus, self._join = launch, bus, join
@@ -83,7 +86,7 @@ class WebHub:
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
         self._tell_tables([operator.outbox])
         operator.refresh(self.clock.now_s())
-        self._say("web", f"{welcome.user} came, with priority {welcome.priority}")
+        self._say(OperatorAction.ATTACH, welcome.user, f"with priority {welcome.priority}")
         self._somebody.set()
         self.attention_changed()
         return operator
@@ -94,7 +97,7 @@ class WebHub:
         if not self.guests:
             self._somebody.clear()
         await guest.leave(reason)
-        self._say("web", f"{guest.welcome.user} left: {reason}")
+        self._say(OperatorAction.DETACH, guest.welcome.user, reason)
 
     async def obey(self, guest: Operator, intent: Intent) -> None:
         """Do what an operator asks; what takes time goes on beside."""
@@ -118,7 +121,8 @@ class WebHub:
         self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, offence.remedy, key)
         if now_s >= self._told_s.get(offence.fault, -TOLD_EVERY_S) + TOLD_EVERY_S:
             self._told_s[offence.fault] = now_s
-            self._say("web", line)
+            if self.observer.state is LifeState.READY:
+                self.observer.tell("web", line)
 
     async def tell_all(self) -> None:
         """Keep every operator's view fresh; until cancelled. Nobody there: nothing is done."""
@@ -148,7 +152,9 @@ class WebHub:
             parameters=wished,
         )
         bus = await self._join(launch)
-        return Teleoperation(launch, bus, self.clock, show=show, watches=False, keeps_arc=True, user=welcome.user)
+        return Teleoperation(
+            launch, bus, self.clock, show=show, watches=False, keeps_arc=True, signs_in=False, user=welcome.user
+        )
 
     def watching_changed(self) -> None:
         """Listen to the pictures that somebody watches and that somebody's grant delivers, and to no others."""
@@ -212,9 +218,9 @@ class WebHub:
             for outbox in outboxes:
                 outbox.put_section(name, body)
 
-    def _say(self, subject: str, what: str) -> None:
+    def _say(self, action: OperatorAction, user: str, detail: str) -> None:
         if self.observer.state is LifeState.READY:
-            self.observer.tell(subject, what)
+            self.observer.acted(action, "web", detail, user)
 
 
 def _name_from(user: str) -> str:

@@ -196,7 +196,7 @@ class Operator:
     def _acknowledge(self, key: str) -> None:
         seen = self.model.acknowledge(key)
         if seen:
-            self._hands.observer.tell("alarms", f"{self.welcome.user} has seen {key or f'all {seen}'}")
+            self._hands.observer.acknowledged(seen, key, self.welcome.user)
             self.refresh(self._hands.clock.now_s())
 
     def _attend(self, is_there: bool) -> None:
@@ -230,37 +230,35 @@ class Operator:
                     if self._console is not None and self._console.is_ready:
                         await self._console.give_back(f"{user} released it")
             case StopRobot(robot):
-                await self._stop([robot])
+                await self._stop(robot)
             case StopAll():
-                await self._stop(self._hands.team.robot_names())
+                self.stop()
+                self._tell_unsure(await observer.stop_all("", user))
             case LiftStop(robot):
                 stop = self.model.team.stop_of(robot)
                 if stop is not None:
-                    observer.tell(robot, f"{user} lifts stop {stop.number} by {stop.by}")
-                    await observer.feed.lift(stop, user)
+                    await observer.lift_stop(stop, user)
             case AskWhy(name):
                 self._answer({"why": name, "lines": await observer.why(name)})
             case AskParameters(name):
                 self._answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
             case SetParameter(name, parameter, value):
-                is_set = await observer.feed.set_parameter(name, parameter, value, user)
-                observer.tell(name, f"{user} {'set' if is_set else 'could not set'} {parameter} to {value!r}")
+                is_set = await observer.set_parameter(name, parameter, value, user)
                 self._answer({"set": name, "parameter": parameter, "done": is_set})
             case _:
                 assert_never(intent)
         self.refresh(self._hands.clock.now_s())
 
-    async def _stop(self, robots: list[str]) -> None:
+    async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""
         self.stop()
-        known = sorted(set(robots) & set(self._hands.team.robot_names()))
-        observer, user = self._hands.observer, self.welcome.user
-        for robot in known:
-            observer.tell(robot, f"{user} stops it")
-        unsure = await observer.feed.stop_robots(known, "", user)
-        unknown = sorted(set(robots) - set(known))
-        if unsure or unknown:
-            self._answer({"refused": f"not certain to have stopped: {', '.join([*unsure, *unknown])}"})
+        is_known = robot in self._hands.team.robot_names()
+        is_stopped = is_known and await self._hands.observer.stop_robot(robot, "", self.welcome.user)
+        self._tell_unsure([] if is_stopped else [robot])
+
+    def _tell_unsure(self, robots: list[str]) -> None:
+        if robots:
+            self._answer({"refused": f"not certain to have stopped: {', '.join(robots)}"})
 
     async def _take(self, robot: str) -> None:
         if self._console is not None and self._life is not None and not self._life.done():

@@ -422,7 +422,7 @@ async def test_the_recording_says_who_came_and_who_left(stage: Stage) -> None:
     await stage.placer.wait(lambda: not stage.hub.guests)
     await stage.placer.wait(lambda: any("Carla left" in row.what for row in stage.hub.team.log()))
     told = [row.what for row in stage.hub.team.log() if row.subject == "web"]
-    assert told == ["Carla came, with priority 10", "Carla left: the browser has gone away"]
+    assert told == ["Carla sat down: with priority 10", "Carla left: the browser has gone away"]
 
 
 async def test_when_the_page_is_no_longer_in_front_the_wheels_stop_and_alarms_are_kept_for_later(stage: Stage) -> None:

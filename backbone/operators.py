@@ -1,0 +1,108 @@
+"""What operators did: one event for each action, with the user's name, for consoles, logs and recordings."""
+
+from __future__ import annotations
+
+import getpass
+import os
+from enum import StrEnum
+
+from backbone.bus.interface import Bus, Clock
+from backbone.keys import Conversation
+from backbone.wire import Message
+
+
+class OperatorAction(StrEnum):
+    """What people do to a mission."""
+
+    ATTACH = "attach"  # sat down at a console
+    DETACH = "detach"  # left it in good order; a console that died is a lost component
+    TAKE = "take"  # asked for a robot
+    RELEASE = "release"  # gave it back
+    DRIVE_BEGIN = "drive_begin"  # the first command of a drive was applied
+    DRIVE_END = "drive_end"  # the wheels were stopped, or the robot was lost or given back
+    JUMP = "jump"
+    STOP_ROBOT = "stop_robot"  # emergency stop
+    STOP_ALL = "stop_all"
+    LIFT_STOP = "lift_stop"
+    SET_PARAMETER = "set_parameter"
+    ACKNOWLEDGE = "acknowledge"  # saw an alarm
+    ASK_CONSENT = "ask_consent"  # asked an equal for a robot
+    CONSENT = "consent"  # let them have it
+    DECLINE = "decline"
+    START_MISSION = "start_mission"
+    STOP_MISSION = "stop_mission"
+    START_COMPONENT = "start_component"
+    STOP_COMPONENT = "stop_component"
+
+
+_SENTENCES = {
+    OperatorAction.ATTACH: "{user} sat down",
+    OperatorAction.DETACH: "{user} left",
+    OperatorAction.TAKE: "is asked for by {user}",
+    OperatorAction.RELEASE: "was given back by {user}",
+    OperatorAction.DRIVE_BEGIN: "is driven by {user}",
+    OperatorAction.DRIVE_END: "is no longer driven by {user}",
+    OperatorAction.JUMP: "jumps for {user}",
+    OperatorAction.STOP_ROBOT: "{user} stops it",
+    OperatorAction.STOP_ALL: "{user} stops all",
+    OperatorAction.LIFT_STOP: "{user} lifts its stop",
+    OperatorAction.SET_PARAMETER: "{user} changes it",
+    OperatorAction.ACKNOWLEDGE: "{user} has seen it",
+    OperatorAction.ASK_CONSENT: "{user} asks for it",
+    OperatorAction.CONSENT: "{user} lets it go",
+    OperatorAction.DECLINE: "{user} keeps it",
+    OperatorAction.START_MISSION: "{user} started it",
+    OperatorAction.STOP_MISSION: "{user} ends it",
+    OperatorAction.START_COMPONENT: "{user} started it",
+    OperatorAction.STOP_COMPONENT: "{user} stopped it",
+}
+
+
+class OperatorActed(Message, frozen=True):
+    """Published as an event, once for each action, by the console or command through which a person acted.
+
+    Attributes:
+        user: Who.
+        action: What.
+        subject: Name of the robot, component or alarm it was done to.
+        detail: For people: how, why, or what came of it.
+        at_s: Mission time.
+    """
+
+    user: str
+    action: OperatorAction
+    subject: str
+    detail: str
+    at_s: float
+
+    @property
+    def sentence(self) -> str:
+        """What happened to the subject, for people.
+
+        Example:
+            >>> OperatorActed("anna", OperatorAction.STOP_ROBOT, "scout1", "child in the room", 2.0).sentence
+            'anna stops it: child in the room'
+        """
+        said = _SENTENCES[self.action].format(user=self.user)
+        return f"{said}: {self.detail}" if self.detail else said
+
+
+def login_name() -> str:
+    """Return who is logged in, as far as the system knows."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError):  # a user without a name, in a container
+        return f"uid-{os.getuid()}"
+
+
+def tell_acted(bus: Bus, clock: Clock, action: OperatorAction, subject: str, detail: str = "") -> None:
+    """Let a mission know that who is logged in here did this.
+
+    Args:
+        bus: Of the command by which it was done.
+        clock: The mission's time.
+        action: What.
+        subject: Whom or what it was done to.
+        detail: For people.
+    """
+    bus.publish(bus.source, Conversation.EVENTS, OperatorActed(login_name(), action, subject, detail, clock.now_s()))
