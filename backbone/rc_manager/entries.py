@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
-from backbone.rc_manager.priority import Path
+from backbone.rc_manager.priority import Level, Path, higher
 from backbone.rc_manager.radio_admission import Stream
 
 INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the rounding of sums of times
@@ -69,6 +69,7 @@ class ArcEntry:
         uses: RC → how it uses it; the alternative that was chosen.
         place_in_tree: Names from the root to its owner.
         path: The same with the present numbers.
+        level: Its parent's path and its own number, the same object in all siblings of that number: they are equals.
         minimum_s: Run time it needs to be served, counted from the grant.
         maximum_s: End of all extensions, counted from the grant.
         settle_s: Longest settling time of its RCs.
@@ -100,6 +101,7 @@ class ArcEntry:
     uses: Mapping[str, RcUse]
     place_in_tree: tuple[str, ...]
     path: Path
+    level: Level
     minimum_s: float
     maximum_s: float
     settle_s: float
@@ -129,6 +131,10 @@ class ArcEntry:
     def name(self) -> str:
         """Name of the ARC."""
         return self.request.arc
+
+    def goes_before(self, other: ArcEntry) -> bool:
+        """Say whether its owner is strictly higher than the other's."""
+        return self.level is not other.level and higher(self.path, other.path)
 
     @property
     def active(self) -> bool:

@@ -6,6 +6,7 @@ Nobody's turn depends on it. Source: decision 0011.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Sequence
 
 from backbone.rc_manager.above import Above
@@ -23,8 +24,8 @@ def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot
     ends_s: dict[str, float] = {}
     taken_s: dict[str, float] = {}
     all_equal = len({(arc.path[:-1], arc.path[-1][1]) for arc in order}) == 1
-    exclusive: dict[str, Above] = {rc: Above() for arc in order for rc in arc.uses}
-    sharers: dict[str, Above] = {rc: Above() for arc in order for rc in arc.shares}
+    exclusive: defaultdict[str, Above] = defaultdict(Above)
+    sharers: defaultdict[str, Above] = defaultdict(Above)
     slots = []
     for arc in order:
         standing = _standing(table, arc, now_s)
@@ -66,5 +67,5 @@ def _standing(table: Table, arc: ArcEntry, now_s: float) -> list[Hold]:
     return [
         (holder, -math.inf, table.stands_until_s(holder, arc, now_s))
         for holder in table.holders(arc)
-        if not table.fits(arc, [holder])
+        if table.clash(arc, holder)
     ]

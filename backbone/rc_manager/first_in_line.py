@@ -15,7 +15,6 @@ from collections.abc import Iterable
 from backbone.rc_manager.entries import INSTANT_S, ArcEntry
 from backbone.rc_manager.messages import RequestState
 from backbone.rc_manager.plan import Turn
-from backbone.rc_manager.priority import higher
 from backbone.rc_manager.table import Table
 
 LOOK_AHEAD = 3  # chosen: how many first ones may wait for each other before the present holders alone tell
@@ -43,8 +42,24 @@ class FirstInLine:
             self._firsts.pop(rc, None)
 
     def look_near(self, rc: str) -> None:
-        """Look at those for whom it matters what happened to this RC."""
-        self._candidates.update(dict.fromkeys(self._table.near(rc)))
+        """Look at those for whom it matters what happened to this RC.
+
+        That is who uses it, and who may have let one of those go first at another RC.
+        """
+        table = self._table
+        users = table.users(rc)
+        elsewhere = {other: None for arc in users if arc.queued for other in arc.uses if self._may_hold_up(arc, other)}
+        near = dict.fromkeys(users)
+        for other in elsewhere:
+            near.update((user, None) for user in table.users(other) if not table.is_kept_out(user))
+        self._candidates.update((arc, None) for arc in near if arc.state is RequestState.WAITING)
+
+    def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:
+        """Say whether somebody may have let the ARC go first at the RC, which would be free."""
+        if self._table.is_held(rc):
+            return False
+        first = self.at(rc)
+        return first is None or first is arc or first.level is not arc.level
 
     def due(self, now_s: float) -> Turn | None:
         """Return a candidate whose time is now; the others are candidates no more."""
@@ -75,10 +90,11 @@ class FirstInLine:
             competes = other is not arc and not self._table.fits(arc, [other, *crowd]) and self._table.usable(other)
             return competes and self._reserved_s(other, now_s, (arc,)) < end_s
 
-        firsts = dict.fromkeys(self.at(rc) for rc in arc.uses)
-        if any(from_one(first) for first in firsts if first is not None):
+        firsts = [first for first in dict.fromkeys(self.at(rc) for rc in arc.uses) if first is not None]
+        firsts.sort(key=self._reserved.__contains__, reverse=True)  # one that is known may tell enough
+        if any(from_one(first) for first in firsts):
             return True
-        return any(from_one(one) for one in self._table.beside(arc) if one.queued and higher(one.path, arc.path))
+        return any(from_one(one) for one in self._table.beside(arc) if one.goes_before(arc) and one.queued)
 
     def _crowd(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return those that hold a sharable RC of the ARC."""
@@ -101,20 +117,20 @@ class FirstInLine:
             now_s: From when on.
             behind: Those that asked for this: they do not wait for themselves, though being equal is not transitive.
         """
-        if arc in self._reserved:
-            return self._reserved[arc]
-        start_s = now_s
-        for holder in self._table.holders(arc):
-            if not self._table.fits(arc, [holder]):
-                start_s = max(start_s, self._table.stands_until_s(holder, arc, now_s))
+        known_s = self._reserved.get(arc)
+        if known_s is not None:
+            return known_s
+        table = self._table
+        in_the_way = [holder for holder in table.holders(arc) if table.clash(arc, holder)]
+        start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
         if len(behind) > LOOK_AHEAD:
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
             first = self.at(rc)
-            if first is None or first is arc or first in behind or self._table.fits(arc, [first]):
+            if first is None or first is arc or first in behind or not table.clash(arc, first):
                 continue
             first_s = self._reserved_s(first, now_s, (*behind, arc))
             if first_s < start_s + arc.length_s - INSTANT_S:
-                start_s = math.inf if higher(first.path, arc.path) else max(start_s, first_s + first.length_s)
+                start_s = math.inf if first.goes_before(arc) else max(start_s, first_s + first.length_s)
         self._reserved[arc] = start_s
         return start_s

@@ -19,6 +19,9 @@ from backbone.rc_manager.messages import PathNode
 Path = tuple[tuple[str, int], ...]
 """Nodes from the root to the owner, each with its number among its siblings."""
 
+Level = tuple[Path, int]
+"""Path of a parent, and the number its children of this level have: they are equals."""
+
 T = TypeVar("T")
 
 CONSOLE = "console "  # a legal node name holds no space: a console is never mistaken for a node of the tree

@@ -527,7 +527,7 @@ class ScheduleManager:
 
     def _renumber(self) -> None:
         for arc in self._table.arcs.values():
-            arc.path = self._tree.path(arc.place_in_tree)
+            self._table.move(arc, self._tree.path(arc.place_in_tree))
         self._table.priorities_changed()
 
     # RCs.

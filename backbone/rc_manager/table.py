@@ -23,7 +23,7 @@ from backbone.rc_manager.discipline import Discipline, deadline_s, eligible, joi
 from backbone.rc_manager.entries import CONNECTED, INSTANT_S, SOON_S, ArcEntry, RcEntry
 from backbone.rc_manager.groups import Group, Groups
 from backbone.rc_manager.messages import RcUse, RequestState, SchedulingRequest
-from backbone.rc_manager.priority import Path, by_precedence, higher, rank
+from backbone.rc_manager.priority import Level, Path, by_precedence, rank
 from backbone.rc_manager.radio_admission import Analysis, admissible, exceeds, stream
 
 SETS_REMEMBERED = 4096  # chosen: sets of users of one RC; a group of 30 meets some hundred between two arrivals
@@ -62,6 +62,7 @@ class Table:
         self._exact_up_to = exact_up_to
         self._groups: Groups[ArcEntry] = Groups(exact_up_to)
         self._bits: dict[str, int] = {}
+        self._levels: dict[Level, Level] = {}
         self._touched: dict[str, None] = {}
         self._busy = 0
         self._now_s = 0.0
@@ -89,6 +90,7 @@ class Table:
             uses=uses,
             place_in_tree=place,
             path=path,
+            level=self._level_of(path),
             minimum_s=request.minimum_runtime_s,
             maximum_s=max(request.minimum_runtime_s, request.maximum_runtime_s),
             settle_s=max((rc.connect_s for rc in rcs), default=0.0),
@@ -101,6 +103,14 @@ class Table:
         )
         self.arcs[arc.name] = arc
         return arc
+
+    def move(self, arc: ArcEntry, path: Path) -> None:
+        """Give the ARC another place or other numbers; ``priorities_changed`` is to follow."""
+        arc.path, arc.level = path, self._level_of(path)
+
+    def _level_of(self, path: Path) -> Level:
+        level = (path[:-1], path[-1][1])
+        return self._levels.setdefault(level, level)
 
     def forget_arc(self, arc: ArcEntry) -> None:
         """Take out an ARC that holds nothing."""
@@ -222,6 +232,10 @@ class Table:
                 beside.append(other)
         return all(self._can_share(rc, [arc, *(other for other in beside if rc in other.uses)]) for rc in arc.shares)
 
+    def clash(self, arc: ArcEntry, other: ArcEntry) -> bool:
+        """Say whether the ARC cannot hold all its RCs together with this other one."""
+        return bool(arc.touches & other.excludes or arc.excludes & other.touches) or not self.fits(arc, (other,))
+
     def usable(self, arc: ArcEntry) -> bool:
         """Say whether it could run if nobody else were there: its RCs are up and can serve it."""
         known = self._usable.get(arc)
@@ -278,7 +292,7 @@ class Table:
         ordered = by_precedence(arcs, lambda arc: arc.path, self.seniority)
         for pledged in [arc for arc in ordered if arc.pledge is not None]:
             # A higher one that cannot run at all keeps nobody from what was freed for it.
-            if not any(self.usable(other) and higher(other.path, pledged.path) for other in arcs):
+            if not any(self.usable(other) and other.goes_before(pledged) for other in arcs):
                 ordered.remove(pledged)
                 ordered.insert(0, pledged)
         return ordered
@@ -288,7 +302,7 @@ class Table:
         if any(arc.pledge is not None for arc in arcs):
             return self.in_order(arcs)[0]
         by_age = sorted(arcs, key=self.seniority)
-        return next(arc for arc in by_age if not any(rank(other.path, arc.path) > 0 for other in arcs))
+        return next(arc for arc in by_age if not any(other.goes_before(arc) for other in arcs))
 
     def seniority(self, arc: ArcEntry) -> tuple[bool, float, float, int]:
         """Return the key among equals: smaller comes first. Those RCs are being freed for by force come before all."""
@@ -315,7 +329,7 @@ class Table:
         """Return until when the holder stands in the way of the ARC."""
         if holder.state is RequestState.REVOKING:
             return self.free_s(holder, now_s)
-        before = rank(holder.path, arc.path)
+        before = 0 if holder.level is arc.level else rank(holder.path, arc.path)
         if before:
             return math.inf if before > 0 else now_s
         if holder.state is RequestState.CONNECTING:  # its slice begins with its grant: it cannot be over yet
@@ -326,18 +340,13 @@ class Table:
         """Return when the RCs of an ARC that is being revoked are expected to be free."""
         return max(now_s + SOON_S, revoked.since_s + revoked.release_s)
 
-    def near(self, rc: str) -> list[ArcEntry]:
-        """Return the waiting ARCs for which it matters what happened to this RC.
+    def is_held(self, rc: str) -> bool:
+        """Say whether somebody holds the RC alone, and its slice is not over."""
+        return bool(self._busy & self._bits[rc])
 
-        That is who uses it, and who shares an RC with those: they may have let them go first.
-        """
-        users = self._groups.users(rc)
-        others = dict.fromkeys(other for arc in users if arc.queued for other in arc.uses)
-        near = dict.fromkeys(users)
-        for other in others:
-            if not self._busy & self._bits[other]:
-                near.update(dict.fromkeys(arc for arc in self._groups.users(other) if not arc.touches & self._busy))
-        return [arc for arc in near if arc.state is RequestState.WAITING]
+    def is_kept_out(self, arc: ArcEntry) -> bool:
+        """Say whether somebody holds an RC of the ARC alone, and its slice is not over."""
+        return bool(self._busy & arc.touches)
 
     def beside(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the others that use an RC of this one."""
@@ -347,7 +356,9 @@ class Table:
 
     def holders(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the others that hold an RC of the ARC."""
-        holders = dict.fromkeys(holder for rc in arc.uses for holder in self.rcs[rc].holders)
+        holders: dict[ArcEntry, None] = {}
+        for rc in arc.uses:
+            holders.update(self.rcs[rc].holders)
         holders.pop(arc, None)
         return [*holders]
 
@@ -401,7 +412,7 @@ class Table:
     def must_let_higher_go_first(self, arc: ArcEntry) -> bool:
         """Say whether the policy ``strict`` holds the ARC back: a higher usable one of its group waits."""
         return self.strict and any(
-            other.state is RequestState.WAITING and higher(other.path, arc.path) and self.usable(other)
+            other.state is RequestState.WAITING and other.goes_before(arc) and self.usable(other)
             for other in self._groups.of(arc).arcs
         )
 
