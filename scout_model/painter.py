@@ -13,6 +13,7 @@ not by distance: the near corner of a long table says nothing about what stands 
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ _Floats = NDArray[np.float64]
 _SLICES = 16  # chosen: what the OpenGL renderer is told in room.xml
 _STACKS = 8  # chosen: same
 _FLOOR_REACH_M = 100.0  # chosen: an endless plane ends beyond every room
+_SOLIDS_KEPT = 512  # chosen: those of a few worlds, some kilobytes each
 _NEAR_M = 0.02  # chosen: as in room.xml
 _SUBPIXEL_BITS = 4  # chosen: edges move smoothly, a sixteenth of a pixel at a time
 _DISC_M = 0.002  # chosen: a mark is a disc on a surface, not a band around a body, if half its length is no more
@@ -230,8 +232,19 @@ def _far_to_near(lows: _Floats, highs: _Floats, eye_m: _Floats) -> list[int]:
 
 
 def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
-    size = model.geom_size[geom]
     kind = mujoco.mjtGeom(model.geom_type[geom])
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        return _triangles(model, int(model.geom_dataid[geom]))
+    x_m, y_m, z_m = model.geom_size[geom].tolist()
+    mesh = _solid(kind, (x_m, y_m, z_m), is_mark=bool(model.geom_group[geom] == _MARKS))
+    if mesh is None:
+        raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which nobody taught the painter")
+    return mesh
+
+
+@functools.lru_cache(maxsize=_SOLIDS_KEPT)
+def _solid(kind: mujoco.mjtGeom, size_m: tuple[float, float, float], *, is_mark: bool) -> _Mesh | None:
+    """Return a shape of this size, which only is read; None: of an unknown kind."""
     match kind:
         case mujoco.mjtGeom.mjGEOM_PLANE:
             reach = _FLOOR_REACH_M
@@ -240,24 +253,22 @@ def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
         case mujoco.mjtGeom.mjGEOM_BOX:
             signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
             sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-            if model.geom_group[geom] == _MARKS:
+            if is_mark:
                 # OpenCV paints a polygon's outline too, and a mark's thin edges would become lines.
-                thin = 2 * int(np.argmin(size))
+                thin = 2 * size_m.index(min(size_m))
                 sides = sides[thin : thin + 2]
-            return _polyhedron(signs * size, sides)
+            return _polyhedron(signs * np.array(size_m), sides)
         case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            if model.geom_group[geom] == _MARKS and size[1] <= _DISC_M:
-                return _disc(float(size[0]), float(size[1]))
-            return _cylinder(float(size[0]), float(size[1]), has_lids=model.geom_group[geom] != _MARKS)
+            if is_mark and size_m[1] <= _DISC_M:
+                return _disc(size_m[0], size_m[1])
+            return _cylinder(size_m[0], size_m[1], has_lids=not is_mark)
         case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return _sphere(np.repeat(size[0], 3), 0.0)
+            return _sphere(np.repeat(size_m[0], 3), 0.0)
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return _sphere(size, 0.0)
+            return _sphere(np.array(size_m), 0.0)
         case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return _sphere(np.repeat(size[0], 3), float(size[1]))
-        case mujoco.mjtGeom.mjGEOM_MESH:
-            return _triangles(model, int(model.geom_dataid[geom]))
-    raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which nobody taught the painter")
+            return _sphere(np.repeat(size_m[0], 3), size_m[1])
+    return None
 
 
 def _polyhedron(corners: _Floats, polygons: list[list[int]]) -> _Mesh:

@@ -102,5 +102,7 @@ class RadioAir:
     def _is_lost(self, sent: Sent, away_m: float) -> bool:
         by_distance = packet_loss(counted_distance_m(away_m, self._air.weak_signal), packet_bits(sent.payload))
         lost = 1.0 - (1.0 - by_distance) * (1.0 - self._air.radio_loss)
+        if lost == 0.0:
+            return False
         dice = np.random.default_rng((self._seed, key_of(sent.radio), sent.number))
         return bool(dice.random() < lost)

@@ -345,11 +345,9 @@ def _rolling(picture: Picture, unlocked: float, rng: np.random.Generator) -> Pic
 def _shifted(picture: Picture, shifts_px: NDArray[np.float64]) -> Picture:
     """Return the picture with each row turned to the right by its own shift."""
     endless = np.concatenate([picture, picture], axis=1)
-    shifted = np.empty_like(picture)
-    lefts = np.mod(-np.rint(shifts_px), PICTURE_WIDTH_PX).astype(int).tolist()
-    for row, left in enumerate(lefts):
-        shifted[row] = endless[row, left : left + PICTURE_WIDTH_PX]
-    return shifted
+    lefts = np.mod(-np.rint(shifts_px), PICTURE_WIDTH_PX).astype(np.intp)
+    windows = np.lib.stride_tricks.sliding_window_view(endless, PICTURE_WIDTH_PX, axis=1)
+    return windows[np.arange(len(lefts)), lefts]
 
 
 def _endless(picture: Picture) -> Picture:

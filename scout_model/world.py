@@ -24,7 +24,7 @@ from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.robot import Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
-from scout_model.targets import Route, part_poses, parts
+from scout_model.targets import Route, TargetPose, part_poses, parts
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """What of MuJoCo's state a picture depends on."""
@@ -86,6 +86,7 @@ class World:
             for target in description.targets
             for part in part_poses(target, 0.0)
         }
+        self._placed: dict[str, TargetPose] = {}
         self._place_targets()
         self._hold_carried()
         mujoco.mj_forward(self._model, self._data)
@@ -316,7 +317,11 @@ class World:
         time_s = self._step * STEP_S
         positions, quaternions = self._data.mocap_pos, self._data.mocap_quat
         for name, target in self._targets.items():
-            for part in parts(target, self._whereabouts[name](time_s)):
+            pose = self._whereabouts[name](time_s)
+            if pose == self._placed.get(name):
+                continue
+            self._placed[name] = pose
+            for part in parts(target, pose):
                 mocap = self._mocap[part.body]
                 positions[mocap] = part.position_m
                 quaternions[mocap] = part.quaternion
