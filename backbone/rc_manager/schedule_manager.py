@@ -77,6 +77,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.rc_manager.plan import Turn
 from backbone.rc_manager.priority import PriorityTree, carried, higher
+from backbone.rc_manager.promises import broken
 from backbone.rc_manager.rules import ROUNDING, SchedulingRules
 from backbone.rc_manager.table import EXACT_UP_TO
 
@@ -677,34 +678,9 @@ class ScheduleManager:
         Raises:
             AssertionError: It does not; with the story of the ARCs concerned.
         """
-        for arc in self._table.arcs.values():
-            self._check_arc(arc)
-        for rc in self._table.rcs.values():
-            holders = [arc for arc in self._table.arcs.values() if rc.name in arc.epochs]
-            exclusive = [arc for arc in holders if not rc.sharable or not arc.uses[rc.name].streams]
-            self._promise(not exclusive or len(holders) == 1, f"{rc.name} has one holder", holders)
-            epochs = [arc.epochs[rc.name] for arc in holders]
-            self._promise(len({*epochs}) == len(epochs), f"{rc.name}'s epochs are given once", holders)
-            self._promise(all(epoch <= rc.epoch for epoch in epochs), f"{rc.name}'s epochs grow", holders)
-            connected = [arc for arc in holders if arc.state in CONNECTED]
-            self._promise(rc.up or not connected, f"{rc.name} is down and holds nobody", connected)
-            for arc in connected:
-                others = [other for other in connected if other is not arc]
-                self._promise(self._table.fits(arc, others), f"{rc.name} serves all its holders in time", connected)
-        forgotten = self._table.forgotten(self._now_s)
-        self._promise(forgotten is None, f"nobody's turn is forgotten, but {forgotten and forgotten.name}'s", ())
-
-    def _check_arc(self, arc: ArcEntry) -> None:
-        wholly = arc.epochs.keys() == arc.uses.keys() if arc.holds else not arc.epochs
-        self._promise(wholly, f"{arc.name} holds all its RCs or none", [arc])
-        self._promise(arc.pledge is None or arc.state is RequestState.WAITING, "only who waits is pledged", [arc])
-
-    def _promise(self, kept: bool, what: str, whom: Sequence[ArcEntry]) -> None:
-        if kept:
-            return
-        names = {arc.name for arc in whom}
-        story = self._chronicle.story_of(names)
-        raise AssertionError("\n".join([f"broken at {self._now_s}: {what}", *map(str, story)]))
+        for promise, whom in broken(self._table, self._now_s):
+            story = self._chronicle.story_of({arc.name for arc in whom})
+            raise AssertionError("\n".join([f"broken at {self._now_s}: {promise}", *map(str, story)]))
 
     # Bookkeeping.
 

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_missions import END_S, play, random_mission
 from simulated_switches import Bench, ask, load, manager, sharable, unit
+from trace_judge import judge
 
 from backbone.rc_manager.decisions import PriorityChanged, RcKnown, Requested
 from backbone.rc_manager.messages import RcUse, SchedulingRequest
@@ -149,6 +150,7 @@ def judged(first: int) -> tuple[int, list[str]]:
 @pytest.mark.timeout(3600)
 def test_the_judge_finds_nothing_in_a_hundred_thousand_missions():
     """On all processors; each seed gives the same mission again."""
+    judge()  # where there is none it is skipped here, not in another process
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         results = list(pool.map(judged, range(0, MISSIONS, PART)))
     print(f"{MISSIONS} missions, {sum(lines for lines, _ in results)} lines of trace judged")
