@@ -21,9 +21,15 @@ Text = Annotated[str, msgspec.Meta(max_length=MOST_TEXT)]
 
 
 class Select(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="select"):
-    """Show all about this element."""
+    """Show all about this element.
+
+    Attributes:
+        path: The element.
+        number: Told back with what is shown, so that a page knows to which of its choices it belongs.
+    """
 
     path: PathSaid
+    number: Annotated[int, msgspec.Meta(ge=0, le=2**53)] = 0
 
 
 class TakeOffer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):

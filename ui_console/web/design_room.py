@@ -63,6 +63,8 @@ class Designer:
         self.news = asyncio.Event()
         self.at: Path = ()
         """The element all about which is shown."""
+        self.selected = 0
+        """The page's number of its last choice."""
         self.sees_rehearsal = False
         self.handled = 0
         """How much that names a revision was done or refused; the page says one such thing at a time."""
@@ -149,8 +151,8 @@ class DesignRoom:
 
     async def _do(self, guest: Designer, intent: DesignIntent) -> None:
         match intent:
-            case Select(path=path):
-                guest.at = self.draft.mission.nearest(path)
+            case Select(path=path, number=number):
+                guest.at, guest.selected = self.draft.mission.nearest(path), number
                 self._tell_element(guest)
             case TakeOffer() | SetProperty() | MoveElement() | RemoveElement() | Undo() | Redo():
                 await self._change(guest, intent)
@@ -305,6 +307,7 @@ class DesignRoom:
         self._tell_element(guest)
 
     def _tell_element(self, guest: Designer) -> None:
+        guest.tell("selected", guest.selected)
         guest.tell("element", element_view(self.draft, guest.at, self._facts))
 
     def _tell_people(self) -> None:

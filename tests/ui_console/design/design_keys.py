@@ -1,4 +1,4 @@
-"""Keys of the designer as a tutorial writes them, and classes that say little of themselves."""
+"""Keys of the designer as a tutorial writes them, what it builds, and classes that say little of themselves."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from collections.abc import Sequence
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from backbone.mission.edit import NewElement, Node
 from ui_console.design.catalogue import ClassFacts, ParameterFacts
+from ui_console.design.commands import Add, AddBehavior, AddResource, AddWorld, Claim, SetValue
+from ui_console.design.draft import Draft
 
 WATCH = "mission_control.behaviors.watch_for_motion:WatchForMotion"
 FACTS = {
@@ -37,3 +40,32 @@ async def settle(pilot: Pilot[None]) -> None:
     """Let what was begun come to its end."""
     for _ in range(3):
         await pilot.pause()
+
+
+def tutorial_draft(source: str = "guard.xml") -> Draft:
+    """Return the mission of the design tutorial, whatever hands build it."""
+
+    def path_of(tag: str, name: str) -> tuple[int, ...]:
+        return next(node.path for node in draft.mission if (node.tag, node.text("name")) == (tag, name))
+
+    draft = Draft.new(source).do(AddWorld("9", "6"))
+    points = [NewElement("point", {"x-m": x, "y-m": "3"}) for x in ("0", "9")]
+    pioneer = {"name": "pioneer", "shape": "pioneer", "speed-m-s": "0.5"}
+    draft = draft.do(Add(path_of("world", "world"), NewElement("target", pioneer, points)))
+    for kind, name in (("command_radio", "radio"), ("video_frequency", "video1"), ("framegrabber", "grabber")):
+        draft = draft.do(AddResource(kind, name))
+    for name in ("scout1", "scout2"):
+        draft = draft.do(AddResource("scout", name))
+    draft = draft.do(SetValue(path_of("scout", "scout2"), "x-m", "7.2"))
+    draft = draft.do(AddBehavior((), "surveillance", "surveillance", 5))
+    for robot in ("scout1", "scout2"):
+        draft = draft.do(AddBehavior(path_of("behavior", "surveillance"), "watch_for_motion", f"watch-{robot}"))
+        draft = draft.do(Claim(draft.step.touched, "capture", "5"))
+        draft = draft.do(Add(draft.step.touched, NewElement("wish", {"type": "scout", "name": robot})))
+    return draft
+
+
+def element(draft: Draft, tag: str, name: str) -> Node:
+    """Return the one element of this tag and name."""
+    (found,) = [node for node in draft.mission if (node.tag, node.text("name")) == (tag, name)]
+    return found

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from design_keys import known, press, settle
+from design_keys import known, press, settle, tutorial_draft
 from screen_text import screen_text
 from tutorial_commands import run_all
 
@@ -37,6 +37,7 @@ async def test_two_watchers_are_built_from_nothing_checked_and_brought_up(monkey
                         assert is_shown(line, screen_text(app)), f"{line}\n{screen_text(app)}"
         built, example = read_mission("guard.xml"), read_mission(ROOT / "mission.xml")
         assert built.behaviors == example.behaviors
+        assert app.draft.saved == tutorial_draft().text
         run_all(TUTORIAL, Path(name))
 
 

@@ -15,7 +15,7 @@ const view = {};
 
 const link = new Link({ heard, saw: () => {}, changed, silentMs: SILENT_MS });
 const login = new Login({ form: find("login"), enter: (hello) => link.open(hello) });
-const tree = new Tree({ root: find("tree"), choose: (path) => { if (!put(path)) link.say({ do: "select", path }); }, key: treeKey });
+const tree = new Tree({ root: find("tree"), choose: (path) => { if (!put(path)) link.say({ do: "select", path, number: ++selects }); }, key: treeKey });
 const palette = new Palette({
   root: find("palette"), filter: find("find-part"), read,
   add: (label) => take(tree.at, label),
@@ -26,7 +26,7 @@ const details = new Details({
   set: (path, one, value) => change(() => ({ do: "set", path, name: one.name, value, is_parameter: one.is_parameter })),
 });
 new Drag({ tree: tree.root, what, place, drop: (place) => place.do() });
-let carried = null, learning = "";
+let carried = null, learning = "", afterShown = null, selects = 0;
 
 // ---------------------------------------------------------------- one change after the other
 const waiting = [];
@@ -59,6 +59,7 @@ function changed(isUp, why, isRefused = false) {
   document.body.classList.toggle("is-down", !isUp);
   isUnderway = false;
   if (isUp) {
+    selects = 0;
     find("designer").hidden = false;
     if (!find("minute").hidden) link.say({ do: "rehearse", is_shown: true });
     return;
@@ -74,19 +75,28 @@ function heard(message) {
   if (changes.tree) tree.show(view.tree);
   if (changes.palette) {
     palette.show(view.palette);
-    const learned = view.palette.find((row) => row.type === learning && row.is_known);
+    const learned = learning && view.palette.find((row) => row.type === learning && row.is_known);
     if (learned) { learning = ""; read(learned.name, learned.doc.join("\n")); }
   }
   if (changes.problems) {
     showProblems(find("problems"), view.problems, (path) => { tree.pick(path); show("details"); });
-    for (const tab of document.querySelectorAll("[data-pane=problems]")) tab.textContent = view.problems.length ? `Problems (${view.problems.length})` : "Problems";
+    for (const tab of document.querySelectorAll("[role=tab][data-pane=problems]")) tab.textContent = view.problems.length ? `Problems (${view.problems.length})` : "Problems";
   }
-  if (changes.element) { tree.mark(view.element.path); showActions(); find("target-shown").textContent = `${view.element.tag} ${view.element.told}`.trim(); }
+  if ((changes.element || changes.selected !== undefined) && view.selected === selects) showChosen(); // else a newer choice is on its way
   if ((changes.element || changes.tree) && view.element) details.show(view.element, tree.row(view.element.path)?.problems ?? []);
   if ("rehearsal" in changes) showMinute(find("minute"), view.rehearsal);
   if (changes.people) find("people").textContent = view.people.length > 1 ? `with ${view.people.filter((one, at) => at !== view.people.indexOf(view.welcome?.user)).join(", ")}` : "";
   if (changes.status) showStatus(view.status);
   if (changes.handled !== undefined) { isUnderway = false; pump(); }
+}
+
+function showChosen() {
+  tree.mark(view.element.path);
+  showActions();
+  find("target-shown").textContent = `${view.element.tag} ${view.element.told}`.trim();
+  const act = afterShown;
+  afterShown = null;
+  act?.();
 }
 
 function showStatus(status) {
@@ -175,13 +185,13 @@ function move(path, parent, before, revision = null) {
 
 // ---------------------------------------------------------------- the same by buttons and keys
 const acts = {
-  add: async () => {
+  add: () => whenShown(async () => {
     const { path, offers } = view.element, revision = view.status.revision;
     const option = await choose(`Add to ${view.element.tag} ${view.element.told}`, offers);
     if (!option) return;
     const answers = option.asks.length ? await ask(option.label, option.doc, option.asks) : [];
     if (answers) take(path, option.label, answers, revision);
-  },
+  }),
   up: () => atChosen((path) => { const at = siblings(path).findIndex((one) => keyOf(one.path) === keyOf(path)); return at > 0 ? placed(path, path.slice(0, -1), siblings(path)[at - 1].path.at(-1)) : null; }),
   down: () => atChosen((path) => { const at = siblings(path).findIndex((one) => keyOf(one.path) === keyOf(path)); const next = siblings(path)[at + 1]; return next ? placed(path, path.slice(0, -1), next.path.at(-1) + 1) : null; }),
   into: () => atChosen((path, row) => {
@@ -202,12 +212,18 @@ const acts = {
 const siblings = (path) => (path.length ? tree.parts(path.slice(0, -1)) : []);
 const placed = (path, parent, before) => ({ do: "move", path, parent, before });
 
+/** Do something as soon as all about the chosen element has been heard. */
+function whenShown(act) {
+  if (view.element && view.selected === selects) act();
+  else afterShown = act;
+}
+
 function raise(steps) {
-  atChosen((path) => {
+  whenShown(() => atChosen((path) => {
     const found = view.element.properties.find((one) => one.name === "priority" && !one.is_parameter);
     const value = Number.parseInt(found?.value ?? "", 10);
     return Number.isNaN(value) ? null : { do: "set", path, name: "priority", value: String(value + steps) };
-  });
+  }));
 }
 
 /** Take an element in the hand, to be put into the one that is chosen next; null: put nothing. */

@@ -84,12 +84,15 @@ export class Tree {
   }
 
   made(row) {
-    const made = document.createElement("div"), isFolded = this.isFolded(row), inside = this.parts(row.path).length;
+    const made = document.createElement("div"), isFolded = this.isFolded(row);
+    const inside = row.path.length ? this.parts(row.path).length : 0; // the mission itself is never folded
     made.className = `element tag-${row.tag}`;
     made.dataset.key = keyOf(row.path);
+    made.dataset.told = `${row.tag} ${row.told}`.trim();
     if (row.path.length) made.dataset.drag = "element";
     made.tabIndex = -1;
     made.setAttribute("role", "treeitem");
+    made.setAttribute("aria-label", [made.dataset.told, ...row.problems.map((one) => `problem: ${one}`)].join("; "));
     made.setAttribute("aria-level", String(row.path.length + 1));
     made.setAttribute("aria-selected", String(keyOf(row.path) === keyOf(this.at)));
     if (inside) made.setAttribute("aria-expanded", String(!isFolded));
@@ -99,8 +102,7 @@ export class Tree {
     if (row.problems.length) {
       const cross = part("wrong", "✗");
       cross.title = row.problems.join("\n");
-      cross.setAttribute("aria-label", `problem: ${row.problems.join("; ")}`);
-      cross.setAttribute("role", "img");
+      cross.setAttribute("aria-hidden", "true");
       made.append(cross);
     }
     made.append(part("tag", row.tag), part("told", isFolded ? `… ${inside}` : row.told));

@@ -53,6 +53,14 @@ function showOwn(own) {
   set(find("own"), own.status);
   set(find("taken"), own.taken_because ? `Taken from you: ${own.taken_because}` : "");
   set(find("applied"), own.applied ? `applied: ${own.applied}` : "");
+  const consent = own.consent;
+  find("consent").hidden = consent === null;
+  if (consent) {
+    const others = consent.others ? `, ${consent.others} more ask` : "";
+    set(find("consent-line"), `${consent.user} asks for ${consent.robot}: ${consent.why} (${Math.ceil(consent.left_s)} s${others})`);
+  }
+  set(find("asked"), own.asked);
+  find("may-i").disabled = !own.is_asked || own.is_held;
   find("release").disabled = !own.is_asked;
   find("take").disabled = own.is_asked;
   find("jump").disabled = !own.is_held;
@@ -108,6 +116,9 @@ function act(what, name, more = {}) {
 find("stop-all").addEventListener("click", () => { driving.letGo(); say({ do: "stop_all" }); });
 find("take").addEventListener("click", () => act("take", view.own?.robot ?? ""));
 find("release").addEventListener("click", () => act("release"));
+find("may-i").addEventListener("click", () => say({ do: "may_i" }));
+find("consent-yes").addEventListener("click", () => { driving.letGo(); say({ do: "decide", is_given: true }); });
+find("consent-no").addEventListener("click", () => say({ do: "decide", is_given: false }));
 find("halt").addEventListener("click", () => driving.letGo(true));
 find("jump").addEventListener("click", () => say({ do: "jump" }));
 find("speed").addEventListener("input", () => { find("speed-shown").textContent = find("speed").value; });
