@@ -68,7 +68,9 @@ class Painter:
         self._a_corner = np.array([polygon[0] for polygon in self._polygons])
         self._polygons_of_geom = [np.flatnonzero(self._geom_of_polygon == geom) for geom in range(len(geoms))]
         self._background = [geom for group in (_ROOM, _MARKS) for geom in self._of_room(group)]
+        self._room_geoms = self._geoms[self._background]
         self._things = self._group_things()
+        self._remembered: dict[int, tuple[bytes, NDArray[np.uint8]]] = {}
 
     def draw(self, data: mujoco.MjData, camera: int) -> NDArray[np.uint8]:
         """Return the picture: grey levels 0 to 255, shape (240, 320), row 0 on top."""
@@ -82,15 +84,20 @@ class Painter:
         colors = 255 * self._model.geom_rgba[self._geoms, :3] @ _LUMA
         levels = np.clip(colors[self._geom_of_polygon] * self._brightness(data, normals), 0, 255)
         is_seen = np.einsum("ni,ni->n", normals, eye_m - corners[self._a_corner]) > 0
-        canvas = np.zeros((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), np.uint8)
+        canvas = self._background_as_before(data, camera)
+        is_new = canvas is None
+        if canvas is None:
+            canvas = np.zeros((PICTURE_HEIGHT_PX, PICTURE_WIDTH_PX), np.uint8)
 
         def paint(geom: int) -> None:
             for polygon in self._polygons_of_geom[geom]:
                 if is_seen[polygon]:
                     view.fill(canvas, self._polygons[polygon], float(levels[polygon]))
 
-        for geom in self._background:
-            paint(geom)
+        if is_new:
+            for geom in self._background:
+                paint(geom)
+            self._remembered[camera] = self._background_key(data, camera), canvas.copy()
         own_body = self._model.body_rootid[self._model.cam_bodyid[camera]]
         # What is out of the picture must not take part in the order either: a remembered picture does not know of it.
         others = [
@@ -110,6 +117,16 @@ class Painter:
 
     def close(self) -> None:
         """Do nothing: OpenCV holds nothing."""
+
+    def _background_as_before(self, data: mujoco.MjData, camera: int) -> NDArray[np.uint8] | None:
+        """Return a copy of the room as this camera saw it last; None if it would look different now."""
+        key, picture = self._remembered.get(camera, (b"", None))
+        return picture.copy() if picture is not None and key == self._background_key(data, camera) else None
+
+    def _background_key(self, data: mujoco.MjData, camera: int) -> bytes:
+        """Return bytes that are the same if the room looks the same: camera, lights and colors; it does not move."""
+        seen = (data.cam_xpos[camera], data.cam_xmat[camera], data.light_xdir, self._model.geom_rgba[self._room_geoms])
+        return b"".join(part.tobytes() for part in seen)
 
     def _of_room(self, group: int) -> list[int]:
         return [int(geom) for geom in np.flatnonzero((self._groups == group) & (self._bodies == 0))]

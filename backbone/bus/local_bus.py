@@ -10,6 +10,7 @@ over to each other is the same for ``shared_bus``, whose members speak with othe
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
@@ -318,6 +319,7 @@ def _check(mission: str, address: str) -> None:
     key(mission, address, Conversation.ASK)
 
 
+@functools.lru_cache(maxsize=4096)
 def _matches(pattern: str, address: str) -> bool:
     if pattern == address:
         return True
