@@ -26,6 +26,7 @@ class Conversation(StrEnum):
     TELEMETRY = "telemetry"  # what was applied, measured or overrun
     FRAMES = "frames"  # pictures
     EVENTS = "events"  # what a behavior or world found out
+    OPERATORS = "operators"  # what people did: one event for each action
     SCHEDULE = "schedule"  # the RC manager's decisions and leases
     LEASES = "leases"  # the RC manager's renewals of what is held
     BEAT = "beat"  # heartbeats of ARCs: their loop runs, and their owner's

@@ -52,7 +52,7 @@ class ConsoleObserver:
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people."""
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
-        bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, self._heard_act)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
 
     def tell(self, line: str) -> None:
         """Print one line, also to whoever waits for readiness."""

@@ -59,7 +59,7 @@ _SENTENCES = {
 
 
 class OperatorActed(Message, frozen=True):
-    """Published as an event, once for each action, by the console or command through which a person acted.
+    """Published by the console or command through which a person acted, under ``Conversation.OPERATORS``.
 
     Attributes:
         user: Who.
@@ -105,4 +105,4 @@ def tell_acted(bus: Bus, clock: Clock, action: OperatorAction, subject: str, det
         subject: Whom or what it was done to.
         detail: For people.
     """
-    bus.publish(bus.source, Conversation.EVENTS, OperatorActed(login_name(), action, subject, detail, clock.now_s()))
+    bus.publish(bus.source, Conversation.OPERATORS, OperatorActed(login_name(), action, subject, detail, clock.now_s()))

@@ -16,6 +16,7 @@ from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import Leases, Schedule, Why
 from resource_pool.arc_client import StopState
+from ui_console.consent import Settled, Sought
 
 
 # ---------------------------------------------------------------------- of its own robot
@@ -148,6 +149,58 @@ class Attention:
 
     at_s: float
     is_there: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentAsked:
+    """This console asked whether it may have what others hold.
+
+    Attributes:
+        at_s: When.
+        robot: What it is about.
+        of: Names of the consoles that were asked.
+        until_s: Silence is a no from then on.
+    """
+
+    at_s: float
+    robot: str
+    of: Sequence[str]
+    until_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentHeard:
+    """Somebody who was asked decided, or did not in time.
+
+    Attributes:
+        at_s: When.
+        robot: What it was about.
+        user: Who decided.
+        is_given: True: it is being given back.
+        reason: For people.
+    """
+
+    at_s: float
+    robot: str
+    user: str
+    is_given: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentSought:
+    """Another console asks for what this one holds."""
+
+    at_s: float
+    sought: Sought
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentSettled:
+    """A question that was open here is answered."""
+
+    at_s: float
+    settled: Settled
 
 
 # ---------------------------------------------------------------------- of the whole mission
@@ -310,6 +363,10 @@ OwnEvent = (
     | PictureSeen
     | WhyHeard
     | Attention
+    | ConsentAsked
+    | ConsentHeard
+    | ConsentSought
+    | ConsentSettled
 )
 TeamEvent = (
     ScheduleHeard
@@ -338,6 +395,10 @@ _WORDS: dict[type[Any], str] = {
     PictureSeen: "picture",
     WhyHeard: "why",
     Attention: "attention",
+    ConsentAsked: "consent_asked",
+    ConsentHeard: "consent_heard",
+    ConsentSought: "consent_sought",
+    ConsentSettled: "consent_settled",
     ScheduleHeard: "schedule",
     LeasesHeard: "leases",
     StoryHeard: "story",

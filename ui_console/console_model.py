@@ -15,11 +15,16 @@ from typing import cast, get_args
 import msgspec
 
 from resource_pool.arc_client import EmergencyStopped
+from ui_console.consent import Sought
 from ui_console.console_events import (
     Asked,
     Attention,
     CommandApplied,
     CommandRefused,
+    ConsentAsked,
+    ConsentHeard,
+    ConsentSettled,
+    ConsentSought,
     ConsoleEvent,
     GivenBack,
     Granted,
@@ -34,6 +39,7 @@ from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.views import (
     NONE_S,
     AlarmKind,
+    ConsentView,
     ConsoleView,
     LinkView,
     LogRow,
@@ -72,6 +78,9 @@ class ConsoleModel:
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
         self._pictures: dict[str, deque[PictureSeen]] = {}
+        self._sought: dict[str, Sought] = {}
+        self._asked_whom: ConsentAsked | None = None
+        self._heard: list[ConsentHeard] = []
         self._blind = ""  # robot that is held without pictures to drive by
 
     # ------------------------------------------------------------------ events in
@@ -136,7 +145,26 @@ class ConsoleModel:
             applied=_applied_line(self.applied),
             stop=self.team.stop_view(self.robot, now_s) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
+            consent=self.consent(now_s),
+            asked=self.asked_line(now_s),
         )
+
+    def consent(self, now_s: float) -> ConsentView | None:
+        """Return what this operator is to decide first; None: nobody asks."""
+        if not self._sought:
+            return None
+        first, *others = self._sought.values()
+        return ConsentView(first.user, first.robot, first.why, max(0.0, first.until_s - now_s), len(others))
+
+    def asked_line(self, now_s: float) -> str:
+        """Return in one line what came of asking others for their consent; empty: nobody was asked."""
+        asked = self._asked_whom
+        if asked is None:
+            return ""
+        said = [_answer_line(heard) for heard in self._heard]
+        if len(said) < len(asked.of):
+            said.append(f"asked {', '.join(asked.of)} for {asked.robot}: {max(0.0, asked.until_s - now_s):.0f} s left")
+        return "; ".join(said)
 
     def robots(self, now_s: float) -> list[RobotView]:
         """Return one row for each robot, sorted by name; this console's own and its pictures are marked."""
@@ -185,10 +213,19 @@ class ConsoleModel:
     def _apply_own(self, event: OwnEvent) -> None:
         alarms = self.team.alarms
         match event:
+            case ConsentAsked():
+                self._asked_whom, self._heard = event, []
+            case ConsentHeard():
+                self._heard.append(event)
+            case ConsentSought(sought=sought):
+                self._sought[sought.asker] = sought
+            case ConsentSettled(settled=settled):
+                self._sought.pop(settled.sought.asker, None)
             case Asked(robot=robot):
+                self._asked_whom = None
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
-                self.held, self.lost, self.why = event, None, None
+                self.held, self.lost, self.why, self._asked_whom = event, None, None, None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s, reason=reason, by=by):
                 self.held, self.lost = None, event
@@ -205,7 +242,7 @@ class ConsoleModel:
             case LinkTrouble(at_s=at_s, detail=detail):
                 alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
             case GivenBack(at_s=at_s, confirmed=confirmed):
-                self.held = self.asked = self.lost = self.why = self.applied = None
+                self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:
                     line = f"{self.robot} was given back, but nobody confirmed it"
@@ -238,6 +275,11 @@ def _video(robot: str, seen: deque[PictureSeen], now_s: float) -> VideoView:
     span_s = newest.at_s - seen[0].at_s
     rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
     return VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
+
+
+def _answer_line(heard: ConsentHeard) -> str:
+    word = "lets you have" if heard.is_given else "keeps"
+    return f"{heard.user} {word} {heard.robot}{f': {heard.reason}' if heard.reason else ''}"
 
 
 def _applied_line(applied: CommandApplied | None) -> str:

@@ -100,7 +100,7 @@ class ConsoleFeed:
         bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
         bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_story)
-        bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, self._heard_act)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
         bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard_status, latest=True)
         bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_life)
         watch_stops(bus, lambda stop: self._show(StopHeard(self._clock.now_s(), stop)))

@@ -59,7 +59,7 @@ class Observer(Component[P], Generic[P]):
         """
         act = OperatorActed(user or self.user, action, subject, detail, self.clock.now_s())
         self.story.note(subject, act.sentence)
-        self.bus.publish(self.address, Conversation.EVENTS, act)
+        self.bus.publish(self.address, Conversation.OPERATORS, act)
 
     # ------------------------------------------------------------------ verbs that need no grant
     async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:

@@ -19,10 +19,11 @@ import msgspec
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState
-from backbone.errors import LinkError, Refusal, code_of
+from backbone.errors import LinkError, NoResponder, Refusal, code_of
+from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy, Why
+from backbone.rc_manager.messages import AskSchedule, AskWhy, Schedule, Why
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_client import (
     Applied,
@@ -37,11 +38,25 @@ from resource_pool.arc_client import (
     arc_name,
     claim_parameters,
 )
+from ui_console.consent import (
+    CONSENT_WITHIN_S,
+    MAX_WHY,
+    AskConsent,
+    Consent,
+    ConsentDesk,
+    NobodyToAsk,
+    NotAnOperator,
+    Settled,
+)
 from ui_console.console_events import (
     Asked,
     Attention,
     CommandApplied,
     CommandRefused,
+    ConsentAsked,
+    ConsentHeard,
+    ConsentSettled,
+    ConsentSought,
     ConsoleEvent,
     GivenBack,
     Granted,
@@ -95,7 +110,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent
 
     def __init__(
         self,
@@ -132,6 +147,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._holding = ""
         self._next_robot = ""
         self._switching = asyncio.Lock()
+        self._desk = ConsentDesk(self.user)
+        self._answers: dict[str, asyncio.Future[Consent]] = {}
+        self._unanswered = 0
         self.refusal: Refusal | None = None
         """Why the claim was refused; None if it was not."""
         self.given_back: bool | None = None
@@ -320,10 +338,123 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     def _tell_given_back(self, reason: str, *, confirmed: bool) -> None:
         self._tell_drive_ended(reason)
+        self._settle(self._desk.ended(True, reason))
         robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
         self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
         self.report("holds no robot")
         self.show(GivenBack(self.clock.now_s(), reason, confirmed))
+
+    # ------------------------------------------------------------------ consent
+    def begin_ask_consent(self, why: str = "") -> None:
+        """Ask whoever holds what this console waits for; what they say is shown. Nothing if they are being asked."""
+        if self._unanswered == 0:
+            self._unanswered = 1
+            self.start_task(self._ask_consent(why), "consent")
+
+    def decide(self, is_given: bool, reason: str = "") -> None:
+        """Answer who asks for the robot; with a yes it is given back."""
+        settled = self._desk.decide(is_given, reason)
+        if not settled:
+            return
+        asker = settled[0].sought
+        action = OperatorAction.CONSENT if is_given else OperatorAction.DECLINE
+        self.acted(action, asker.robot, f"asked by {asker.user}{f', {reason}' if reason else ''}")
+        if is_given:
+            self.start_task(self._yield_to(settled), "consent")
+        else:
+            self._settle(settled)
+
+    async def _yield_to(self, settled: list[Settled]) -> None:
+        """Give the robot back, then say so: who was let have it finds it free."""
+        await self.give_back(f"{settled[0].sought.user} may have it")
+        self._settle(settled)
+
+    async def _seek_consent(self, asker: str, asked: AskConsent) -> Consent:
+        """Have the operator decide; silence is a no.
+
+        Raises:
+            NotAnOperator: The asker is no console.
+            Refusal: See ``ConsentDesk.seek``.
+        """
+        if not _is_console(asker):
+            raise NotAnOperator(f"{self.name} is asked for its robot by operators only, not by {asker}")
+        if not self.is_held:
+            return Consent(not self._is_asking, self.user, "holds nothing")
+        if self._work is not None:
+            return Consent(False, self.user, "a script drives")
+        within_s = CONSENT_WITHIN_S * self.clock.rate
+        sought = self._desk.seek(asker, asked, self.clock.now_s(), within_s)
+        answer: asyncio.Future[Consent] = asyncio.get_running_loop().create_future()
+        self._answers[asker] = answer
+        self.show(ConsentSought(self.clock.now_s(), sought))
+        try:
+            async with asyncio.timeout(CONSENT_WITHIN_S):
+                return await answer
+        except TimeoutError:
+            self._settle(self._desk.expire(max(self.clock.now_s(), sought.until_s)))
+            return Consent(False, self.user, "no answer")
+
+    def _settle(self, settled: list[Settled]) -> None:
+        for one in settled:
+            answer = self._answers.pop(one.sought.asker, None)
+            if answer is not None and not answer.done():
+                answer.set_result(one.consent)
+            self.show(ConsentSettled(self.clock.now_s(), one))
+
+    async def _ask_consent(self, why: str) -> None:
+        try:
+            holders = await self._who_holds()
+        except Refusal as refusal:
+            self._unanswered = 0
+            self._tell_refusal(refusal)
+        except LinkError as error:
+            self._unanswered = 0
+            self.show(LinkTrouble(self.clock.now_s(), str(error)))
+        else:
+            self._unanswered = len(holders)
+            robot, now_s = self.parameters.robot or ANY_ROBOT, self.clock.now_s()
+            names = [component_of(holder) for holder in holders]
+            why = (why or f"waits since {now_s - self._asked_s:.0f} s")[:MAX_WHY]
+            self.acted(OperatorAction.ASK_CONSENT, robot, f"of {', '.join(names)}, {why}")
+            self.show(ConsentAsked(now_s, robot, names, now_s + CONSENT_WITHIN_S * self.clock.rate))
+            await asyncio.gather(*(self._ask_one(holder, AskConsent(robot, self.user, why)) for holder in holders))
+
+    async def _who_holds(self) -> list[str]:
+        """Return the addresses of the consoles that hold the robot, or else stand directly in the way.
+
+        Raises:
+            NobodyToAsk: There is none, or this console does not wait.
+            LinkError: The RC manager did not answer.
+        """
+        if not self._is_asking or self.is_held:
+            raise NobodyToAsk(f"{self.user} does not wait for a robot", remedy="Take the robot first.")
+        schedule = await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
+        owners = {request.arc: request.owner for request in schedule.requests}
+        own = arc_name(self.bus, self.parameters.kind)
+        arcs = {arc for one in schedule.requests if one.arc == own for arc in one.blockers}
+        arcs |= {holder.arc for rc in schedule.rcs if rc.rc == self.parameters.robot for holder in rc.holders}
+        blockers = {owners[arc] for arc in arcs - {own} if arc in owners}
+        consoles = sorted(at for at in blockers if _is_console(at) and at != self.address)
+        if not consoles:
+            names = ", ".join(sorted(map(component_of, blockers))) or "nobody"
+            raise NobodyToAsk(f"no operator stands in the way of {self.user}, but {names}")
+        return consoles
+
+    async def _ask_one(self, holder: str, question: AskConsent) -> None:
+        try:
+            consent = await self.bus.ask(holder, question, Consent, within_s=CONSENT_WITHIN_S + REPLY_TIME_S)
+        except NoResponder:  # a console that is gone holds nothing: its ARC ends with it
+            consent = Consent(True, component_of(holder), "is gone")
+        except LinkError:
+            consent = Consent(False, component_of(holder), "does not answer")
+        except Refusal as refusal:
+            consent = Consent(False, component_of(holder), refusal.detail)
+        self._unanswered -= 1
+        if not consent.is_given:
+            because = consent.reason or "no reason given"
+            self.tell(question.robot, f"{consent.user} keeps it from {self.user}: {because}")
+        now_s = self.clock.now_s()
+        self.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
 
     # ------------------------------------------------------------------ the component's hooks
     async def serve(self) -> None:
@@ -339,7 +470,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         await self.watch()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Answer the ARC's notices."""
+        """Answer the ARC's notices, and other consoles that ask for the robot."""
+        if isinstance(asked.body, AskConsent):
+            return await self._seek_consent(asked.source, asked.body)
         if not isinstance(asked.body, ArcNotice):
             raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
         if self._arc is None:
@@ -379,8 +512,10 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def arc_suspended(self, notice: Suspended) -> None:
         """Tell it; see ``ArcListener``."""
         self._dead_man = DeadMan()
-        self._tell_drive_ended(f"{notice.reason} by {notice.by}" if notice.by else notice.reason)
         if self._keeping is not None:
+            because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
+            self._settle(self._desk.ended(False, f"it was lost: {because}"))
+            self._tell_drive_ended(because)
             self.report(f"waits: {notice.reason} by {notice.by}")
             self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
 
@@ -463,3 +598,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
         await work(self)
         self.end("the work is done")
+
+
+def _is_console(address: str) -> bool:
+    return address.startswith(f"{Subsystem.UI_CONSOLE}/")

@@ -374,6 +374,24 @@ class LogRow(msgspec.Struct, frozen=True):
     where: str
 
 
+class ConsentView(msgspec.Struct, frozen=True):
+    """Somebody asks for what this console holds.
+
+    Attributes:
+        user: Who.
+        robot: For what.
+        why: Why, for people.
+        left_s: Seconds until silence is a no.
+        others: How many more ask.
+    """
+
+    user: str
+    robot: str
+    why: str
+    left_s: float
+    others: int
+
+
 class OwnView(msgspec.Struct, frozen=True):
     """What this console wants and has.
 
@@ -390,6 +408,8 @@ class OwnView(msgspec.Struct, frozen=True):
         applied: The last command that was applied, for people.
         stop: The stop in force on the robot held; None: it may move.
         away_since_s: Since when the operator is away.
+        consent: What this operator is asked; None: nothing.
+        asked: In one line what came of asking others; empty: nobody was asked.
     """
 
     console: str
@@ -404,6 +424,8 @@ class OwnView(msgspec.Struct, frozen=True):
     applied: str
     stop: StopView | None
     away_since_s: float
+    consent: ConsentView | None = None
+    asked: str = ""
 
 
 class ConsoleView(msgspec.Struct, frozen=True):

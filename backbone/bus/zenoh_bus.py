@@ -55,6 +55,7 @@ _QUALITY = {
     Conversation.LEASES: _URGENT,
     Conversation.STATUS: _SURE,
     Conversation.EVENTS: _SURE,
+    Conversation.OPERATORS: _SURE,
     Conversation.SCHEDULE: _SURE,
     Conversation.FRAMES: _BULK,
     Conversation.LOG: _BULK,

@@ -12,28 +12,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from running_mission import MISSION_XML, RunningMission, mission_up, runtime_directory
+from consoles_at_work import WAIT_S, Console, consoles_at_work
+from running_mission import MISSION_XML, RunningMission, mission_up
 
-from backbone import run_files
-from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
-from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.companion import Companion
-from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, ComponentState, Parameters, SetParameter, Statistics
 from backbone.keys import Conversation
-from backbone.naming import Subsystem
 from backbone.wire import Envelope
 from mission_control.messages import WaypointReached
-from ui_console.console_events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.console_events import Lost
 from ui_console.driving import Drive
-from ui_console.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
 DRIVEN_WITHIN_S = 0.150
 RESUMED_WITHIN_S = 0.300
-WAIT_S = 10.0
 A_WAY_S = 20.0
 FOR_GOOD = 0.25  # share of the releases after which the next take-over starts a new process
 PATROL, SCOUT, WORLD = "mission_control/patrol", "resource_pool/scout3", "resource_pool/world"
@@ -98,95 +91,14 @@ class Watch:
                 await self.changed.wait()
 
 
-class Console:
-    """A person at a console."""
-
-    def __init__(self, name: str, priority: int, found: run_files.RunFile, clock: MissionClock) -> None:
-        self.name, self.clock, self.events = name, clock, list[ConsoleEvent]()
-        self.launch = Launch(
-            found.mission,
-            Subsystem.UI_CONSOLE,
-            name,
-            "console",
-            "ui_console.teleoperation:Teleoperation",
-            found.host,
-            found.endpoint,
-            found.clock_origin_monotonic_s,
-            found.clock_rate,
-            {"robot": "scout3", "kind": "drive", "priority": priority, "minimum_runtime_s": 0.1},
-        )
-        self.component: Teleoperation | None = None
-        self.heard = asyncio.Event()
-
-    def show(self, event: ConsoleEvent) -> None:
-        self.events.append(event)
-        self.heard.set()
-
-    async def hears(self, mark: int, kind: type[Any]) -> Any:
-        """Return the first event of this kind after the mark."""
-        async with asyncio.timeout(WAIT_S):
-            while not (found := self.since(mark, kind)):
-                self.heard.clear()
-                await self.heard.wait()
-        return found[0]
-
-    def since(self, mark: int, kind: type[Any]) -> list[Any]:
-        return [event for event in self.events[mark:] if isinstance(event, kind)]
-
-    async def take_and_drive(self, drive: Drive) -> float:
-        """Return how long it took from the wish to the first command applied."""
-        console = self.component
-        assert console is not None
-        mark = len(self.events)
-        console.take()
-        async with asyncio.timeout(WAIT_S):
-            await console.wait_granted()
-            assert await console.do(drive), self.events[mark:]
-        [asked], [applied] = self.since(mark, Asked), self.since(mark, CommandApplied)[:1]
-        assert isinstance(self.since(mark, Granted)[0], Granted)
-        return float(applied.at_s - asked.at_s)
-
-    async def give_back(self, *, for_good: bool = False) -> float:
-        """Return when it began to give the robot back."""
-        assert self.component is not None
-        mark, began_s = len(self.events), self.clock.now_s()
-        await self.component.give_back(for_good=for_good)
-        assert self.since(mark, GivenBack)[0].confirmed
-        return began_s
-
-    def run(self, bus: Bus) -> asyncio.Task[None]:
-        self.component = Teleoperation(
-            self.launch, bus, self.clock, show=self.show, takes=False, watches=False, keeps_arc=True
-        )
-        return asyncio.create_task(self.component.run(), name=self.name)
-
-
 @asynccontextmanager
 async def two_consoles(mission: RunningMission) -> AsyncIterator[tuple[Console, Console, Watch, Bus]]:
-    with runtime_directory(mission.environment["XDG_RUNTIME_DIR"]):
-        found = run_files.find(mission.name)
-    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     watch = Watch()
     async with mission.bus("ui_console/onlooker") as bus:
         watch.listen(bus)
-        consoles = [Console("console-low", 90, found, clock), Console("console-high", 100, found, clock)]
-        lives = []
-        for console in consoles:
-            own = await ZenohBus.open_when_up(
-                mission.name, console.launch.address, clock, client_config(found.endpoint)
-            )
-            lives.append(console.run(own))
-        for console in consoles:
-            companion = Companion(bus, console.launch.address)
-            await companion.wait_there()
-            companion.close()
-        try:
-            yield consoles[0], consoles[1], watch, bus
-        finally:
-            for console in consoles:
-                assert console.component is not None
-                console.component.end("the test is over")
-            await asyncio.gather(*lives)
+        people = [("console-low", 90), ("console-high", 100)]
+        async with consoles_at_work(mission, bus, "scout3", people) as (low, high):
+            yield low, high, watch, bus
 
 
 async def counted(bus: Bus, address: str) -> dict[str, float]:

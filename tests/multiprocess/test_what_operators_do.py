@@ -48,7 +48,7 @@ class Record:
 async def test_each_command_that_changes_a_mission_is_one_event_with_its_user(mission: RunningMission) -> None:
     async with mission.bus("ui_console/recorder") as bus:
         record = Record()
-        bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, record.heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, record.heard)
         for words in (
             ("set", "watch-scout1", "priority", "7"),
             ("start", "video_frequency", "--name", "video9"),

@@ -208,7 +208,7 @@ def test_each_thing_an_operator_does_is_one_event_with_the_name(stage: Callable[
         watcher = on.make(Watcher, Subsystem.MISSION_CONTROL, "watch1", "watch")
         heard: list[OperatorActed] = []
         async with on.beside(on.manager()) as manager, on.beside(robot), on.beside(watcher):
-            manager.bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, lambda said: heard.append(said.body))
+            manager.bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, lambda said: heard.append(said.body))
             async with on.beside(console):
                 await on.until(lambda: "schedule" in on.words())
                 await console.stop_robot("scout1", "child in the room")

@@ -464,7 +464,7 @@ def test_each_thing_a_driver_does_is_one_event_with_the_name(placer_world: Any, 
     async def scene(placer: FakePlacer) -> None:
         heard: list[OperatorActed] = []
         placer.on_arc = grant_at_once
-        placer.bus.subscribe("*/*", Conversation.EVENTS, OperatorActed, lambda said: heard.append(said.body))
+        placer.bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, lambda said: heard.append(said.body))
         async with beside(console(placer, lambda event: None, user="anna")) as driven:
             await placer.wait(lambda: driven.is_held)
             for _repeat in range(10):

@@ -14,7 +14,19 @@ from screen_text import same_as_before, screen_text
 from textual.events import AppBlur, AppFocus
 from textual.widgets import Input
 
-from ui_console.console_events import Attention, ConsoleEvent, LinkTrouble, Lost, ScheduleHeard, StopHeard
+from ui_console.consent import Consent, Settled, Sought
+from ui_console.console_events import (
+    Attention,
+    ConsentAsked,
+    ConsentHeard,
+    ConsentSettled,
+    ConsentSought,
+    ConsoleEvent,
+    LinkTrouble,
+    Lost,
+    ScheduleHeard,
+    StopHeard,
+)
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.terminal.app import (
@@ -62,6 +74,12 @@ class WrittenSession:
 
     def release(self) -> None:
         self.wanted.append("release")
+
+    def ask_consent(self, why: str = "") -> None:
+        self.wanted.append(("may I", why))
+
+    def decide(self, is_given: bool) -> None:
+        self.wanted.append(("decide", is_given))
 
     async def switch(self, robot: str) -> None:
         self.wanted.append(("switch", robot))
@@ -117,6 +135,9 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("j", ["jump"]),
     ("r", ["release"]),
     ("t", ["take"]),
+    ("m", [("may I", "")]),
+    ("g", [("decide", True)]),
+    ("n", [("decide", False)]),
     ("x", ["stop", ("stop robot", "scout1")]),
     ("X", ["stop", "stop all"]),
     ("c", [("lift", "scout1")]),
@@ -153,6 +174,7 @@ async def test_every_key_does_what_it_says() -> None:
 
 def test_every_key_the_console_knows_is_tried_here() -> None:
     elsewhere = {
+        "M",
         "plus",
         "equals_sign",
         "minus",
@@ -322,6 +344,51 @@ async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> 
         await settle(pilot)
         assert session.wanted == [("set", "watch1", "threshold", 25)]
         assert ("did not take" in screen_text(screen)) is not is_sure
+
+
+async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_keys_that_decide() -> None:
+    shown = held_model()
+    sought = Sought("ui_console/console-2", "ben", "scout1", "my robot is stuck", 18.0)
+    shown.apply(ConsentSought(11.0, sought))
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=(160, 36)) as pilot:
+        await settle(pilot)
+        assert "ben asks for scout1: my robot is stuck [g: let go, n: keep; 6 s]" in screen_text(screen)
+        await pilot.press("g")
+        assert session.wanted[-1] == ("decide", True)
+        shown.apply(ConsentSettled(12.0, Settled(sought, Consent(True, "anna", ""))))
+        screen.redraw()
+        await settle(pilot)
+        assert "ben asks" not in screen_text(screen)
+
+
+async def test_a_pendants_holder_lets_go_with_the_key_that_releases() -> None:
+    shown = held_model()
+    shown.apply(ConsentSought(11.0, Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0)))
+    screen = ConsoleApp(WrittenSession(shown=shown), profile=Profile.PENDANT)
+    async with screen.run_test(size=(160, 20)) as pilot:
+        await settle(pilot)
+        assert "ben asks for scout1: stuck [enter: let go; 6 s]" in screen_text(screen)
+
+
+async def test_who_asks_may_say_why_and_sees_what_came_of_it() -> None:
+    shown = model(*TEAM_EVENTS, ASK)
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session)
+    async with screen.run_test(size=(160, 36)) as pilot:
+        await pilot.press("M")
+        await pilot.press(*"stuck", "enter")
+        await settle(pilot)
+        assert session.wanted[-1] == ("may I", "stuck")
+        shown.apply(ConsentAsked(12.0, "scout1", ["console-2"], 18.0))
+        screen.redraw()
+        await settle(pilot)
+        assert "asked console-2 for scout1: 6 s left" in screen_text(screen)
+        shown.apply(ConsentHeard(13.0, "scout1", "ben", False, "nearly done"))
+        screen.redraw()
+        await settle(pilot)
+        assert "ben keeps scout1: nearly done" in screen_text(screen)
 
 
 def test_what_is_typed_is_json_or_the_text_itself() -> None:
@@ -502,7 +569,7 @@ async def test_every_table_looks_as_it_did() -> None:
         ("monitor", Profile.MONITOR, SIZE, []),
         ("dialog-picker", Profile.TERMINAL, SIZE, ["p"]),
         ("dialog-why", Profile.TERMINAL, SIZE, ["y"]),
-        ("dialog-keys", Profile.TERMINAL, (120, 46), ["question_mark"]),
+        ("dialog-keys", Profile.TERMINAL, (120, 50), ["question_mark"]),
         ("dialog-parameter", Profile.TERMINAL, SIZE, [*["tab"] * 6, "e"]),
     ],
 )

@@ -90,7 +90,21 @@ DRIVE_KEYS: list[BindingType] = [
     Binding("right,d", "drive('right')", "right", show=False),
 ]
 DRIVES = frozenset(
-    {"drive", "stop", "jump", "faster", "release", "take", "take_or_release", "pick", "choose_robot", "bare"}
+    {
+        "drive",
+        "stop",
+        "jump",
+        "faster",
+        "release",
+        "take",
+        "take_or_release",
+        "pick",
+        "choose_robot",
+        "bare",
+        "ask_consent",
+        "ask_consent_because",
+        "decide",
+    }
 )
 """Actions of those who may drive."""
 PENDANT_DOES = frozenset({"drive", "stop", "take_or_release", "quit"})
@@ -122,6 +136,12 @@ class Session(Protocol):
 
     def release(self) -> None:
         """Give the robot back."""
+
+    def ask_consent(self, why: str = "") -> None:
+        """Ask the operator who holds the robot for it."""
+
+    def decide(self, is_given: bool) -> None:
+        """Answer the operator who asks for the robot; with a yes it is given back."""
 
     async def switch(self, robot: str) -> None:
         """Give the robot back and ask for this one."""
@@ -203,6 +223,10 @@ class ConsoleApp(App[None]):
         Binding("x", "stop_robot", "STOP ROBOT"),
         Binding("X", "stop_all", "STOP ALL"),
         Binding("c", "lift", "lift stop", show=False),
+        Binding("m", "ask_consent", "may I?", show=False),
+        Binding("M", "ask_consent_because", "may I, because", show=False),
+        Binding("g", "decide(True)", "let them have it", show=False),
+        Binding("n", "decide(False)", "keep it", show=False),
         Binding("j", "jump", "jump", show=False),
         Binding("plus,equals_sign", "faster(1)", "faster", show=False),
         Binding("minus", "faster(-1)", "slower", show=False),
@@ -312,6 +336,13 @@ class ConsoleApp(App[None]):
     def _hint(self, view: ConsoleView) -> str:
         if view.own.away_since_s >= 0:
             return "you are away: press any key"
+        consent = view.own.consent
+        if consent is not None:
+            keys = "enter: let go" if self.profile is Profile.PENDANT else "g: let go, n: keep"
+            others = f", {consent.others} more" if consent.others else ""
+            return f"{consent.user} asks for {consent.robot}: {consent.why} [{keys}; {consent.left_s:.0f} s{others}]"
+        if view.own.asked:
+            return view.own.asked
         unsure = [robot.robot for robot in view.robots if robot.stop is not None and not robot.stop.is_confirmed]
         return f"NOT SURE that {', '.join(unsure)} stopped" if unsure else ""
 
@@ -399,6 +430,23 @@ class ConsoleApp(App[None]):
             self._session.take()
         else:
             self._session.release()
+
+    def action_ask_consent(self) -> None:
+        """Ask the operator who holds what this one waits for."""
+        self._session.ask_consent()
+
+    def action_ask_consent_because(self) -> None:
+        """The same, with a sentence that says why."""
+
+        def typed(why: str | None) -> None:
+            if why is not None:
+                self._session.ask_consent(why)
+
+        self.push_screen(Question("may I have it, because", ""), typed)
+
+    def action_decide(self, is_given: bool) -> None:
+        """Let the operator who asks have the robot, or keep it."""
+        self._session.decide(is_given)
 
     def on_app_blur(self, _event: AppBlur) -> None:
         """Stop the wheels when the window is left: no key release would be heard there."""

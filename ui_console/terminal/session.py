@@ -180,6 +180,14 @@ class TerminalSession:
         """Give the robot back."""
         self._with_robot(Teleoperation.begin_release)
 
+    def ask_consent(self, why: str = "") -> None:
+        """Ask the operator who holds the robot for it."""
+        self._with_robot(lambda console: console.begin_ask_consent(why))
+
+    def decide(self, is_given: bool) -> None:
+        """Answer the operator who asks for the robot."""
+        self._with_robot(lambda console: console.decide(is_given))
+
     async def switch(self, robot: str) -> None:
         """Give the robot back and ask for this one."""
         if isinstance(self._console, Teleoperation) and self._console.is_ready:

@@ -31,12 +31,14 @@ from ui_console.web.protocol import (
     Acknowledge,
     AskParameters,
     AskWhy,
+    Decide,
     Drawn,
     Here,
     Intent,
     JumpOnce,
     LetGo,
     LiftStop,
+    MayI,
     SetParameter,
     Steer,
     StopAll,
@@ -117,6 +119,10 @@ class Operator:
                 self._acknowledge(key)
             case Here(is_there):
                 self._attend(is_there)
+            case MayI(why):
+                self._with_robot(lambda console: console.begin_ask_consent(why))
+            case Decide(is_given):
+                self._with_robot(lambda console: console.decide(is_given))
             case TakeOver() | LetGo() | StopRobot() | StopAll() | LiftStop() | AskWhy() | AskParameters():
                 self._begin(intent)
             case SetParameter():

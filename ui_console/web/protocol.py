@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from ui_console.consent import MAX_WHY
 from ui_console.web.door import Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
@@ -37,6 +38,18 @@ class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     """Claim a robot; empty: any free one with a camera."""
 
     robot: ShortText
+
+
+class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="may_i"):
+    """Ask the operator who holds what this one waits for."""
+
+    why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)] = ""
+
+
+class Decide(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="decide"):
+    """Answer the operator who asks; with a yes the robot is given back."""
+
+    is_given: bool
 
 
 class LetGo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
@@ -110,6 +123,8 @@ Intent = (
     | JumpOnce
     | TakeOver
     | LetGo
+    | MayI
+    | Decide
     | StopRobot
     | StopAll
     | LiftStop
