@@ -61,6 +61,7 @@ class FakeArc:
         self.refusal: Refusal | None = None
         self.released = ""
         self.is_idle = False
+        self.wishes: list[Message] = []
         self.rcs = {"scout": parameters["wish"].get("scout", "scout3"), "framegrabber": "grabber1"}
         bus.serve(self.address, ArcQuestion | Stop, self._answer)
         bus.declare_alive(self.address)
@@ -114,7 +115,8 @@ class FakeArc:
                 return ArcState(self.name, "fake", owner, self.rcs, self.granted, epochs, "slice", "other", -1.0)
             case Drive() | Halt() | Jump():
                 return self._command(asked.body)
-            case _:
+            case wish:
+                self.wishes.append(wish)
                 return Accepted()
 
     def _command(self, command: Message) -> Applied:

@@ -19,6 +19,7 @@ from mission_control.behaviors.skeleton import Skeleton
 from mission_control.behaviors.surveillance import Surveillance
 from mission_control.behaviors.watch_for_motion import WatchForMotion
 from mission_control.messages import BehaviorStatus, MotionSeen
+from resource_pool.messages import WantLonger, WantRuntime
 
 Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
 FRAME_S = 1 / 30
@@ -42,9 +43,10 @@ def placer_world(local_mission: Any) -> Run:
     return run
 
 
-def watcher(scout: str) -> dict[str, Any]:
-    arc = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": scout}}
-    return {"type": "watch", "name": f"watch-{scout}", "priority": 3, "arc": arc}
+def watcher(scout: str, maximum_runtime_s: float = 0.0, **parameters: Any) -> dict[str, Any]:
+    times = {"minimum_runtime_s": 5.0, "maximum_runtime_s": maximum_runtime_s}
+    arc = {"kind": "capture", **times, "wish": {"scout": scout}}
+    return {"type": "watch", "name": f"watch-{scout}", "priority": 3, "arc": arc, "parameters": parameters}
 
 
 def room() -> np.ndarray:
@@ -102,6 +104,64 @@ def test_motion_that_goes_on_is_told_once_a_second(placer_world: Run) -> None:
         times = [envelope.body.at_s for envelope in seen]
         assert len(times) >= 3
         assert all(later - earlier >= 1.0 for earlier, later in pairwise(times))
+
+    placer_world(scene)
+
+
+def test_a_glimpse_makes_the_slice_longer_until_it_is_certain(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        order = behavior_order(watcher("scout1", 8.0, frames_wanted=7), [("iros2001", 10)])
+        watch = await placer.launch(order)
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        await arc.grant()
+        began_s = placer.clock.now_s()
+        await show(placer, arc, 145, moving=False)
+        assert arc.wishes == []
+        await show(placer, arc, 20, moving=True)
+        longer = [wish.until_s for wish in arc.wishes if isinstance(wish, WantLonger)]
+        assert longer == sorted(set(longer))
+        assert 5.0 < longer[0] - began_s < longer[-1] - began_s + 1e-9 <= 6.5
+        assert watch.statistics()["events"] == 1
+        asked = len(arc.wishes)
+        await show(placer, arc, 20, moving=True)
+        assert len(arc.wishes) == asked  # it was told: no more is needed
+
+    placer_world(scene)
+
+
+def test_a_slice_that_cannot_be_longer_is_not_asked_to_be(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        await placer.launch(behavior_order(watcher("scout1", frames_wanted=7), [("iros2001", 10)]))
+        await placer.wait(lambda: placer.arcs)
+        [arc] = placer.arcs.values()
+        await arc.grant()
+        await show(placer, arc, 145, moving=False)
+        await show(placer, arc, 20, moving=True)
+        assert arc.wishes == []
+
+    placer_world(scene)
+
+
+def test_run_times_that_are_worked_out_are_drawn_for_each_slice_the_same_for_the_same_seed(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        asked: list[list[float]] = []
+        for scout, seed in (("scout1", 1), ("scout1", 1), ("scout1", 2)):
+            given = watcher(scout, view_s=2.65, frames_wanted=7, seed=seed)
+            watch = await placer.launch(behavior_order(given, [("iros2001", 10)]))
+            await placer.wait(lambda: placer.arcs)
+            [arc] = placer.arcs.values()
+            for _turn in range(4):
+                await arc.grant()
+                await arc.suspend()
+            times = [wish.minimum_runtime_s for wish in arc.wishes if isinstance(wish, WantRuntime)]
+            asked.append([arc.parameters["minimum_runtime_s"], *times])
+            watch.end("next")
+            await placer.wait(lambda: not placer.components)
+            placer.arcs.clear()
+        assert asked[0] == asked[1] != asked[2]
+        assert all(len(set(times)) == 5 for times in asked)
+        assert all(0.711 <= one_s <= 0.889 for times in asked for one_s in times)
 
     placer_world(scene)
 
