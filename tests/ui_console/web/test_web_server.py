@@ -25,7 +25,8 @@ from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import Holder, RcView, Schedule
+from backbone.rc_manager.messages import AskSchedule, Holder, RcView, RequestState, RequestView, Schedule
+from backbone.wire import Envelope, Message
 from resource_pool.messages import Drive, Halt
 from ui_console.web import reception
 from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Pass
@@ -140,6 +141,20 @@ class Stage:
         schedule = Schedule(now_s, rcs, [], [])
         self.rc_manager.publish(RC_MANAGER, Conversation.SCHEDULE, schedule)
 
+    def answer_who_holds(self) -> None:
+        """Have the RC manager know of every ARC; those that are granted hold their robot."""
+
+        async def answer(_asked: Envelope[Any]) -> Message:
+            now_s = self.clock.now_s()
+            held = [Holder(arc.name, arc.epoch, now_s, 0.0) for arc in self.placer.arcs.values() if arc.granted]
+            requests = [
+                RequestView(name, arc.parameters["owner"], RequestState.WAITING, [], 0.0, 0.0, 0.0, "", [], 5.0, "", 0)
+                for name, arc in self.placer.arcs.items()
+            ]
+            return Schedule(now_s, [RcView("scout1", "scout", "up", False, 1.0, held, 1, [], [])], requests, [])
+
+        self.rc_manager.serve(RC_MANAGER, AskSchedule, answer)
+
     def drives(self, robot: str = "scout1") -> list[tuple[float, Any]]:
         return [
             (at_s, command)
@@ -245,6 +260,37 @@ async def test_two_operators_claim_one_robot_each_with_the_priority_of_their_tok
         await stage.placer.wait(lambda: len(stage.placer.arcs) == 2)
         asked = {arc.name[:3]: arc.parameters["path"][0][1] for arc in stage.placer.arcs.values()}
         assert asked == {"ann": 70, "ben": 50}
+
+
+async def test_who_waits_asks_with_one_button_and_who_holds_answers_with_one(stage: Stage) -> None:
+    stage.answer_who_holds()
+    async with stage.browser(HIGH) as anna, stage.browser(ANYBODY, user="Carla") as carla:
+        await anna.say(do="take", robot="scout1")
+        await stage.placer.wait(lambda: stage.placer.arcs)
+        [held] = stage.placer.arcs.values()
+        await held.grant()
+        await anna.wait(lambda: anna.is_held, "held")
+        await carla.say(do="take", robot="scout1")
+        await stage.placer.wait(lambda: len(stage.placer.arcs) == 2)
+
+        await carla.say(do="may_i", why="mine is stuck")
+        await anna.wait(lambda: anna.view["own"]["consent"], "asked")
+        shown = anna.view["own"]["consent"]
+        assert (shown["user"], shown["robot"], shown["why"]) == ("Carla", "scout1", "mine is stuck")
+        await anna.say(do="decide", is_given=False)
+        await carla.wait(lambda: carla.view["own"]["asked"] == "anna keeps scout1", "declined")
+        assert anna.is_held
+
+        await carla.say(do="may_i")
+        await anna.wait(lambda: anna.view["own"]["consent"], "asked again")
+        await anna.say(do="decide", is_given=True)
+        await carla.wait(lambda: carla.view["own"]["asked"] == "anna lets you have scout1", "granted")
+        await anna.wait(lambda: not anna.is_held and not anna.view["own"]["consent"], "given back")
+        assert held.is_idle
+        told = [row.what for row in stage.hub.team.log() if row.subject == "scout1"]
+        for line in ("anna keeps it: asked by Carla", "anna lets it go: asked by Carla"):
+            assert told.count(line) == 1
+        assert told[-1] == "was given back by anna: Carla may have it"
 
 
 async def test_pictures_of_any_robot_that_somebody_holds_can_be_watched(stage: Stage) -> None:
