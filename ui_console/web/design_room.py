@@ -236,14 +236,13 @@ class DesignRoom:
         """Keep the draft beside the file whenever it has changed; until cancelled."""
         while True:
             await self._to_keep.wait()
-            self._to_keep.clear()
             async with self._turn:
+                self._to_keep.clear()
                 await self._keep(self.draft)
 
     async def keep_now(self) -> None:
-        """Keep the draft as it is, if it was changed since it was kept."""
-        if self._to_keep.is_set():
-            self._to_keep.clear()
+        """Return when the draft as it is was kept; one that nobody changed leaves nothing."""
+        if self.revision > 1:
             await self._keep(self.draft)
 
     async def _keep(self, draft: Draft) -> None:

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from ui_console.web.pictures import jpeg, packet
-from ui_console.web.site import FILES, Site, is_own_page
+from ui_console.web.site import DESIGN_FILES, FILES, Site, is_own_page
 
 
 def texts() -> dict[str, str]:
     folder = resources.files("ui_console.web").joinpath("page")
-    return {name: folder.joinpath(name).read_text() for name, _kind in FILES.values()}
+    return {name: folder.joinpath(name).read_text() for name, _kind in (*FILES.values(), *DESIGN_FILES.values())}
 
 
 def test_every_file_of_the_page_is_served_with_its_safety() -> None:
-    for path in FILES:
-        answer = Site().answer(path + "?x=1")
+    for files, path in [(page, path) for page in (FILES, DESIGN_FILES) for path in page]:
+        answer = Site(files).answer(path + "?x=1")
         assert answer.status == 200
         assert answer.body
         policy = answer.headers["Content-Security-Policy"]
@@ -45,7 +45,7 @@ def test_nothing_comes_from_elsewhere_and_nothing_is_inline() -> None:
     for name, text in texts().items():
         found = re.findall(r"https?://[^\"'\s)]+", text)
         assert set(found) <= {"http://www.w3.org/2000/svg"}, name
-    page = texts()["index.html"]
+    page = texts()["index.html"] + texts()["design.html"]
     assert not re.search(r"<script(?![^>]*\bsrc=)|\son\w+=|\sstyle=|<style", page)
     for name, text in texts().items():
         if name.endswith(".js"):
@@ -53,16 +53,18 @@ def test_nothing_comes_from_elsewhere_and_nothing_is_inline() -> None:
 
 
 def test_what_the_modules_look_for_is_on_the_page() -> None:
-    page, main = texts()["index.html"], texts()["main.js"]
-    ids = set(re.findall(r'id="([^"]+)"', page))
-    assert set(re.findall(r'find\("([^"]+)"\)', main)) <= ids
-    for name, text in texts().items():
-        for module in re.findall(r'from "\./([^"]+)"', text):
-            assert f"/{module}" in FILES, name
+    for html, files in (("index.html", FILES), ("design.html", DESIGN_FILES)):
+        ids = set(re.findall(r'id="([^"]+)"', texts()[html]))
+        scripts = [name for name, _kind in files.values() if name.endswith(".js")]
+        for name in scripts:
+            assert set(re.findall(r'find\("([^"]+)"\)', texts()[name])) <= ids, name
+            for module in re.findall(r'from "\./([^"]+)"', texts()[name]):
+                assert f"/{module}" in files, name
 
 
-def test_everything_a_person_presses_has_a_name() -> None:
-    page = texts()["index.html"]
+@pytest.mark.parametrize("html", ["index.html", "design.html"])
+def test_everything_a_person_presses_has_a_name(html: str) -> None:
+    page = texts()[html]
     assert '<html lang="en">' in page
     for attributes, label in re.findall(r"<button([^>]*)>([^<]*)</button>", page):
         assert label.strip() or "aria-label" in attributes

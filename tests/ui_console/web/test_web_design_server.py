@@ -1,0 +1,384 @@
+"""The designer's server on the loopback: designers share a draft, strangers and offenders change nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec import DecodeError
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from backbone.bus.clock import MissionClock
+from ui_console.design.catalogue import ClassFacts
+from ui_console.design.draft import Draft
+from ui_console.design.keeping import path_of_draft
+from ui_console.web.design_protocol import DesignIntent, Select, understand_designer
+from ui_console.web.design_room import DesignRoom
+from ui_console.web.design_server import DesignServer, begin
+from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Hello, Pass
+
+MISSION_XML = (Path(__file__).parents[3] / "mission.xml").read_bytes()
+ANNA, BEN = "token-of-anna", "token-of-ben"
+PASSES = {ANNA: Pass("anna", 100), BEN: Pass("ben", 50)}
+WITHIN_S = 15.0
+
+
+def read(file: Path) -> bytes:
+    return file.read_bytes()
+
+
+def write(file: Path, text: bytes) -> None:
+    file.write_bytes(text)
+
+
+def names(folder: Path) -> set[str]:
+    return {one.name for one in folder.iterdir()}
+
+
+class Page:
+    """What a page hears, without a page."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+        self.view: dict[str, Any] = {}
+        self.answers: list[dict[str, Any]] = []
+        self.news = asyncio.Event()
+
+    async def listen(self) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            async for message in self.socket:
+                said = json.loads(message)
+                self.view.update(said.get("view", {}))
+                self.answers += [said["answer"]] if "answer" in said else []
+                self.news.set()
+        self.news.set()
+
+    async def say(self, **message: Any) -> None:
+        await self.socket.send(json.dumps(message))
+
+    async def change(self, **message: Any) -> dict[str, Any] | None:
+        """Say a change of what is shown now; return the answer to it once it was handled, None if there was none."""
+        handled, heard = self.view.get("handled", 0), len(self.answers)
+        await self.say(revision=self.view["status"]["revision"], **message)
+        await self.wait(lambda: self.view.get("handled", 0) > handled, f"handled {message}")
+        return self.answers[heard] if len(self.answers) > heard else None
+
+    async def wait(self, holds: Callable[[], Any], what: str) -> None:
+        try:
+            async with asyncio.timeout(WITHIN_S):
+                while not holds():
+                    self.news.clear()
+                    await self.news.wait()
+        except TimeoutError:
+            pytest.fail(f"never: {what}; status: {self.view.get('status')}; answers: {self.answers}")
+
+    def has_element(self, words: str) -> bool:
+        return any(words in f"{row['tag']} {row['told']}" for row in self.view.get("tree", []))
+
+    def path(self, words: str) -> list[int]:
+        return next(row["path"] for row in self.view["tree"] if words in f"{row['tag']} {row['told']}")
+
+
+class Serving:
+    """A designer's server."""
+
+    def __init__(self, room: DesignRoom) -> None:
+        self.room, self.port = room, 0
+        self.end = asyncio.Event()
+        self.asked: list[str] = []
+
+    def connection(self, **options: Any) -> connect:
+        return connect(f"ws://127.0.0.1:{self.port}/socket", compression=None, proxy=None, **options)
+
+    @asynccontextmanager
+    async def page(self, token: str = ANNA) -> AsyncIterator[Page]:
+        async with self.connection() as socket:
+            page = Page(socket)
+            await page.say(do="hello", token=token)
+            listening = asyncio.create_task(page.listen())
+            try:
+                await page.wait(lambda: "status" in page.view and "element" in page.view, "welcome")
+                yield page
+            finally:
+                listening.cancel()
+                await asyncio.wait({listening})
+
+
+@asynccontextmanager
+async def serving(file: Path) -> AsyncIterator[Serving]:
+    draft, kept = begin(str(file))
+    asked: list[str] = []
+
+    async def look_up(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
+        asked.extend(class_paths)
+        return {path: ClassFacts(f"About {path}.") for path in class_paths}
+
+    made = Serving(DesignRoom(draft, kept, look_up, MissionClock.started_now()))
+    made.asked = asked
+    ready = asyncio.Event()
+
+    def listens(port: int) -> None:
+        made.port = port
+        ready.set()
+
+    server = DesignServer(made.room, Doorkeeper(PASSES))
+    life = asyncio.create_task(server.run("127.0.0.1", 0, listens, made.end))
+    await ready.wait()
+    try:
+        yield made
+    finally:
+        made.end.set()
+        await life
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    made = tmp_path / "guard.xml"
+    made.write_bytes(MISSION_XML)
+    return made
+
+
+# ---------------------------------------------------------------------- designing together
+async def test_two_designers_see_one_draft_and_each_has_a_cursor(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
+        await anna.wait(lambda: anna.view["people"] == ["anna", "ben"], "ben came")
+        await ben.say(do="select", path=ben.path("resource radio"), number=1)
+        await ben.wait(lambda: ben.view["element"]["tag"] == "resource", "ben's cursor")
+        assert await anna.change(do="set", path=[], name="priority", value="11") is None
+        await ben.wait(lambda: ben.has_element("mission iros2001 priority 11"), "anna's change")
+        assert ben.view["element"]["tag"] == "resource"
+        assert ben.view["status"]["changed_by"] == "anna"
+        await ben.change(do="undo")
+        await anna.wait(lambda: not anna.view["status"]["is_changed"], "ben took it back")
+
+
+async def test_a_change_meant_for_an_older_draft_is_refused_with_who_changed_it(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
+        revision = ben.view["status"]["revision"]
+        await anna.change(do="remove", path=anna.path("scout scout3"))
+        before = served.room.draft.text
+        await ben.say(do="remove", path=[0], revision=revision)
+        await ben.wait(lambda: ben.answers, "refused")
+        assert ben.answers[0]["refused"] == "the mission was changed by anna meanwhile"
+        assert served.room.draft.text == before
+
+
+async def test_questions_are_asked_and_answered(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        world = anna.path("world world")
+        asked = await anna.change(do="take", path=world, label="furniture")
+        assert asked is not None
+        names = [one["name"] for one in asked["ask"]["asks"]]
+        answers = ["shelf" if name == "name" else "0.5" for name in names]
+        assert await anna.change(do="take", path=asked["path"], label=asked["ask"]["label"], answers=answers) is None
+        assert anna.has_element("furniture shelf")
+        assert anna.view["element"]["told"].startswith("shelf")
+
+
+async def test_the_first_minute_is_told_while_it_is_looked_at_and_none_while_there_are_problems(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        await anna.say(do="rehearse", is_shown=True)
+        await anna.wait(lambda: anna.view.get("rehearsal"), "first minute")
+        await anna.change(do="remove", path=anna.path("resource video1"))
+        assert anna.view["status"]["problems"] > 0
+        await anna.wait(lambda: anna.view["rehearsal"] is None, "none")
+        await anna.change(do="undo")
+        await anna.wait(lambda: anna.view["rehearsal"], "again")
+        assert any(row["problems"] for row in anna.view["tree"]) is False
+
+
+async def test_saving_keeps_every_other_byte_and_says_how_it_is(file: Path) -> None:
+    before = read(file)
+    async with serving(file) as served, served.page() as anna:
+        await anna.change(do="set", path=[], name="priority", value="11")
+        answer = await anna.change(do="save")
+        assert answer == {"saved": str(file), "problems": 0}
+        assert not anna.view["status"]["is_changed"]
+    assert read(file) == before.replace(b'priority="10"', b'priority="11"', 1)
+    assert names(file.parent) == {"guard.xml"}
+
+
+async def test_saved_under_another_name_the_other_is_designed_and_the_first_is_as_it_was(file: Path) -> None:
+    before = read(file)
+    async with serving(file) as served, served.page() as anna:
+        await anna.change(do="set", path=[], name="priority", value="11")
+        refused = await anna.change(do="save", name="../night.xml")
+        assert refused is not None
+        assert "no name of a mission file" in refused["refused"]
+        await anna.change(do="save", name="night.xml")
+        assert anna.view["status"]["source"] == str(file.with_name("night.xml"))
+        await anna.change(do="set", path=[], name="priority", value="12")
+    assert read(file) == before
+    assert names(file.parent) == {"guard.xml", "night.xml", ".night.xml.draft"}
+
+
+async def test_what_somebody_else_wrote_is_kept_until_it_is_told_to_overwrite(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        await anna.change(do="set", path=[], name="priority", value="11")
+        theirs = read(file) + b"<!-- theirs -->\n"
+        write(file, theirs)
+        answer = await anna.change(do="save")
+        assert answer is not None
+        assert "holds something else" in answer["file_changed"]
+        assert read(file) == theirs
+        await anna.change(do="reread")
+        assert not anna.view["status"]["is_changed"]
+        write(file, b"<mission")
+        answer = await anna.change(do="reread")
+        assert answer is not None
+        assert "no well-formed XML" in answer["refused"]
+        await anna.change(do="save", overwrite=True)
+    assert read(file) == theirs
+
+
+async def test_an_unsaved_design_outlives_the_server_and_its_connections(file: Path) -> None:
+    async with serving(file) as served:
+        async with served.page() as anna:
+            await anna.change(do="set", path=[], name="priority", value="11")
+        async with served.page() as again:
+            assert again.view["status"]["is_changed"]
+            assert again.view["status"]["can_undo"]
+    assert path_of_draft(str(file)).exists()
+    assert read(file) == MISSION_XML
+    async with serving(file) as served, served.page() as anna:
+        assert anna.has_element("priority 11")
+        await anna.change(do="save")
+    assert not path_of_draft(str(file)).exists()
+
+
+async def test_a_new_mission_that_nobody_touched_leaves_nothing(tmp_path: Path) -> None:
+    async with serving(tmp_path / "guard.xml") as served, served.page() as anna:
+        assert anna.view["status"]["is_new"]
+    assert names(tmp_path) == set()
+
+
+async def test_a_draft_that_cannot_be_kept_is_told(tmp_path: Path) -> None:
+    folder = tmp_path / "missions"
+    folder.mkdir()
+    async with serving(folder / "guard.xml") as served, served.page() as anna:
+        folder.rmdir()
+        await anna.change(do="set", path=[], name="priority", value="11")
+        await anna.wait(lambda: any("No such file" in one.get("notice", "") for one in anna.answers), "notice")
+
+
+async def test_classes_are_looked_up_only_if_the_file_named_them_when_the_server_began(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        await anna.wait(lambda: all(row["is_known"] for row in anna.view["palette"] if row["type"]), "stock looked up")
+        section = anna.path("types")
+        answers = ["spy", "somebody.elses:Spy", "mission_control"]
+        assert await anna.change(do="take", path=section, label="type", answers=answers) is None
+        await anna.say(do="look_up", type="spy")
+        await anna.wait(lambda: anna.answers, "refused")
+        assert "runs its code" in anna.answers[0]["refused"]
+        assert "somebody.elses:Spy" not in served.asked
+        await anna.change(do="save")
+    async with serving(file) as served, served.page() as anna:
+        await anna.say(do="look_up", type="spy")
+        await anna.wait(lambda: any(row["type"] == "spy" and row["is_known"] for row in anna.view["palette"]), "known")
+
+
+async def test_the_text_is_shown_as_it_would_be_saved(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        await anna.say(do="text")
+        await anna.wait(lambda: anna.answers, "text")
+        assert anna.answers[0]["text"].encode() == read(file)
+
+
+# ---------------------------------------------------------------------- who is kept out
+@pytest.mark.parametrize(
+    ("first", "words"),
+    [
+        (b'{"do":"hello","token":"wrong"}', "showed a wrong token"),
+        (b'{"do":"undo","revision":1}', "before it showed a token"),
+        (b"x" * (MAX_MESSAGE_BYTES + 1), "more than 4096 bytes"),
+        (b"\x00\x01", "means nothing"),
+    ],
+)
+async def test_who_is_not_let_in_changes_nothing_and_the_designers_are_told(
+    file: Path, first: bytes, words: str
+) -> None:
+    async with serving(file) as served, served.page() as anna:
+        async with served.connection() as stranger:
+            await stranger.send(first)
+            with pytest.raises(ConnectionClosed):
+                async with asyncio.timeout(WITHIN_S):
+                    await stranger.recv()
+        await anna.wait(lambda: any(words in one.get("notice", "") for one in anna.answers), words)
+        assert not anna.view["status"]["is_changed"]
+
+
+async def test_a_page_of_another_site_may_not_connect(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna:
+        with pytest.raises(InvalidStatus, match="403"):
+            async with served.connection(origin="http://evil.example"):
+                pytest.fail("was let in")
+        await anna.wait(lambda: any("another site" in one.get("notice", "") for one in anna.answers), "told")
+
+
+async def test_a_designer_that_floods_makes_nobody_wait_and_is_cut_off_for_nonsense(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
+        with contextlib.suppress(ConnectionClosed):
+            for number in range(3_000):
+                await ben.say(do="select", path=[number % 5], number=number)
+                if number % 500 == 0:
+                    await anna.change(do="set", path=[], name="priority", value=str(11 + number))
+            for _ in range(10):
+                await ben.say(do="format", disk="/")
+        async with asyncio.timeout(WITHIN_S):
+            await ben.socket.wait_closed()
+        await anna.wait(lambda: any("ben at" in one.get("notice", "") for one in anna.answers), "told")
+        await anna.wait(lambda: anna.view["people"] == ["anna"], "alone")
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.binary(max_size=200)
+    | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(
+        lambda value: json.dumps({"do": "move", "revision": 1, "path": value, "parent": []}).encode()
+    )
+)
+def test_nonsense_is_never_understood_as_anything_else(data: bytes) -> None:
+    try:
+        said: Hello | DesignIntent = understand_designer(data)
+    except (DecodeError, UnicodeError, RecursionError):
+        return
+    assert all(isinstance(number, int) and number >= 0 for number in getattr(said, "path", ()))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"do": "select", "path": [-1]},
+        {"do": "select", "path": [0] * 33},
+        {"do": "select", "path": ["0"]},
+        {"do": "take", "revision": 1, "path": [], "label": "x" * 1025},
+        {"do": "take", "revision": 1, "path": [], "label": "x", "answers": [""] * 17},
+        {"do": "set", "revision": 1, "path": [], "name": "a", "value": "b", "more": 1},
+        {"do": "save", "revision": "1"},
+        {"do": "save", "revision": 1, "name": "x" * 129},
+        {"do": "undo"},
+    ],
+)
+def test_what_is_too_much_or_of_another_type_means_nothing(message: dict[str, Any]) -> None:
+    with pytest.raises(DecodeError):
+        understand_designer(json.dumps(message))
+
+
+def test_an_element_is_chosen_by_its_place() -> None:
+    assert understand_designer('{"do":"select","path":[2,0],"number":7}') == Select((2, 0), 7)
+
+
+def test_it_begins_with_what_was_not_saved_else_with_the_file_else_with_a_new_mission(tmp_path: Path) -> None:
+    file = tmp_path / "guard.xml"
+    assert begin(str(file))[0] == Draft.new(str(file))
+    write(file, MISSION_XML)
+    assert begin(str(file))[0].text == read(file)
