@@ -9,9 +9,10 @@ import pytest
 
 from mission_control.experiments.conditions import PUBLISHED, Condition
 from mission_control.experiments.intervals import wilson
-from mission_control.experiments.prediction import Bursts, predicted
+from mission_control.experiments.prediction import Bursts, departs_s, predicted
 
 FEW = 800
+FEWER = 300  # where rates are far apart
 
 
 @pytest.mark.parametrize("condition", [one for one in PUBLISHED if PUBLISHED[one].trials], ids=Condition.title)
@@ -29,6 +30,34 @@ def test_it_falls_with_load() -> None:
 
 def test_two_channels_without_noise_and_extra_robots_miss_nothing() -> None:
     assert predicted(Condition(channels=2, noise=0.0), FEW) == 1.0
+
+
+@pytest.mark.parametrize(("driven", "goals"), [(1.0, (0.95, 0.82, 0.75, 0.60)), (0.25, (0.95, 0.90, 0.85, 0.80))])
+def test_better_requests_detect_more_on_the_same_frequency(driven: float, goals: tuple[float, ...]) -> None:
+    for extra, goal in enumerate(goals):
+        better = predicted(Condition(extra=extra, driven=driven, policy="adaptive"), FEWER)
+        assert better >= goal
+        assert better > predicted(Condition(extra=extra), FEWER)
+
+
+@pytest.mark.parametrize("speed_m_s", [0.35, 0.42, 0.6, 0.75, 0.9])
+def test_better_requests_detect_more_at_every_speed(speed_m_s: float) -> None:
+    better, papers = (
+        predicted(Condition(extra=2, speed_m_s=speed_m_s, policy=policy), FEWER) for policy in ("adaptive", "paper")
+    )
+    assert better > papers + 0.1
+
+
+def test_a_target_departs_within_the_first_round_of_turns() -> None:
+    assert departs_s(Condition(extra=1), 0.0) == 0.0
+    assert departs_s(Condition(extra=1), 1.0) == pytest.approx(3 * 5.3)
+
+
+def test_a_target_departs_within_a_round_of_equal_time_once_drawn_times_have_come_apart() -> None:
+    condition = Condition(extra=1, policy="adaptive")
+    round_s = 2 * 2.0 / 0.8 * 1.1 + 2.3
+    assert departs_s(condition, 0.0) == pytest.approx(round_s / 2, rel=0.01)
+    assert departs_s(condition, 1.0) == pytest.approx(1.5 * round_s, rel=0.01)
 
 
 def test_noise_costs_detections() -> None:
