@@ -357,7 +357,11 @@ async def test_without_a_pointer_keys_alone_add_move_raise_rename_and_remove(tmp
             await page.wait_for_selector(".element.tag-behavior[aria-level='4']")
             await press_keys("<")
             await page.wait_for_selector(".element.tag-behavior[aria-level='4']", state="detached")
-            await press_keys("Shift+ArrowUp")
+            await press_keys("m", "ArrowUp", "Enter")
+            await page.wait_for_selector(".element.tag-behavior[aria-level='4']")
+            await press_keys("u")
+            await page.wait_for_selector(".element.tag-behavior[aria-level='4']", state="detached")
+            await press_keys("ArrowDown", "Shift+ArrowUp")
             await page.wait_for_function(
                 "() => document.querySelector('.element.tag-behavior').textContent.includes('hide')"
             )

@@ -15,7 +15,7 @@ const view = {};
 
 const link = new Link({ heard, saw: () => {}, changed, silentMs: SILENT_MS });
 const login = new Login({ form: find("login"), enter: (hello) => link.open(hello) });
-const tree = new Tree({ root: find("tree"), choose: (path) => { if (!put(path)) link.say({ do: "select", path, number: ++selects }); }, key: treeKey });
+const tree = new Tree({ root: find("tree"), choose: (path, isTouched) => { if (!isTouched || !put(path)) link.say({ do: "select", path, number: ++selects }); }, key: treeKey });
 const palette = new Palette({
   root: find("palette"), filter: find("find-part"), read,
   add: (label) => take(tree.at, label),
@@ -231,7 +231,7 @@ function carry(path) {
   const row = path === null || path.length === 0 ? null : tree.row(path);
   carried = row === null || row === undefined ? null : { path, tag: row.tag, revision: view.status.revision };
   find("carrying").hidden = carried === null;
-  find("carrying").textContent = carried ? `Choose what ${row.tag} ${row.told} goes into, or press Move to… again.` : "";
+  find("carrying").textContent = carried ? `Choose what ${row.tag} ${row.told} goes into, then touch it or press enter.` : "";
   document.querySelector("[data-act=carry]").setAttribute("aria-pressed", String(carried !== null));
 }
 
@@ -261,6 +261,7 @@ function treeKey(event) {
   }[event.key] ?? (event.shiftKey ? { ArrowUp: "up", ArrowDown: "down" }[event.key] : undefined);
   if (act) acts[act]();
   else if (event.key === "Escape" && carried) carry(null);
+  else if (event.key === "Enter" && carried) put(tree.at);
   else if (event.key === "Enter") { show("details"); find("properties").querySelector("input, select")?.focus(); }
   else return false;
   return true;

@@ -6,7 +6,7 @@ export const keyOf = (path) => path.join("/");
 export const pathOf = (key) => (key ? key.split("/").map(Number) : []);
 export const isWithin = (path, above) => above.every((number, depth) => path[depth] === number) && path.length >= above.length;
 
-/** Shows `rows` ({path, tag, told, problems}); `choose(path)` is called when another one is chosen by hand. */
+/** Shows `rows` ({path, tag, told, problems}); `choose(path, isTouched)` is called when one is chosen by hand, or by a key. */
 export class Tree {
   constructor({ root, choose, key }) {
     Object.assign(this, { root, choose, key });
@@ -19,7 +19,7 @@ export class Tree {
       const row = event.target.closest(".element");
       if (!row) return;
       if (event.target.closest(".fold")) this.fold(pathOf(row.dataset.key));
-      this.pick(pathOf(row.dataset.key));
+      this.pick(pathOf(row.dataset.key), true);
     });
     root.addEventListener("keydown", (event) => this.pressed(event));
   }
@@ -61,12 +61,12 @@ export class Tree {
     if (isOther) this.node(path)?.scrollIntoView({ block: "nearest" });
   }
 
-  pick(path) {
+  pick(path, isTouched = false) {
     this.at = path;
     this.draw();
     this.node(path)?.focus({ preventScroll: true });
     this.node(path)?.scrollIntoView({ block: "nearest" });
-    this.choose(path);
+    this.choose(path, isTouched);
   }
 
   draw() {
