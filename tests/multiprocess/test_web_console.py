@@ -427,6 +427,28 @@ Object.defineProperty(navigator, "getGamepads", { value: () => [pad()] });
 """
 
 
+async def test_by_one_touch_a_page_asks_an_equal_for_the_robot_and_lets_an_equal_have_it(served: Served) -> None:
+    async with program(served, "erna") as erna, page_at("phone", served.port, served.token) as page:
+        await erna.say(do="take", robot="scout1")
+        await erna.wait(lambda: erna.is_held, "erna holds it")
+        await page.locator(".robot[data-robot=scout1]").get_by_role("button", name="Take over").tap()
+        await page.locator("#may-i:enabled").tap()
+        await erna.wait(lambda: erna.view["own"]["consent"], "erna is asked")
+        assert erna.view["own"]["consent"]["user"] == "phone"
+        await erna.say(do="decide", is_given=True)
+        await page.wait_for_selector("body[data-held=scout1]")
+
+        await erna.say(do="take", robot="scout1")
+        await erna.wait(lambda: erna.view["own"]["is_asked"], "erna waits")
+        await erna.say(do="may_i", why="mine is stuck")
+        await page.wait_for_selector("#consent-line:has-text('erna asks for scout1: mine is stuck')")
+        await assert_no_sideways_scroll(page)
+        await page.locator("#consent-yes").tap()
+        await erna.wait(lambda: erna.is_held, "erna has it")
+        await page.locator("#consent").wait_for(state="hidden")
+        await erna.say(do="release")
+
+
 async def test_a_gamepad_drives_only_while_its_shoulder_button_is_held(served: Served) -> None:
     async with served.mission.bus() as bus, page_at("desktop", served.port, served.token, script=GAMEPAD) as page:
         await take(page)
