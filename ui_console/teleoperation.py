@@ -196,10 +196,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """
         self._next_robot = robot
         async with self._switching:
-            if robot != self._next_robot or (robot == self.parameters.robot and self._keeping is not None):
+            if robot != self._next_robot:
                 return
-            self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
-            await self.give_back(f"{self.user} takes {robot}", for_good=True)
+            if robot != self.parameters.robot:
+                self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+                await self.give_back(f"{self.user} takes {robot}", for_good=True)
             self.take()
 
     def touch(self) -> None:

@@ -209,6 +209,11 @@ async def test_who_takes_a_robot_drives_it_and_who_lets_go_stops_it(stage: Stage
         await anna.wait(lambda: not anna.view["own"]["is_asked"], "given back")
         [arc] = stage.placer.arcs.values()
         assert (arc.is_idle, arc.granted) == (True, False), "it holds nothing and is there at once"
+        await anna.say(do="take", robot="scout1")
+        await stage.placer.wait(lambda: not arc.is_idle)
+        await arc.grant()
+        await anna.wait(lambda: anna.is_held, "held again")
+        assert stage.placer.started == [arc.name]
 
 
 async def test_when_nothing_is_heard_for_a_moment_the_wheels_stop_by_the_servers_clock(stage: Stage) -> None:
