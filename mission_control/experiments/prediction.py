@@ -36,7 +36,7 @@ from mission_control.vision.motion_detection import FAST_FRAMES, VOTERS, VOTES
 
 SAMPLES = 2000  # chosen: a standard error of 1 %, a third of that of 200 trials
 BAD_SHARE, BAD_BURST_S = 0.25, 0.15  # SCHEDULING.md, section 6, at noise 1
-LEAST_M = 0.05  # measured: 0.01 to 0.08 m of a target are in view when its region becomes, or ceases to be, large enough
+LEAST_M = 0.05  # measured: a region becomes, or ceases to be, large enough with 0.01 to 0.08 m of a target in view
 DRIVE_S = 5.0  # of the consoles' parameters
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: by less than that nobody is ahead of anybody
 
