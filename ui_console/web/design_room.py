@@ -21,6 +21,7 @@ from ui_console.design.catalogue import ClassFacts, entries, stock_classes
 from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
 from ui_console.design.file import FileChanged, save
+from ui_console.design.following import follower
 from ui_console.design.keeping import DraftFile, DraftNotKept
 from ui_console.design.views import RehearsalView, element_view, rehearsal_view
 from ui_console.web.design_protocol import (
@@ -182,8 +183,7 @@ class DesignRoom:
         after = await asyncio.to_thread(changed, before, change)
         if after is before:
             return
-        guest.at = touched_by(change, before, after)
-        await self._show(after, guest.welcome.user)
+        await self._show(after, guest.welcome.user, (guest, touched_by(change, before, after)))
 
     async def _save(self, guest: Designer, intent: SaveFile) -> None:
         self._must_be(intent.revision)
@@ -266,16 +266,23 @@ class DesignRoom:
             self._tell(guest)
 
     # ------------------------------------------------------------------ what pages are told
-    async def _show(self, draft: Draft, user: str) -> None:
-        """Have all pages show this draft from now on."""
+    async def _show(self, draft: Draft, user: str, chosen: tuple[Designer, Path] | None = None) -> None:
+        """Have all pages show this draft from now on, each with its cursor on what it was on.
+
+        Args:
+            draft: The draft.
+            user: Who changed it.
+            chosen: Whose cursor goes elsewhere, and where.
+        """
         told = await asyncio.to_thread(sections, draft, self._facts)
+        follow = await asyncio.to_thread(follower, self.draft, draft)
         self._to_keep.set()
         if draft is not self.draft:
             self.revision += 1
             self._changed_by = user
         self.draft, self._told = draft, told
         for guest in self.guests:
-            guest.at = draft.mission.nearest(guest.at)
+            guest.at = chosen[1] if chosen is not None and guest is chosen[0] else follow(guest.at)
             self._tell(guest)
         await self._rehearse()
 

@@ -161,6 +161,16 @@ async def test_two_designers_see_one_draft_and_each_has_a_cursor(file: Path) -> 
         await anna.wait(lambda: not anna.view["status"]["is_changed"], "ben took it back")
 
 
+async def test_a_cursor_stays_on_its_element_when_somebody_else_removes_one_before_it(file: Path) -> None:
+    async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
+        await ben.say(do="select", path=ben.path("resource scout2"), number=1)
+        await ben.wait(lambda: ben.view["element"]["told"] == "scout2 scout", "ben's cursor")
+        await anna.change(do="remove", path=anna.path("resource radio"))
+        await ben.wait(lambda: not ben.has_element("resource radio"), "anna's change")
+        assert ben.view["element"]["told"] == "scout2 scout"
+        assert ben.view["element"]["path"] == ben.path("resource scout2")
+
+
 async def test_a_change_meant_for_an_older_draft_is_refused_with_who_changed_it(file: Path) -> None:
     async with serving(file) as served, served.page() as anna, served.page(BEN) as ben:
         revision = ben.view["status"]["revision"]

@@ -6,11 +6,16 @@ export const keyOf = (path) => path.join("/");
 export const pathOf = (key) => (key ? key.split("/").map(Number) : []);
 export const isWithin = (path, above) => above.every((number, depth) => path[depth] === number) && path.length >= above.length;
 
+/** What is folded stays so wherever it is moved. */
+const nameOf = (row) => `${row.path.length} ${row.tag} ${row.told}`;
+
 /** Shows `rows` ({path, tag, told, problems}); `choose(path, isTouched)` is called when one is chosen by hand, or by a key. */
 export class Tree {
   constructor({ root, choose, key }) {
     Object.assign(this, { root, choose, key });
     this.rows = [];
+    this.byKey = new Map();
+    this.inside = new Map();
     this.at = [];
     this.unfolded = new Set();
     this.folded = new Set();
@@ -24,15 +29,14 @@ export class Tree {
     root.addEventListener("keydown", (event) => this.pressed(event));
   }
 
-  row(path) { return this.rows.find((one) => keyOf(one.path) === keyOf(path)); }
-  parts(path) { return this.rows.filter((one) => one.path.length === path.length + 1 && isWithin(one.path, path)); }
+  row(path) { return this.byKey.get(keyOf(path)); }
+  parts(path) { return this.inside.get(keyOf(path)) ?? []; }
   node(path) { return this.root.querySelector(`[data-key="${keyOf(path)}"]`); }
 
   isFolded(row) {
-    if (!this.rows.some((one) => one.path.length > row.path.length && isWithin(one.path, row.path))) return false;
-    const name = `${keyOf(row.path)} ${row.tag}`;
+    if (this.parts(row.path).length === 0) return false;
     if (row.path.length === 1 && FOLDED_AT_FIRST.includes(row.tag)) return !this.unfolded.has(row.tag);
-    return this.folded.has(name);
+    return this.folded.has(nameOf(row));
   }
 
   fold(path, isFolded = null) {
@@ -40,12 +44,20 @@ export class Tree {
     if (!row || path.length === 0) return;
     const folds = isFolded ?? !this.isFolded(row);
     if (row.path.length === 1 && FOLDED_AT_FIRST.includes(row.tag)) this.unfolded[folds ? "delete" : "add"](row.tag);
-    else this.folded[folds ? "add" : "delete"](`${keyOf(path)} ${row.tag}`);
+    else this.folded[folds ? "add" : "delete"](nameOf(row));
     this.draw();
   }
 
   show(rows) {
     this.rows = rows;
+    this.byKey = new Map(rows.map((row) => [keyOf(row.path), row]));
+    this.inside = new Map();
+    for (const row of rows) {
+      if (row.path.length === 0) continue;
+      const above = keyOf(row.path.slice(0, -1));
+      if (this.inside.has(above)) this.inside.get(above).push(row);
+      else this.inside.set(above, [row]);
+    }
     this.draw();
   }
 
@@ -71,11 +83,12 @@ export class Tree {
 
   draw() {
     const hasFocus = this.root.contains(document.activeElement);
-    const hidden = [], shown = [];
-    for (const row of this.rows) {
-      if (hidden.some((path) => isWithin(row.path, path))) continue;
+    const shown = [];
+    let folded = null;
+    for (const row of this.rows) { // in the order of the text, so what is in a folded one follows it
+      if (folded !== null && isWithin(row.path, folded)) continue;
       shown.push(row);
-      if (this.isFolded(row)) hidden.push(row.path);
+      folded = this.isFolded(row) ? row.path : null;
     }
     const made = shown.map((row) => this.made(row));
     this.root.replaceChildren(...made);
