@@ -60,7 +60,7 @@ class FakeArc:
         self.commands: list[tuple[float, int, Message]] = []
         self.refusal: Refusal | None = None
         self.released = ""
-        self.is_idle = False
+        self.is_idle = self.stays = False  # stays: holds on to its RCs although it is told to rest
         self.wishes: list[Message] = []
         self.rcs = {"scout": parameters["wish"].get("scout", "scout3"), "framegrabber": "grabber1"}
         bus.serve(self.address, ArcQuestion | Stop, self._answer)
@@ -104,7 +104,7 @@ class FakeArc:
                 return Accepted()
             case WantIdle(idle=idle):
                 self.is_idle = idle
-                if idle and self.granted:
+                if idle and self.granted and not self.stays:
                     self.bus.start(self.suspend("self", "", deadline_s=0.0))
                 return Accepted()
             case Stop():

@@ -185,6 +185,24 @@ def test_an_arc_that_rested_and_is_gone_is_started_anew(placer_world: Any, besid
     placer_world(scene)
 
 
+def test_an_arc_that_does_not_confirm_that_it_rests_is_ended(placer_world: Any, beside: Any) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        events: list[ConsoleEvent] = []
+        placer.on_arc = grant_at_once
+        async with beside(console(placer, events.append, keeps_arc=True)) as driven:
+            await placer.wait(lambda: driven.is_held)
+            [arc] = placer.arcs.values()
+            arc.stays = True
+            await driven.give_back()
+            assert events[-1] == GivenBack(placer.clock.now_s(), "released", True)
+            assert (arc.released, placer.ended) == ("released", [arc.name])
+            driven.take()
+            await placer.wait(lambda: driven.is_held)
+            assert placer.started == [arc.name, arc.name]
+
+    placer_world(scene)
+
+
 def test_an_arc_that_rested_is_ended_when_something_else_is_asked_for(placer_world: Any, beside: Any) -> None:
     async def scene(placer: FakePlacer) -> None:
         placer.on_arc = grant_at_once
