@@ -239,6 +239,7 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
         for one in found
     ]
     known = facts.get(class_of(mission, node)) if node.text("type") else None
+    docs = {_label(one): facts[one.class_path].doc for one in entries(mission) if one.class_path in facts}
     return ElementView(
         path,
         node.tag,
@@ -247,14 +248,19 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
         "" if rule is None else rule.documentation,
         () if known is None else tuple(known.doc.splitlines()),
         tuple(told),
-        tuple(offer_view(offer) for offer in offers(mission, path)),
+        tuple(offer_view(offer, docs.get(offer.label, "")) for offer in offers(mission, path)),
     )
 
 
-def offer_view(offer: Offer) -> OfferView:
-    """Return an offer without the way it is taken."""
+def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
+    """Return an offer without the way it is taken.
+
+    Args:
+        offer: The offer.
+        class_doc: What the class of its type says of itself, of which the first line is told; empty: not known.
+    """
     asks = tuple(AskedView(one.name, one.doc, one.proposed, one.choices) for one in offer.asks)
-    return OfferView(offer.label, offer.doc, asks)
+    return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, asks)
 
 
 def rehearsal_view(dry: DryRun) -> RehearsalView:
@@ -269,7 +275,7 @@ def rehearsal_view(dry: DryRun) -> RehearsalView:
         for rc in seen.utilization()
     ]
     told = [
-        f"{one.arc}: {one.turns} turns, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
+        f"{one.arc}: {_turns(one.turns)}, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
         for one in dry.claimed
         if not one.never_runs
     ]
@@ -283,16 +289,28 @@ def rehearsal_view(dry: DryRun) -> RehearsalView:
 
 
 def _type_row(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> PaletteRow:
-    tag = "arc" if entry.role is Role.ARC else str(entry.role)
     return PaletteRow(
-        f"{tag} {entry.name}",
+        _label(entry),
         GROUPS[entry.role],
         entry.name,
-        tag,
+        _tag(entry),
         entry.name,
         is_known=entry.class_path in facts,
         doc=tuple(description(entry, facts)),
     )
+
+
+def _tag(entry: TypeEntry) -> str:
+    return "arc" if entry.role is Role.ARC else str(entry.role)
+
+
+def _label(entry: TypeEntry) -> str:
+    """Return the label of the offer of something of this type."""
+    return f"{_tag(entry)} {entry.name}"
+
+
+def _turns(count: int) -> str:
+    return "1 turn" if count == 1 else f"{count} turns"
 
 
 def _turn(run: Run, who: str) -> TurnView:

@@ -193,8 +193,8 @@ class Finger(Hands):
         await self.page.wait_for_selector(".ghost")
         for _ in range(3):  # the tree scrolls while the finger is near its edge
             end = await target.bounding_box()
-            await send("touchMove", [{"x": x + 60, "y": end["y"] + end["height"] / 2}])
-        await self.page.wait_for_selector(".drop-into")
+            await send("touchMove", [{"x": end["x"] + 120, "y": end["y"] + end["height"] / 2}])
+        await self.page.wait_for_selector(".drop-into")  # what is under it, or what will hold it
         await send("touchEnd", [])
 
 
@@ -324,7 +324,7 @@ async def test_with_a_finger_on_a_phone_the_same_is_built(tmp_path: Path) -> Non
     assert checked(file) == tutorial_draft().text
 
 
-async def test_without_a_pointer_keys_alone_add_move_raise_rename_and_remove(tmp_path: Path) -> None:
+async def test_on_a_tablet_a_finger_drags_parts_and_keys_alone_add_move_raise_and_remove(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     with served(file) as address:
         async with page_at("tablet", address) as page:
@@ -343,6 +343,10 @@ async def test_without_a_pointer_keys_alone_add_move_raise_rename_and_remove(tmp
                 await page.keyboard.press("Enter")
                 await page.wait_for_selector("#ask", state="hidden")
 
+            await Finger(page).drag(hands.part("behavior patrol"), hands.row("hosts"))
+            await hands.see("behavior patrol patrol priority 1")
+            await page.locator("#undo").tap()
+            await hands.row("behaviors").wait_for(state="detached")
             await page.locator(".element").first.focus()
             await pick("behavior patrol")
             await hands.see("behavior patrol patrol priority 1")
@@ -391,6 +395,10 @@ async def test_what_somebody_else_wrote_meanwhile_is_overwritten_only_when_told_
             await page.locator("#choose").get_by_role("button", name="Take what the file holds").click()
             await hands.is_state("saved, fine")
             assert file.read_bytes() == theirs
+            await page.locator("#undo").click()
+            await hands.is_state("changed, fine")
+            await page.locator("#revert").click()
+            await hands.is_state("saved, fine")
             await page.locator("#undo").click()
             await hands.is_state("changed, fine")
             file.write_bytes(theirs + b"<!-- again -->\n")

@@ -153,7 +153,9 @@ def test_all_about_an_element_says_what_its_class_says() -> None:
     view = element_view(draft, element(draft, "behavior", "watch-scout1").path, FACTS)
     assert view.type_doc == ("Looks for motion.",)
     assert {one.name for one in view.properties if one.is_parameter} == {"view_s"}
-    assert "behavior patrol" in {one.label for one in view.offers}
+    told = {one.label: one.doc for one in view.offers}
+    assert told["behavior watch_for_motion"] == "Looks for motion."
+    assert told["behavior patrol"] == "mission_control.behaviors.patrol:Patrol"
     row = next(row for row in palette(draft.mission, FACTS) if row.label == "behavior watch_for_motion")
     assert row.is_known
     assert f"watch_for_motion: behavior, {WATCH}" in row.doc

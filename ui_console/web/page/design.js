@@ -108,6 +108,7 @@ function showStatus(status) {
   document.title = `${status.is_changed ? "● " : ""}${name} – Mission design`;
   find("undo").disabled = !status.can_undo;
   find("redo").disabled = !status.can_redo;
+  find("revert").disabled = !status.is_changed || status.is_new;
   find("save").disabled = !status.is_changed;
 }
 
@@ -123,7 +124,7 @@ async function answered(answer) {
   else if (answer.file_changed) {
     const option = await choose(answer.file_changed, [
       { label: "Overwrite it", doc: "What somebody else wrote there is gone.", act: () => change(() => ({ do: "save", name: answer.name, overwrite: true })) },
-      ...(answer.name ? [] : [{ label: "Take what the file holds", doc: "Your changes can be had again by Undo.", act: () => change(() => ({ do: "reread" })) }]),
+      ...(answer.name ? [] : [{ label: "Take what the file holds", doc: "Your changes can be had again by Undo.", act: acts.revert }]),
       { label: "Save under another name", doc: "Both are kept.", act: saveAs },
     ]);
     option?.act();
@@ -206,6 +207,7 @@ const acts = {
   remove: () => atChosen((path) => ({ do: "remove", path })),
   undo: () => change(() => ({ do: "undo" })),
   redo: () => change(() => ({ do: "redo" })),
+  revert: () => change(() => ({ do: "reread" })),
   save: () => change(() => ({ do: "save" })),
 };
 
@@ -279,7 +281,7 @@ addEventListener("keydown", (event) => {
 });
 
 for (const button of document.querySelectorAll("#actions button")) button.addEventListener("click", () => acts[button.dataset.act]());
-for (const name of ["undo", "redo", "save"]) find(name).addEventListener("click", acts[name]);
+for (const name of ["undo", "redo", "revert", "save"]) find(name).addEventListener("click", acts[name]);
 find("save-as").addEventListener("click", saveAs);
 find("text").addEventListener("click", () => link.say({ do: "text" }));
 
