@@ -26,6 +26,7 @@ from ui_console.design.dialogs import CSS as DIALOG_CSS
 from ui_console.design.dialogs import Ask, Picker, Reading, Sure
 from ui_console.design.draft import Draft
 from ui_console.design.file import FileChanged, save
+from ui_console.design.following import follower
 from ui_console.design.lines import key_of, path_of, problem_rows, property_rows, rehearsal_rows, tree_rows
 from ui_console.design.offers import Asked, Offer, offers
 from ui_console.design.properties import Property, properties
@@ -323,21 +324,24 @@ class DesignApp(App[None]):
 
     def action_undo(self) -> None:
         """Take the last command back."""
-        undone = self.draft.step.touched
-        self._step(self.draft.undo, undone)
+        undone = self.draft
+        if self._step(self.draft.undo):
+            self.go_to(follower(undone, self.draft)(undone.mission.nearest(undone.step.touched)))
+            self.redraw()
 
     def action_redo(self) -> None:
         """Do again what was taken back."""
         self._step(self.draft.redo)
 
-    def _step(self, step: Callable[[], Draft], path: Path | None = None) -> None:
+    def _step(self, step: Callable[[], Draft]) -> bool:
         try:
             self.draft = step()
         except Refusal as refusal:
             self.notify(refusal.detail, severity="warning", markup=False)
-            return
-        self.go_to(self.draft.mission.nearest(self.draft.step.touched if path is None else path))
+            return False
+        self.go_to(self.draft.mission.nearest(self.draft.step.touched))
         self.redraw()
+        return True
 
     # ------------------------------------------------------------------ reading
     def action_rehearse(self) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ui_console.design.draft import Draft
+from ui_console.design.file import NotSaved
 from ui_console.design.keeping import DraftFile
 from ui_console.web.design_protocol import DesignIntent, understand_designer
 from ui_console.web.design_room import Designer, DesignRoom
@@ -19,9 +20,13 @@ def begin(source: str) -> tuple[Draft, DraftFile]:
     """Return the draft of a mission file: what was not saved last time, else what the file holds, else a new mission.
 
     Raises:
+        NotSaved: There is no folder to save it in.
         DraftUnreadable: What was kept is no draft.
         MissionInvalid: The file cannot be read, or not even as XML.
     """
+    folder = Path(source).parent
+    if not folder.is_dir():
+        raise NotSaved(f"{folder} is no folder", remedy="Make it first.")
     kept = DraftFile(source)
     draft = kept.resume()
     if draft is None:

@@ -16,6 +16,7 @@ from backbone.mission.edit import Path
 from ui_console.design.catalogue import ClassFacts
 from ui_console.design.commands import DesignRefused, Move, Remove
 from ui_console.design.draft import Draft
+from ui_console.design.following import follower
 from ui_console.design.offers import Offer, offer_at
 from ui_console.design.properties import Property, properties
 from ui_console.design.views import offer_view, palette, places, problems_view, tree_view
@@ -83,8 +84,10 @@ def changed(draft: Draft, change: Change) -> Draft:
 
 def touched_by(change: Change, before: Draft, after: Draft) -> Path:
     """Return the element that a change was about, as it stands afterwards; of a parameter the one that has it."""
-    path = before.step.touched if isinstance(change, Undo) else after.step.touched
-    path = after.mission.nearest(path)
+    if isinstance(change, Undo):
+        path = follower(before, after)(before.mission.nearest(before.step.touched))
+    else:
+        path = after.mission.nearest(after.step.touched)
     return path[:-1] if after.mission.at(path).tag == "parameter" else path
 
 

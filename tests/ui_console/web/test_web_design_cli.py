@@ -37,6 +37,12 @@ def test_a_draft_that_cannot_be_read_is_refused_and_left_alone(tmp_path: Path) -
     assert kept.read_text() == "{}"
 
 
+def test_a_folder_that_is_not_there_is_refused_before_anything_is_built(tmp_path: Path) -> None:
+    code, told = serve(tmp_path / "no" / "mission.xml")
+    assert code == 5
+    assert "is no folder" in told
+
+
 @pytest.mark.parametrize("more", [["--mission", "iros2001"], ["--connect", "tcp/127.0.0.1:1"]])
 def test_a_mission_that_is_up_is_not_designed(tmp_path: Path, more: list[str]) -> None:
     code, told = serve(tmp_path / "mission.xml", *more)
