@@ -303,6 +303,7 @@ async def test_with_a_mouse_the_mission_of_the_tutorial_is_built_by_dragging(tmp
     assert checked(file) == tutorial_draft().text
 
 
+@pytest.mark.slow
 async def test_with_a_finger_on_a_phone_the_same_is_built(tmp_path: Path) -> None:
     file = tmp_path / "guard.xml"
     with served(file) as address:
