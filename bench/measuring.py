@@ -11,7 +11,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import psutil
+
 END_WITHIN_S = 5.0  # chosen: a helper whose input is closed ends in milliseconds
+_STOLEN_BEFORE_S: float = psutil.cpu_times().steal if psutil.LINUX else 0.0
 
 
 def percentile(values: Sequence[float], share: float) -> float:
@@ -35,8 +38,13 @@ def summary(values_s: Sequence[float]) -> dict[str, float]:
 
 
 def report(claim: str, **measured: Any) -> None:
-    """Print one JSON line: the claim, what was measured, and how busy the machine was."""
-    machine = {"cpus": os.cpu_count(), "load": round(os.getloadavg()[0], 2)}
+    """Print one JSON line: the claim, what was measured, and how busy the machine was.
+
+    ``stolen_s`` is the time, since the program began, in which a processor had work and another machine ran on it.
+    A number that is far from its usual one means little where that is not nearly 0.
+    """
+    stolen_s = psutil.cpu_times().steal - _STOLEN_BEFORE_S if psutil.LINUX else 0.0
+    machine = {"cpus": os.cpu_count(), "load": round(os.getloadavg()[0], 2), "stolen_s": round(stolen_s, 2)}
     print(json.dumps({"bench": claim, **measured, **machine}))
 
 

@@ -2,14 +2,14 @@
 
 Claims an ARC as a behavior does, with a priority of its own beside the mission's, and gives it back
 on request, at its end, or by its death, which the ARC sees. Faces (terminal, script) hear events
-through ``show`` and pictures through ``see``, and call the verbs.
+through ``show`` and pictures through ``see``, and call the verbs. What the hands want goes through
+``controls``, what operators say to each other about the robot through ``consent_talk``.
 """
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import time
 import types
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, ClassVar
@@ -19,14 +19,12 @@ import msgspec
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState
-from backbone.errors import LinkError, NoResponder, Refusal, code_of
-from backbone.naming import Subsystem, component_of
+from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, AskWhy, Schedule, Why
+from backbone.rc_manager.messages import AskWhy, Why
 from backbone.wire import Envelope, Message, UnknownMessage
 from resource_pool.arc_client import (
-    Applied,
     ArcClient,
     ArcNotice,
     Frame,
@@ -38,34 +36,21 @@ from resource_pool.arc_client import (
     arc_name,
     claim_parameters,
 )
-from ui_console.consent import (
-    CONSENT_WITHIN_S,
-    MAX_WHY,
-    AskConsent,
-    Consent,
-    ConsentDesk,
-    NobodyToAsk,
-    NotAnOperator,
-    Settled,
-)
+from ui_console.consent import AskConsent, Consent
+from ui_console.consent_talk import Claim, ConsentTalk
 from ui_console.console_events import (
     Asked,
     Attention,
-    CommandApplied,
     CommandRefused,
-    ConsentAsked,
-    ConsentHeard,
-    ConsentSettled,
-    ConsentSought,
     ConsoleEvent,
     GivenBack,
     Granted,
-    LinkTrouble,
     Lost,
     PictureSeen,
     WhyHeard,
 )
-from ui_console.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
+from ui_console.controls import Controls
+from ui_console.driving import Command, Drive, Halt, Jump
 from ui_console.feed import REPLY_TIME_S
 from ui_console.observer import Observer
 from ui_console.team_model import ROBOT_KIND
@@ -139,17 +124,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._asked_s = 0.0
         self._grants = 0
         self._decided = asyncio.Event()
-        self._dead_man, self._span = DeadMan(), DriveSpan()
-        self._pressed = asyncio.Event()
+        self._controls = Controls(self)
+        self._consent = ConsentTalk(self, self.give_back)
         self._asking_why: asyncio.Task[None] | None = None
         self._touched = asyncio.Event()
         self._is_attended = True
         self._holding = ""
         self._next_robot = ""
         self._switching = asyncio.Lock()
-        self._desk = ConsentDesk(self.user)
-        self._answers: dict[str, asyncio.Future[Consent]] = {}
-        self._unanswered = 0
         self.refusal: Refusal | None = None
         """Why the claim was refused; None if it was not."""
         self.given_back: bool | None = None
@@ -181,6 +163,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
         arc, self._claimed, self._is_asking = self._arc, claim, True
         assert arc is not None  # noqa: S101  what rests is there
+        self._controls.connect(arc)
         if self._see is not None:
             self._frames = arc.frames(self._saw)
         self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None
@@ -235,13 +218,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
             lasts_s: How long that counts, machine seconds, for what says it again while it is held; None: as for keys.
         """
         self.touch()
-        self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
-        self._pressed.set()
+        self._controls.hold(drive, lasts_s)
 
     def stop(self) -> None:
         """Stop the wheels now."""
-        self._dead_man.stop()
-        self._pressed.set()
+        self._controls.stop()
 
     def jump(self) -> None:
         """Jump once."""
@@ -250,41 +231,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def do(self, command: Command) -> bool:
         """Have one command carried out and tell what became of it; return True if it was applied."""
-        if self._arc is None or self._rests:
-            return False
-        wanted_s = time.perf_counter()
-        try:
-            match command:
-                case Drive(left_rad_s, right_rad_s):
-                    applied = await self._arc.drive(left_rad_s, right_rad_s)
-                case Halt():
-                    applied = await self._arc.halt()
-                case Jump():
-                    applied = await self._arc.jump()
-        except Refusal as refusal:
-            self._tell_refusal(refusal)
-            return False
-        except LinkError as error:
-            self.show(LinkTrouble(self.clock.now_s(), str(error)))
-            return False
-        took_s = time.perf_counter() - wanted_s
-        self._tell_command(command, applied)
-        self.show(CommandApplied(applied.at_s, applied.rc, applied.epoch, applied.command, applied.values, took_s))
-        return True
-
-    def _tell_command(self, command: Command, applied: Applied) -> None:
-        if self._span.begins(command, applied.at_s):
-            speeds = ", ".join(f"{name.partition('_')[0]} {value:+.1f}" for name, value in applied.values.items())
-            self.acted(OperatorAction.DRIVE_BEGIN, applied.rc, f"{speeds} rad/s")
-        elif isinstance(command, Jump):
-            self.acted(OperatorAction.JUMP, applied.rc)
-        elif isinstance(command, Halt):
-            self._tell_drive_ended()
-
-    def _tell_drive_ended(self, why: str = "") -> None:
-        took_s = self._span.ends(self.clock.now_s())
-        if took_s is not None:
-            self.acted(OperatorAction.DRIVE_END, self._holding, f"after {took_s:.1f} s{f', {why}' if why else ''}")
+        return not self._rests and await self._controls.do(command)
 
     def begin_release(self) -> None:
         """Give the robot back without waiting for it."""
@@ -306,7 +253,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool) -> None:
         keeping, self._keeping = self._keeping, None
-        self._dead_man = DeadMan()
+        self._controls.switch_off()
         if keeping is not None:
             keeping.cancel()
             await asyncio.wait({keeping})
@@ -334,12 +281,13 @@ class Teleoperation(Observer[TeleoperationParameters]):
         except LinkError as error:
             log.info("the release was not confirmed: %s", error)
             confirmed = False
+        self._controls.disconnect()
         self._arc, self._rests = None, False
         return confirmed
 
     def _tell_given_back(self, reason: str, *, confirmed: bool) -> None:
-        self._tell_drive_ended(reason)
-        self._settle(self._desk.ended(True, reason))
+        self._controls.tell_drive_ended(self._holding, reason)
+        self._consent.ended(True, reason)
         robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
         self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
         self.report("holds no robot")
@@ -348,114 +296,19 @@ class Teleoperation(Observer[TeleoperationParameters]):
     # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
         """Ask whoever holds what this console waits for; what they say is shown. Nothing if they are being asked."""
-        if self._unanswered == 0:
-            self._unanswered = 1
-            self.start_task(self._ask_consent(why), "consent")
+        robot, is_waiting = self.parameters.robot, self._is_asking and not self.is_held
+        claim = Claim(arc_name(self.bus, self.parameters.kind), robot, robot or ANY_ROBOT, self._asked_s)
+        self._consent.begin_ask(claim if is_waiting else None, why)
 
     def decide(self, is_given: bool, reason: str = "") -> None:
         """Answer who asks for the robot; with a yes it is given back."""
-        settled = self._desk.decide(is_given, reason)
-        if not settled:
-            return
-        asker = settled[0].sought
-        action = OperatorAction.CONSENT if is_given else OperatorAction.DECLINE
-        self.acted(action, asker.robot, f"asked by {asker.user}{f', {reason}' if reason else ''}")
-        if is_given:
-            self.start_task(self._yield_to(settled), "consent")
-        else:
-            self._settle(settled)
+        self._consent.decide(is_given, reason)
 
-    async def _yield_to(self, settled: list[Settled]) -> None:
-        """Give the robot back, then say so: who was let have it finds it free."""
-        await self.give_back(f"{settled[0].sought.user} may have it")
-        self._settle(settled)
-
-    async def _seek_consent(self, asker: str, asked: AskConsent) -> Consent:
-        """Have the operator decide; silence is a no.
-
-        Raises:
-            NotAnOperator: The asker is no console.
-            Refusal: See ``ConsentDesk.seek``.
-        """
-        if not _is_console(asker):
-            raise NotAnOperator(f"{self.name} is asked for its robot by operators only, not by {asker}")
+    def _consent_at_once(self) -> Consent | None:
+        """Return what is said to who asks for the robot if there is nothing that the operator could decide."""
         if not self.is_held:
             return Consent(not self._is_asking, self.user, "holds nothing")
-        if self._work is not None:
-            return Consent(False, self.user, "a script drives")
-        within_s = CONSENT_WITHIN_S * self.clock.rate
-        sought = self._desk.seek(asker, asked, self.clock.now_s(), within_s)
-        answer: asyncio.Future[Consent] = asyncio.get_running_loop().create_future()
-        self._answers[asker] = answer
-        self.show(ConsentSought(self.clock.now_s(), sought))
-        try:
-            async with asyncio.timeout(CONSENT_WITHIN_S):
-                return await answer
-        except TimeoutError:
-            self._settle(self._desk.expire(max(self.clock.now_s(), sought.until_s)))
-            return Consent(False, self.user, "no answer")
-
-    def _settle(self, settled: list[Settled]) -> None:
-        for one in settled:
-            answer = self._answers.pop(one.sought.asker, None)
-            if answer is not None and not answer.done():
-                answer.set_result(one.consent)
-            self.show(ConsentSettled(self.clock.now_s(), one))
-
-    async def _ask_consent(self, why: str) -> None:
-        try:
-            holders = await self._who_holds()
-        except Refusal as refusal:
-            self._unanswered = 0
-            self._tell_refusal(refusal)
-        except LinkError as error:
-            self._unanswered = 0
-            self.show(LinkTrouble(self.clock.now_s(), str(error)))
-        else:
-            self._unanswered = len(holders)
-            robot, now_s = self.parameters.robot or ANY_ROBOT, self.clock.now_s()
-            names = [component_of(holder) for holder in holders]
-            why = (why or f"waits since {now_s - self._asked_s:.0f} s")[:MAX_WHY]
-            self.acted(OperatorAction.ASK_CONSENT, robot, f"of {', '.join(names)}, {why}")
-            self.show(ConsentAsked(now_s, robot, names, now_s + CONSENT_WITHIN_S * self.clock.rate))
-            await asyncio.gather(*(self._ask_one(holder, AskConsent(robot, self.user, why)) for holder in holders))
-
-    async def _who_holds(self) -> list[str]:
-        """Return the addresses of the consoles that hold the robot, or else stand directly in the way.
-
-        Raises:
-            NobodyToAsk: There is none, or this console does not wait.
-            LinkError: The RC manager did not answer.
-        """
-        if not self._is_asking or self.is_held:
-            raise NobodyToAsk(f"{self.user} does not wait for a robot", remedy="Take the robot first.")
-        schedule = await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
-        owners = {request.arc: request.owner for request in schedule.requests}
-        own = arc_name(self.bus, self.parameters.kind)
-        arcs = {arc for one in schedule.requests if one.arc == own for arc in one.blockers}
-        arcs |= {holder.arc for rc in schedule.rcs if rc.rc == self.parameters.robot for holder in rc.holders}
-        blockers = {owners[arc] for arc in arcs - {own} if arc in owners}
-        consoles = sorted(at for at in blockers if _is_console(at) and at != self.address)
-        if not consoles:
-            names = ", ".join(sorted(map(component_of, blockers))) or "nobody"
-            raise NobodyToAsk(f"no operator stands in the way of {self.user}, but {names}")
-        return consoles
-
-    async def _ask_one(self, holder: str, question: AskConsent) -> None:
-        try:
-            consent = await self.bus.ask(holder, question, Consent, within_s=CONSENT_WITHIN_S + REPLY_TIME_S)
-        except NoResponder:  # a console that is gone holds nothing: its ARC ends with it
-            consent = Consent(True, component_of(holder), "is gone")
-        except LinkError:
-            consent = Consent(False, component_of(holder), "does not answer")
-        except Refusal as refusal:
-            consent = Consent(False, component_of(holder), refusal.detail)
-        self._unanswered -= 1
-        if not consent.is_given:
-            because = consent.reason or "no reason given"
-            self.tell(question.robot, f"{consent.user} keeps it from {self.user}: {because}")
-        now_s = self.clock.now_s()
-        self.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
+        return Consent(False, self.user, "a script drives") if self._work is not None else None
 
     # ------------------------------------------------------------------ the component's hooks
     async def serve(self) -> None:
@@ -463,7 +316,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self.sign_in(f"to drive {self.parameters.robot or ANY_ROBOT}, with priority {self.parameters.priority}")
         if self._takes:
             self.take()
-        self.start_task(self._drive_while_held(), "keys")
+        self.start_task(self._controls.run(), "keys")
         if self.parameters.away_after_s > 0:
             self.start_task(self._give_back_when_away(), "attention")
         if self._work is not None:
@@ -473,7 +326,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Answer the ARC's notices, and other consoles that ask for the robot."""
         if isinstance(asked.body, AskConsent):
-            return await self._seek_consent(asked.source, asked.body)
+            return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
         if not isinstance(asked.body, ArcNotice):
             raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
         if self._arc is None:
@@ -512,11 +365,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def arc_suspended(self, notice: Suspended) -> None:
         """Tell it; see ``ArcListener``."""
-        self._dead_man = DeadMan()
+        self._controls.release()
         if self._keeping is not None:
             because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
-            self._settle(self._desk.ended(False, f"it was lost: {because}"))
-            self._tell_drive_ended(because)
+            self._consent.ended(False, f"it was lost: {because}")
+            self._controls.tell_drive_ended(self._holding, because)
             self.report(f"waits: {notice.reason} by {notice.by}")
             self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
 
@@ -541,6 +394,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
                 await rested.release("asks otherwise")
             await arc.keep(self.clock, kind, parameters, rests=rests)
         except Refusal as refusal:
+            self._controls.disconnect()
             self._arc, self._keeping, self._is_asking = None, None, False
             self.refusal = refusal
             self._tell_refusal(refusal)
@@ -567,19 +421,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._asking_why = None
 
     # ------------------------------------------------------------------ hands
-    async def _drive_while_held(self) -> None:
-        loop = asyncio.get_running_loop()
-        while True:
-            self._pressed.clear()
-            command = self._dead_man.due(loop.time())
-            if command is not None and self.is_held:
-                await self.do(command)
-            try:
-                async with asyncio.timeout_at(self._dead_man.next_s):
-                    await self._pressed.wait()
-            except TimeoutError:
-                continue
-
     async def _give_back_when_away(self) -> None:
         """Let the robot go on with useful work when nobody drives it."""
         away_after_s = self.parameters.away_after_s
@@ -599,7 +440,3 @@ class Teleoperation(Observer[TeleoperationParameters]):
     async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
         await work(self)
         self.end("the work is done")
-
-
-def _is_console(address: str) -> bool:
-    return address.startswith(f"{Subsystem.UI_CONSOLE}/")
