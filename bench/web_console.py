@@ -2,7 +2,8 @@
 
 Starts the shipped mission with three video frequencies, so that three behaviors see at once, and ``scout-console
 serve`` beside it. A client watches all three and says that a picture is drawn as soon as it has it, as a page does. The
-claim: 15 pictures of 320 × 240 a second of each, at a small share of one core, a moment after they were taken.
+claim: 15 pictures of 320 × 240 a second of each, at a small share of one core, a moment after they were taken. A rate
+is that of the pictures from the first to the last counted one; ``longest_gap_ms`` tells whether they came all the time.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +64,7 @@ class Watcher:
     def __init__(self, socket: ClientConnection, clock: MissionClock) -> None:
         self._socket, self._clock = socket, clock
         self.is_counting = False
-        self.counts = dict.fromkeys(ROBOTS, 0)
+        self.arrived_s: dict[str, list[float]] = {robot: [] for robot in ROBOTS}
         self.ages_s: list[float] = []
         self.received_bytes = 0
         self.drawn_s: dict[str, float] = {}
@@ -99,8 +101,23 @@ class Watcher:
             number, captured_s = struct.unpack_from(">Id", message, 1 + message[0])
             await self._socket.send(json.dumps({"do": "drawn", "robot": robot, "number": number}))
             if self.is_counting:
-                self.counts[robot] += 1
+                self.arrived_s[robot].append(time.monotonic())
                 self.ages_s.append(self._clock.now_s() - captured_s)
+
+
+def rate_hz(times_s: list[float]) -> float:
+    """Return how many a second there were from the first to the last.
+
+    Example:
+        >>> rate_hz([0.0, 0.1, 0.2]), rate_hz([1.0])
+        (10.0, 0.0)
+    """
+    return round((len(times_s) - 1) / (times_s[-1] - times_s[0]), 2) if len(times_s) > 1 else 0.0
+
+
+def longest_gap_ms(times_s: list[float]) -> float:
+    """Return the longest time between one and the next."""
+    return round(1000 * max(later - earlier for earlier, later in pairwise(times_s)), 1)
 
 
 async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -> dict[str, Any]:
@@ -123,7 +140,11 @@ async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -
         measured = {
             "serving_cpu_percent": percent(busy_s([server]) - own_s, took_s),
             "mission_cpu_percent": percent(busy_s(mission) - mission_s, took_s),
-            "pictures_per_s": {robot: round(count / took_s, 1) for robot, count in watcher.counts.items()},
+            "pictures_per_s": {robot: rate_hz(times_s) for robot, times_s in watcher.arrived_s.items()},
+            "longest_gap_ms": {
+                robot: longest_gap_ms([began_s, *times_s, began_s + took_s])
+                for robot, times_s in watcher.arrived_s.items()
+            },
             "age_p50_ms": round(1000 * percentile(watcher.ages_s or [0.0], 0.5), 1),
             "age_p99_ms": round(1000 * percentile(watcher.ages_s or [0.0], 0.99), 1),
             "shown_latency_ms": {robot: round(1000 * at_s, 1) for robot, at_s in watcher.drawn_s.items()},

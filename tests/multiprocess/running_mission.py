@@ -96,13 +96,17 @@ class RunningMission:
         with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
             return run_files.find(self.name).endpoint
 
+    @property
+    def clock(self) -> MissionClock:
+        """Its time."""
+        with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
+            found = run_files.find(self.name)
+        return MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+
     @contextlib.asynccontextmanager
     async def bus(self, source: str = "ui_console/tester") -> AsyncIterator[ZenohBus]:
         """Open a bus to the mission."""
-        with runtime_directory(self.environment["XDG_RUNTIME_DIR"]):
-            found = run_files.find(self.name)
-        clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-        opened = await ZenohBus.open_when_up(self.name, source, clock, client_config(found.endpoint))
+        opened = await ZenohBus.open_when_up(self.name, source, self.clock, client_config(self.endpoint))
         try:
             yield opened
         finally:

@@ -135,9 +135,9 @@ def test_an_unknown_robot_is_refused_with_a_remedy(mission: RunningMission) -> N
 
 
 def test_equal_watchers_take_turns_and_the_judge_agrees(tmp_path: Path, judged) -> None:
-    """IROS 2001, section 5.1: five seconds each, round robin."""
+    """IROS 2001, section 5.1: round robin; two seconds each here, whole minutes of five are among the long tests."""
     trace = tmp_path / "run.jsonl"
-    with mission_up("--trace", str(trace), "--for", "22") as running:
+    with mission_up("--trace", str(trace), "--for", "11", change={'runtime-s="5"': 'runtime-s="2"'}) as running:
         assert running.launcher.wait(90) == 0, running.story()
     lines = trace_of(trace)
     grants = [(line["arc"], line["t"]) for line in lines if line["ev"] == "grant"]
@@ -145,7 +145,7 @@ def test_equal_watchers_take_turns_and_the_judge_agrees(tmp_path: Path, judged) 
     assert len(arcs) >= 4, running.story()
     assert all(first != second for first, second in pairwise(arcs))
     starts = [at for _, at in grants]
-    assert all(later - earlier >= 5.3 for earlier, later in pairwise(starts)), starts  # 5 s, then the picture settles
+    assert all(later - earlier >= 2.3 for earlier, later in pairwise(starts)), starts  # 2 s, then the picture settles
     judged(trace)
 
 

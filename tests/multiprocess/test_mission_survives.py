@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import os
 import signal
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from running_mission import RunningMission, mission_up, wait_gone
 
+from backbone.bus.interface import Bus
+from backbone.errors import LinkError, Refusal
+from backbone.mission_picture import look
+
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 
 RECOVERED_WITHIN_S = 20.0
+LOOK_EVERY_S = 0.05
 VICTIMS = [
     "watch-scout1",
     "watch-scout1-capture",
@@ -32,19 +38,19 @@ VICTIMS = [
 ]
 
 
-def wait_until(mission: RunningMission, what: str, holds: Callable[[dict], bool]) -> dict:
+async def wait_until(mission: RunningMission, bus: Bus, what: str, holds: Callable[[dict], bool]) -> dict:
     """Return the status as soon as it fulfills the condition."""
-    deadline = time.monotonic() + RECOVERED_WITHIN_S
     status: dict = {}
-    while time.monotonic() < deadline:
-        done = mission.command("scout-backbone", "status", "--json", "--mission", mission.name)
-        if done.returncode == 0:
-            import json
-
-            status = json.loads(done.stdout)
-            if holds(status):
-                return status
-    raise AssertionError(f"not within {RECOVERED_WITHIN_S} s: {what}\n{status}\n{mission.story()}")
+    try:
+        async with asyncio.timeout(RECOVERED_WITHIN_S):
+            while True:
+                with contextlib.suppress(LinkError, Refusal):  # whoever knows has just been killed
+                    status = (await look(bus, mission.clock.now_s())).to_json()
+                    if holds(status):
+                        return status
+                await asyncio.sleep(LOOK_EVERY_S)
+    except TimeoutError:
+        raise AssertionError(f"not within {RECOVERED_WITHIN_S} s: {what}\n{status}\n{mission.story()}") from None
 
 
 def names(status: dict) -> set[str]:
@@ -63,28 +69,31 @@ def somebody_runs(status: dict) -> bool:
     return any(request["state"] == "running" for request in status["requests"])
 
 
-def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_path: Path) -> None:
+async def test_a_mission_recovers_from_the_death_of_each_of_its_processes(tmp_path: Path) -> None:
     trace = tmp_path / "run.jsonl"
     with mission_up("--trace", str(trace)) as mission:
-        expected = names(wait_until(mission, "both watchers ask", lambda s: both_watchers_ask(s) and somebody_runs(s)))
-        for victim in VICTIMS:
-            before = mission.component(victim)["pid"]
-            os.kill(before, signal.SIGKILL)
+        async with mission.bus() as bus:
+            expected = names(
+                await wait_until(mission, bus, "both watchers ask", lambda s: both_watchers_ask(s) and somebody_runs(s))
+            )
+            for victim in VICTIMS:
+                before = mission.component(victim)["pid"]
+                os.kill(before, signal.SIGKILL)
 
-            def recovered(status: dict, victim: str = victim, before: int = before) -> bool:
-                pids = {c["name"]: c["pid"] for c in status["components"]}
-                return (
-                    pids.get(victim, before) != before
-                    and expected <= names(status)
-                    and both_watchers_ask(status)
-                    and somebody_runs(status)
-                    and not status["problems"]
-                )
+                def recovered(status: dict, victim: str = victim, before: int = before) -> bool:
+                    pids = {c["name"]: c["pid"] for c in status["components"]}
+                    return (
+                        pids.get(victim, before) != before
+                        and expected <= names(status)
+                        and both_watchers_ask(status)
+                        and somebody_runs(status)
+                        and not status["problems"]
+                    )
 
-            status = wait_until(mission, f"recovery from the death of {victim}", recovered)
-            for rc in status["rcs"]:
-                assert rc["sharable"] or len(rc["holders"]) <= 1, rc
-        assert mission.down() in (0, 6), mission.story()
+                status = await wait_until(mission, bus, f"recovery from the death of {victim}", recovered)
+                for rc in status["rcs"]:
+                    assert rc["sharable"] or len(rc["holders"]) <= 1, rc
+        assert await asyncio.to_thread(mission.down) in (0, 6), mission.story()
 
 
 def test_nothing_is_left_after_the_death_of_the_launcher() -> None:

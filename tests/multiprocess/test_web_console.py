@@ -204,7 +204,6 @@ async def test_two_equal_operators_have_the_robot_in_turns(served: Served) -> No
             await one.say(do="take", robot="scout1")
         await carla.wait(lambda: carla.is_held and not dora.is_held, "carla's turn")
         await dora.wait(lambda: dora.is_held and not carla.is_held, "dora's turn")
-        await carla.wait(lambda: carla.is_held and not dora.is_held, "carla's next turn")
 
 
 async def holds(bus: Bus, behavior: str) -> bool:
