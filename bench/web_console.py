@@ -1,4 +1,4 @@
-"""What three videos in a browser cost while their mission runs: ``.venv/bin/python bench/web_console.py [SECONDS]``.
+"""What three videos in a browser cost while their mission runs: ``bench/web_console.py [SECONDS [PICTURES_PER_S]]``.
 
 Starts the shipped mission with three video frequencies, so that three behaviors see at once, and ``scout-console
 serve`` beside it. A client watches all three and says that a picture is drawn as soon as it has it, as a page does. The
@@ -34,9 +34,9 @@ ROBOTS = ("scout1", "scout2", "scout3")
 SETTLE_S = 8.0  # chosen: behaviors have their robots, and the first pictures are over
 
 
-def with_three_frequencies(mission: str) -> str:
-    """Return the shipped mission with a frequency, a framegrabber and a watcher for each robot."""
-    text = mission
+def with_three_frequencies(mission: str, pictures_per_s: float) -> str:
+    """Return the shipped mission with a frequency, a framegrabber of this rate and a watcher for each robot."""
+    text = re.sub(r'(name="frame_rate_hz" value=")[^"]*', rf"\g<1>{pictures_per_s:g}", mission)
     for kind, names in (("video_frequency", ("video1", "video2", "video3")), ("framegrabber", ("grabber",))):
         found = re.search(rf'    <resource type="{kind}" name="\w+".*?</resource>\n', text, re.DOTALL)
         assert found is not None
@@ -157,12 +157,12 @@ async def watch(port: int, token: str, server: psutil.Process, lasts_s: float) -
         return measured
 
 
-def main(lasts_s: float) -> None:
+def main(lasts_s: float = 15.0, pictures_per_s: float = 15.0) -> None:
     """Print one JSON line."""
     with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
         os.environ["XDG_RUNTIME_DIR"] = folder
         file = Path(folder) / "mission.xml"
-        file.write_text(with_three_frequencies(MISSION_XML.read_text()))
+        file.write_text(with_three_frequencies(MISSION_XML.read_text(), pictures_per_s))
         backbone = str(BIN / "scout-backbone")
         subprocess.run([backbone, "up", str(file), "--detach", "--headless"], check=True, stderr=subprocess.DEVNULL)
         serving = subprocess.Popen(
@@ -180,4 +180,4 @@ def main(lasts_s: float) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 15.0)
+    main(*map(float, sys.argv[1:]))
