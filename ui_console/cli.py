@@ -17,6 +17,8 @@ import typer
 from backbone.cli import ExitCode, run, say
 
 if TYPE_CHECKING:
+    from ssl import SSLContext
+
     from backbone.bus.interface import Clock
     from backbone.component.launch import Launch
     from ui_console.console_events import ConsoleEvent
@@ -82,8 +84,21 @@ class _Site:
 
     host: str
     port: int
+    certificate: str
+    key: str
     kind: str
     away_after_s: float
+
+    @property
+    def encryption(self) -> SSLContext | None:
+        """What is encrypted with; None: nothing is.
+
+        Raises:
+            NoCertificate: There is none where one should be.
+        """
+        from ui_console.web.encryption import encryption_with
+
+        return encryption_with(self.certificate, self.key) if self.certificate else None
 
 
 @app.command()
@@ -149,6 +164,12 @@ def serve(
         list[str] | None,
         typer.Option(help="NAME=PRIORITY: a token for this operator alone; again for each. Default: one for all."),
     ] = None,
+    certificate: Annotated[
+        str, typer.Option(help="PEM file with a certificate: the page is served over HTTPS.", metavar="FILE")
+    ] = "",
+    key: Annotated[
+        str, typer.Option(help="PEM file with its key; default: it is in the certificate's file.", metavar="FILE")
+    ] = "",
     design: Annotated[
         str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
     ] = "",
@@ -167,7 +188,10 @@ def serve(
     except WrongOperator as wrong:
         say(f"--operator {wrong}")
         raise typer.Exit(ExitCode.USAGE) from wrong
-    site = _Site(host, port, kind, away_after)
+    if key and not certificate:
+        say("--key belongs to a --certificate")
+        raise typer.Exit(ExitCode.USAGE)
+    site = _Site(host, port, certificate, key, kind, away_after)
     if design:
         if mission is not None or connect is not None:
             say("--design serves a mission file; --mission and --connect are for missions that are up")
@@ -330,6 +354,7 @@ async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, 
     except ModuleNotFoundError as missing:
         say(f"{missing.name} is not installed; install scout-backbone[web]")
         return ExitCode.USAGE
+    encryption = site.encryption
     launch, clock = await _launch(mission, connect, {})
     launch = msgspec.structs.replace(launch, name=f"web-{os.getpid()}")
 
@@ -341,7 +366,9 @@ async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, 
     interrupted = _end_on_signals(hub.observer)
 
     try:
-        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, lambda port: _tell_where(site, port, passes))
+        await WebServer(hub, Doorkeeper(passes)).run(
+            site.host, site.port, lambda port: _tell_where(site, port, passes), encryption
+        )
     except CannotListen:
         await bus.close()
         raise
@@ -360,6 +387,7 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
     except ModuleNotFoundError as missing:
         say(f"{missing.name} is not installed; install scout-backbone[web]")
         return ExitCode.USAGE
+    encryption = site.encryption
     try:
         draft, kept = begin(file)
     except MissionInvalid as invalid:
@@ -377,17 +405,21 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
         asyncio.get_running_loop().add_signal_handler(number, ended, number)
     room = DesignRoom(draft, kept, look_up, MissionClock.started_now())
     server = DesignServer(room, Doorkeeper(passes))
-    await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end)
+    await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end, encryption)
     return ExitCode.INTERRUPTED if signal.SIGINT in came else ExitCode.DONE
 
 
 def _tell_where(site: _Site, port: int, passes: Mapping[str, Pass]) -> None:
     """Print the page's address for each token, as soon as browsers can come."""
+    scheme = "https" if site.certificate else "http"
     for token, granted in passes.items():
         who = f"{granted.user}: " if granted.user else ""
-        _write_line(f"{who}http://{_shown(site.host)}:{port}/#token={token}".encode())
-    if site.host not in LOOPBACK:
-        say("whoever can listen on the way to this address can read what is sent: use it on networks you trust")
+        _write_line(f"{who}{scheme}://{_shown(site.host)}:{port}/#token={token}".encode())
+    if site.host not in LOOPBACK and not site.certificate:
+        say(
+            "whoever can listen on the way to this address can read what is sent: use it on networks you trust, "
+            "or give a --certificate"
+        )
 
 
 def _shown(host: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
+from ssl import SSLContext
 
 from ui_console.design.draft import Draft
 from ui_console.design.file import NotSaved
@@ -48,7 +49,14 @@ class DesignServer:
             room, doorkeeper, Site(DESIGN_FILES), understand_designer
         )
 
-    async def run(self, host: str, port: int, ready: Callable[[int], None], end: asyncio.Event) -> None:
+    async def run(
+        self,
+        host: str,
+        port: int,
+        ready: Callable[[int], None],
+        end: asyncio.Event,
+        encryption: SSLContext | None = None,
+    ) -> None:
         """Serve until the event is set; what is not saved is kept beside the file.
 
         Args:
@@ -56,6 +64,7 @@ class DesignServer:
             port: Port; 0: any that is free.
             ready: Called with the port once browsers can come.
             end: Ends it.
+            encryption: See ``encryption_with``; None: it speaks plain HTTP.
 
         Raises:
             CannotListen: The address cannot be had.
@@ -64,7 +73,7 @@ class DesignServer:
         room = self._room
         await room.prepare()
         try:
-            async with self._reception.open(host, port) as server, asyncio.TaskGroup() as beside:
+            async with self._reception.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
                 tasks = [beside.create_task(one(), name=f"design: {one.__name__}") for one in (room.beat, room.keep_on)]
                 tasks.append(beside.create_task(room.learn_stock(), name="design: learn_stock"))
                 ready(port_of(server))

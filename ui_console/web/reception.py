@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sized
 from contextlib import asynccontextmanager
+from ssl import SSLContext
 from typing import Generic, Protocol, TypeVar
 
 from websockets.asyncio.server import Server, ServerConnection, serve
@@ -99,20 +100,22 @@ class Reception(Generic[GuestT, IntentT]):
         self._strangers = 0
 
     @asynccontextmanager
-    async def open(self, host: str, port: int) -> AsyncIterator[Server]:
+    async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
         """Let browsers come, until left or the server is closed.
 
         Args:
             host: Address to listen at.
             port: Port; 0: any that is free.
+            encryption: See ``encryption_with``; None: it speaks plain HTTP.
 
         Raises:
             CannotListen: The address cannot be had.
         """
-        async with await self._listen(host, port) as server:
+        async with await self._listen(host, port, encryption) as server:
             yield server
 
-    async def _listen(self, host: str, port: int) -> Server:
+    async def _listen(self, host: str, port: int, encryption: SSLContext | None) -> Server:
+        is_encrypted = encryption is not None
         try:
             return await serve(
                 self._meet,
@@ -128,6 +131,9 @@ class Reception(Generic[GuestT, IntentT]):
                 max_size=MAX_MESSAGE_BYTES,
                 max_queue=MOST_UNREAD,
                 write_limit=SEND_AHEAD_BYTES,
+                ssl=encryption,
+                ssl_handshake_timeout=OPEN_WITHIN_S if is_encrypted else None,
+                ssl_shutdown_timeout=CLOSE_WITHIN_S if is_encrypted else None,
             )
         except OSError as error:
             raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from ssl import SSLContext
 
 from ui_console.web.door import Doorkeeper
 from ui_console.web.hub import WebHub
@@ -25,20 +26,23 @@ class WebServer:
         self._hub = hub
         self._reception: Reception[Operator, Intent] = Reception(hub, doorkeeper, Site(), understand)
 
-    async def run(self, host: str, port: int, ready: Callable[[int], None]) -> None:
+    async def run(
+        self, host: str, port: int, ready: Callable[[int], None], encryption: SSLContext | None = None
+    ) -> None:
         """Serve until the hub's component has ended; all robots are given back then.
 
         Args:
             host: Address to listen at.
             port: Port; 0: any that is free.
             ready: Called with the port once browsers can come.
+            encryption: See ``encryption_with``; None: it speaks plain HTTP.
 
         Raises:
             CannotListen: The address cannot be had.
             BaseException: The bug that ended the component.
         """
         observer = self._hub.observer
-        async with self._reception.open(host, port) as server:
+        async with self._reception.open(host, port, encryption) as server:
             life = asyncio.create_task(observer.run(), name=f"life of {observer.address}")
             telling = asyncio.create_task(self._hub.tell_all(), name="web: tell all")
             telling.add_done_callback(

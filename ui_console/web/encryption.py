@@ -1,0 +1,34 @@
+"""HTTPS: nobody on the way reads the token or drives, and browsers lend the page what they keep for safe ones."""
+
+from __future__ import annotations
+
+import ssl
+
+from backbone.errors import Refusal
+
+
+class NoCertificate(Refusal):
+    """There is no certificate to show."""
+
+    code = "web.certificate"
+    remedy = "Give --certificate and --key as PEM files without a password, as your authority or mkcert makes them."
+
+
+def encryption_with(certificate: str, key: str) -> ssl.SSLContext:
+    """Return what a server encrypts with, TLS 1.2 or newer.
+
+    Args:
+        certificate: PEM file with the certificate and those of the authorities between.
+        key: PEM file with its key; empty: the certificate's file has it too.
+
+    Raises:
+        NoCertificate: A file cannot be read, has no such thing, wants a password, or the two do not belong together.
+    """
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    try:
+        context.load_cert_chain(certificate, key or None, password="")  # else it would ask at the terminal
+    except OSError as error:  # also what OpenSSL says
+        why = error.strerror or str(error)
+        raise NoCertificate(f"cannot serve with {certificate} and {key or 'the key in it'}: {why}") from error
+    return context
