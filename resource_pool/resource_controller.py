@@ -13,6 +13,7 @@ import asyncio
 import logging
 import math
 import types
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import msgspec
@@ -127,8 +128,9 @@ class ResourceController(Component[R], Generic[R]):
     # ------------------------------------------------------------------ for derived classes
     def driver_site(self) -> DriverSite:
         """Return what a driver of this RC may use."""
+        folder = Path(self.launch.run_directory) if self.launch.run_directory else None
         return DriverSite(
-            self.name, self.bus, self.clock, self.parameters, lambda what: self.tell(self.name, what), self.fail
+            self.name, self.bus, self.clock, self.parameters, lambda what: self.tell(self.name, what), self.fail, folder
         )
 
     def make_driver(self, name: str = "") -> Any:

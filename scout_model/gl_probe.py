@@ -7,11 +7,15 @@ import of mujoco in it.
 
 from __future__ import annotations
 
+import fcntl
 import os
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
+
+import msgspec
 
 from scout_model.errors import RenderingUnavailable
 
@@ -19,6 +23,8 @@ Backend = Literal["egl", "osmesa", "none"]
 
 MISSING_PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"  # measured on bare Debian 12: these three render, fewer do not
 TRIAL_TIME_S = 20.0  # chosen: a trial takes half a second; a hanging driver must not hang a mission
+
+FOUND_FILE = "gl_support.json"
 
 _CANDIDATES: tuple[Backend, ...] = ("egl", "osmesa")  # OSMesa last: newer Mesa has dropped it
 _MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "disable"}
@@ -58,6 +64,28 @@ def probe(trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
         if renderer:
             return GlSupport(backend, renderer, "")
     return GlSupport("none", "", MISSING_PACKAGES)
+
+
+def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
+    """Return what ``probe`` finds out; of all processes that ask with this folder one does, the others wait for it.
+
+    Args:
+        folder: Lives as long as the answer is to be believed: until the machine or its drivers may be others.
+        trial_time_s: As for ``probe``.
+
+    Raises:
+        OSError: The folder cannot be written into.
+    """
+    with (folder / FOUND_FILE).open("a+b") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)  # let go with the file, also by a process that dies
+        file.seek(0)
+        try:
+            return msgspec.json.decode(file.read(), type=GlSupport)
+        except msgspec.DecodeError:  # nobody has asked yet, or died while writing
+            file.truncate(0)
+        support = probe(trial_time_s)
+        file.write(msgspec.json.encode(support))
+        return support
 
 
 def prepare(backend: Backend) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import msgspec
@@ -38,6 +39,7 @@ class DriverSite:
         parameters: The RC's parameters; the driver's own are in ``options``, checked by its ``options_type``.
         tell: Says one line to the people who watch the mission.
         fail: Ends the RC because of this bug or fault; its creator starts it anew, with the device reopened.
+        folder: Of this mission on this machine, for what need be found out only once; None: there is none.
     """
 
     resource: str
@@ -46,6 +48,7 @@ class DriverSite:
     parameters: Any
     tell: Callable[[str], None]
     fail: Callable[[BaseException], None]
+    folder: Path | None = None
 
     def options(self, kind: type[Options]) -> Options:
         """Return what the mission says to this driver alone.

@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
@@ -27,7 +28,7 @@ from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import meet_world, world_of
 from resource_pool.messages import WorldModel, WorldState
-from scout_model.gl_probe import GlSupport, prepare, probe
+from scout_model.gl_probe import GlSupport, prepare, probe, probe_once
 
 CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each
 EARLY_S = 1 / 120  # chosen: a quarter of a frame; the times of frames are rounded, and no frame is left out for that
@@ -70,7 +71,7 @@ class SimulatedFramegrabber:
     async def open(self) -> None:
         """Fetch the world's model and open the renderer, or the painter where there is no OpenGL."""
         run = asyncio.get_running_loop().run_in_executor
-        choosing = run(None, _choose, self._site.parameters.camera)
+        choosing = run(None, _choose, self._site.parameters.camera, self._site.folder)
         world = await meet_world(self._site)
         support, backend = await choosing
         lasts = isinstance(asyncio.get_running_loop(), VirtualLoop)
@@ -205,9 +206,9 @@ def _lasting_camera(mjcf: str, backend: str) -> Any:
     return _new_camera(mjcf, backend)
 
 
-def _choose(wanted: str) -> tuple[GlSupport | None, str]:
+def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, str]:
     """Return what OpenGL there is, if anybody must know, and which camera to use."""
     if wanted == "paint":
         return None, "paint"
-    support = probe()
+    support = probe() if folder is None else probe_once(folder)
     return support, support.camera_backend

@@ -1,16 +1,20 @@
+import contextlib
 import math
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from scout_model import gl_probe
 from scout_model.camera import Camera
 from scout_model.description import Furniture, ScoutPlace, Target, WorldDescription
 from scout_model.errors import RenderingUnavailable, StateMismatch, UnknownBody
-from scout_model.gl_probe import GlSupport, prepare, probe
+from scout_model.gl_probe import FOUND_FILE, GlSupport, prepare, probe, probe_once
 from scout_model.world import World
 
 Picture = NDArray[np.uint8]
@@ -145,6 +149,28 @@ def test_a_driver_that_hangs_does_not_hang_the_probe() -> None:
     support = probe(trial_time_s=0.001)
     assert (support.backend, support.camera_backend) == ("none", "paint")
     assert support.missing_packages == "libegl1 libopengl0 libgl1-mesa-dri"
+
+
+def test_of_many_who_ask_with_one_folder_only_one_probes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found, probed, together = GlSupport("egl", "a renderer", ""), [], threading.Barrier(4)
+
+    def probe_slowly(_trial_time_s: float) -> GlSupport:
+        probed.append(threading.get_ident())
+        with contextlib.suppress(threading.BrokenBarrierError):
+            together.wait(0.1)  # would end at once if the others probed as well
+        return found
+
+    monkeypatch.setattr(gl_probe, "probe", probe_slowly)
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda _number: probe_once(tmp_path), range(4))) == [found] * 4
+    assert len(probed) == 1
+
+
+def test_what_somebody_died_over_while_writing_it_is_found_out_anew(tmp_path: Path) -> None:
+    (tmp_path / FOUND_FILE).write_bytes(b'{"backend":"eg')
+    first = probe_once(tmp_path, trial_time_s=0.001)
+    assert first.backend == "none"
+    assert probe_once(tmp_path) == first, "it was not kept"
 
 
 def test_probing_imports_no_mujoco() -> None:
