@@ -82,8 +82,7 @@ class FirstInLine:
 
     def _takes_from_others(self, arc: ArcEntry, now_s: float) -> bool:
         """Say whether, if it started now, it would take time from a higher one or from the first in line at an RC."""
-        end_s = now_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
-
+        end_s = self._must_be_done_s(arc, now_s)
         crowd = [holder for holder in self._crowd(arc) if self._table.fits(arc, [holder])]
 
         def from_one(other: ArcEntry) -> bool:
@@ -95,6 +94,10 @@ class FirstInLine:
         if any(from_one(first) for first in firsts):
             return True
         return any(from_one(one) for one in self._table.beside(arc) if one.goes_before(arc) and one.queued)
+
+    def _must_be_done_s(self, arc: ArcEntry, start_s: float) -> float:
+        """Return from when on others may need the RCs of an ARC that starts then: hand-overs may eat the slack."""
+        return start_s + arc.length_s - min(self._slack_s, arc.minimum_s / 2) - INSTANT_S
 
     def _crowd(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return those that hold a sharable RC of the ARC."""
@@ -123,14 +126,14 @@ class FirstInLine:
         table = self._table
         in_the_way = [holder for holder in table.holders(arc) if table.clash(arc, holder)]
         start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
-        if len(behind) > LOOK_AHEAD:
+        if len(behind) > LOOK_AHEAD or arc.pledge is not None:  # what is freed for it by force is nobody else's
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
             first = self.at(rc)
             if first is None or first is arc or first in behind or not table.clash(arc, first):
                 continue
             first_s = self._reserved_s(first, now_s, (*behind, arc))
-            if first_s < start_s + arc.length_s - INSTANT_S:
+            if first_s < self._must_be_done_s(arc, start_s):
                 start_s = math.inf if first.goes_before(arc) else max(start_s, first_s + first.length_s)
         self._reserved[arc] = start_s
         return start_s

@@ -122,6 +122,37 @@ def test_in_a_big_group_on_crowded_radios_nobody_is_started_to_be_cut_again_and_
     assert max(overrides.values(), default=0) <= 5, overrides.most_common(3)
 
 
+def tree_crowd(seed: int) -> Bench:
+    """Return a mission of many ARCs deep in a tree, of two to four RCs each; nothing has happened yet."""
+    rng = Random(seed)
+    settle_s, tolerance_s = rng.choice([0.0, 0.3]), rng.choice([1e-6, 0.05])
+    rcs = [unit(f"u{n}", settle_s) for n in range(rng.choice([10, 20, 50]))]
+    bench = Bench(manager(tolerance_s=tolerance_s), *rcs)
+    branches = [f"t{n}" for n in range(3)]
+    nodes = [*branches, *(f"{above}-{n}" for above in branches for n in range(3))]
+    number = {name: rng.randint(0, 2) for name in nodes}
+    for arc in range(rng.choice([70, 100, 120])):
+        above = rng.choice(branches)
+        below = f"{above}-{rng.randint(0, 2)}"
+        path = [("m", 0), (above, number[above]), (below, number[below]), (f"o{arc}", rng.randint(0, 2))]
+        uses = " ".join(rc.rc for rc in rng.sample(rcs, rng.randint(2, 4)))
+        bench.at(rng.choice([0.0, rng.uniform(0.0, 5.0)]), ask(f"a{arc}", uses, path=path))
+    return bench
+
+
+def cut_most_at_one_instant(bench: Bench) -> int:
+    cuts = Counter((line["t"], line["arc"]) for line in bench.trace if line["ev"] == "revoke")
+    return max(cuts.values(), default=0)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_in_a_big_group_two_lower_ones_do_not_take_turns_in_being_cut_for_a_higher_one(seed):
+    """Found by a bench: what was freed of the one by force went to the other, so the higher one never had both."""
+    bench = tree_crowd(seed)
+    bench.run(40.0)
+    assert cut_most_at_one_instant(bench) <= 2
+
+
 def test_what_is_freed_by_force_waits_for_no_higher_one_that_cannot_run():
     """Found in a hundred thousand missions: an older equal took it, because a higher one of the group was down."""
     assert violations(play(*random_mission(Random(39603), tolerance_s=0.05))) == []
