@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -25,6 +26,10 @@ from backbone.naming import Subsystem
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("searching", derandomize=False)
 settings.load_profile("searching" if os.environ.get("SCOUT_SEARCH") else "repeatable")
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell that starts us in the background has SIGINT ignored, and all our children would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]
 
