@@ -1,6 +1,8 @@
 """The simulated world, played as hardware: radio packets in, the state of every body out.
 
-It steps physics and keeps the mission's pace; if it is late it catches up, it never skips a step.
+It steps physics and keeps the mission's pace, and never skips a step: if it is a little late it catches up, if it
+was away longer the time it was away is none for the world. Else robots would hear nothing while it catches up,
+and stop by themselves.
 Pictures are drawn elsewhere, from the state it publishes once a frame.
 """
 
@@ -31,6 +33,8 @@ from scout_model.dimensions import FRAMES_PER_S
 from scout_model.errors import UnknownBody
 from scout_model.radio_air import RadioAir, Sent
 from scout_model.world import World
+
+AWAY_S = 0.1  # chosen: three frames; with the packets' usual pause well below what robots take for silence
 
 
 class WorldParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -63,6 +67,7 @@ class SimulatedWorld(Component[WorldParameters]):
         self._epochs: dict[int, int] = {}
         self._packets = self._stale = self._late_frames = 0
         self._jammed_frames = 0
+        self._away_s = 0.0
 
     async def connect(self) -> None:
         """Begin to hear the air."""
@@ -75,7 +80,11 @@ class SimulatedWorld(Component[WorldParameters]):
         while True:
             frame += 1
             due_s = first_s + frame / FRAMES_PER_S
-            self._late_frames += self.clock.now_s() > due_s + 1.0 / FRAMES_PER_S
+            late_s = self.clock.now_s() - due_s
+            self._late_frames += late_s > 1.0 / FRAMES_PER_S
+            if late_s > AWAY_S:
+                first_s, due_s = first_s + late_s, due_s + late_s
+                self._away_s += late_s
             await self.clock.sleep_until_s(due_s)
             for packet in self._air.arrived(due_s):
                 self._world.hear(packet.network_id, packet.payload)
@@ -109,6 +118,7 @@ class SimulatedWorld(Component[WorldParameters]):
             "stale_packets": self._stale,
             "jammed_frames": self._jammed_frames,
             "late_frames": self._late_frames,
+            "away_s": self._away_s,
             "frames": self._world.frame,
         }
 

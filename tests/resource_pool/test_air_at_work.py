@@ -13,12 +13,13 @@ import pytest
 from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import Connect, Connected, RcUse
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import SimulatedRadio
 from resource_pool.drivers.simulated_video import SimulatedFramegrabber
-from resource_pool.messages import Applied, Tune
+from resource_pool.messages import Applied, Tune, WorldState
 from resource_pool.simulated_world import SimulatedWorld
 from scout_model import radio_link
 from scout_model.description import CLEAN_AIR, AirDescription, ScoutPlace, WorldDescription
@@ -88,6 +89,53 @@ def test_a_packet_moves_its_own_robot_and_no_other(local_mission: Any) -> None:
             assert (audit["packets"], audit["packets_lost"], audit["packets_for_nobody"]) == (5, 0, 0)
 
     run_virtual(main())
+
+
+class AwayClock:
+    """A component's clock that finds itself later than it was: the component was not run meanwhile."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        self._clock, self._away_s = clock, 0.0
+        self.rate = clock.rate
+
+    def was_away(self, seconds: float) -> None:
+        self._away_s += seconds
+
+    def now_s(self) -> float:
+        return self._clock.now_s() + self._away_s
+
+    async def sleep_s(self, seconds: float) -> None:
+        await self._clock.sleep_s(seconds)
+
+    async def sleep_until_s(self, time_s: float) -> None:
+        await self._clock.sleep_until_s(time_s - self._away_s)
+
+
+@pytest.mark.parametrize("away_s", [0.05, 0.4, 3.0])
+def test_after_a_world_was_away_its_robots_still_do_what_they_are_told(local_mission: Any, away_s: float) -> None:
+    """A robot stops by itself when it hears nothing; that the world was not run is no silence."""
+
+    async def scene() -> None:
+        async with played(local_mission) as here:
+            world = here.pool.running["world"]
+            world.clock = clock = AwayClock(here.pool.clock)
+            radio = SimulatedRadio(here.site("radio"))
+            await here.send(radio, 1, radio_link.encode_transmitter_on("video1"))
+            states: list[WorldState] = []
+            here.pool.voice("ear").subscribe(
+                world.address, Conversation.TELEMETRY, WorldState, lambda heard: states.append(heard.body)
+            )
+            for number in range(10):
+                if number == 4:
+                    clock.was_away(away_s)
+                await here.send(radio, 1, HALT)
+                await here.pool.clock.sleep_s(0.1)
+            on_air = [state for state in states if state.transmitting]
+            assert on_air, "the transmitter never came on"
+            assert states[states.index(on_air[0]) :] == on_air, "the transmitter went off"
+            assert states[-1].at_s == pytest.approx(clock.now_s(), abs=0.05), "it does not keep the mission's pace"
+
+    run_virtual(scene())
 
 
 def test_a_packet_to_an_id_nobody_has_is_counted_and_moves_nobody(local_mission: Any) -> None:
