@@ -23,6 +23,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
 from backbone.component.messages import (
+    Absence,
     AskParameters,
     AskState,
     AskStatistics,
@@ -44,7 +45,7 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Register, Registered
-from backbone.naming import claim_address
+from backbone.naming import claim_address, incarnation
 from backbone.wire import Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -53,6 +54,13 @@ MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
 REGISTER_WITHIN_S = 10.0  # chosen: a hub that is being restarted on a busy machine is back long before
 CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for its spectators; people see no difference
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
+
+
+class OtherIncarnation(Refusal):
+    """The order was meant for another life of this address: another host or another process."""
+
+    code = "component.incarnation"
+    remedy = "Nothing to do: the life that was meant is not this one."
 
 
 class NoParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -154,6 +162,10 @@ class Component(Generic[P]):
         """Return named counters and measures, units in the names."""
         return {}
 
+    def absences(self) -> list[Absence]:
+        """Return the components this one wants and that are absent; call ``changed`` when the answer changes."""
+        return []
+
     def publish_news(self) -> None:
         """Publish what spectators should know now.
 
@@ -237,6 +249,7 @@ class Component(Generic[P]):
             self._since_s,
             self.feedback,
             launch.requester,
+            self.absences(),
         )
 
     # ------------------------------------------------------------------ the shell
@@ -373,6 +386,8 @@ class Component(Generic[P]):
                 return self._set_parameter(name, value, user or asked.source)
             case AskStory(subject=subject):
                 return Story(self.story.of(subject))
+            case Stop(incarnation=meant) if meant not in ("", incarnation(self.launch.host, os.getpid())):
+                raise OtherIncarnation(f"{self.address} is {self.launch.host}.{os.getpid()}, not {meant}", meant=meant)
             case Stop(reason=reason):
                 self.end(reason or f"stopped by {asked.source}")
                 return Stopping()

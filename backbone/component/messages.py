@@ -22,6 +22,26 @@ class AskState(Message, frozen=True):
     """Who are you and how are you?"""
 
 
+class Absence(Message, frozen=True):
+    """A component that its owner wants and that does not run, or does not respond.
+
+    Attributes:
+        name: Name of the absent component.
+        since_s: Mission time at which its owner first missed it.
+        cause: Why it is absent: how it ended, or what refused its start. One line.
+        doing: What its owner does about it, one line; empty: nothing more.
+        remedy: What an operator can do; empty: nothing is needed.
+        vital: True if the mission cannot do its work without it (core services).
+    """
+
+    name: str
+    since_s: float
+    cause: str
+    doing: str = ""
+    remedy: str = ""
+    vital: bool = False
+
+
 class ComponentState(Message, frozen=True):
     """Answer to ``AskState``; also published as the component's status on every change.
 
@@ -34,6 +54,7 @@ class ComponentState(Message, frozen=True):
         since_s: Mission time at which it entered that state.
         feedback: One line for people: what it is doing.
         requester: Address of whoever had it started.
+        absent: Components that this one wants and that are absent.
     """
 
     address: str
@@ -44,6 +65,7 @@ class ComponentState(Message, frozen=True):
     since_s: float
     feedback: str = ""
     requester: str = ""
+    absent: list[Absence] = []
 
 
 class AskTime(Message, frozen=True):
@@ -135,9 +157,12 @@ class Stop(Message, frozen=True):
 
     Attributes:
         reason: For the record.
+        incarnation: The one life that is meant, ``<host>.<pid>``; empty: the component of this address, whichever
+            it is. Another life of the same address refuses with ``OtherIncarnation``.
     """
 
     reason: str = ""
+    incarnation: str = ""
 
 
 class Stopping(Message, frozen=True):

@@ -119,6 +119,8 @@ class ProcessState(Message, frozen=True):
         restarts: How often it was restarted.
         given_up: True if it ended too often and is left down.
         last_end: How it ended last, for people; empty if it never did.
+        silent_s: Seconds of the machine since its process last showed that its event loop runs; 0 while it is in time.
+        doing: What a component that is not ready yet is doing, for people.
     """
 
     spawn: Spawn
@@ -126,6 +128,8 @@ class ProcessState(Message, frozen=True):
     restarts: int
     given_up: bool
     last_end: str
+    silent_s: float = 0.0
+    doing: str = ""
 
 
 class Processes(Message, frozen=True):

@@ -1,0 +1,98 @@
+"""Health of a mission in one word, with the list of what is wanted and absent.
+
+Rules of this file: pure; what was observed goes in, the verdict comes out. Each owner reports the components that it
+wants and misses (``Component.absences``); this file joins these reports with what the observer itself found missing.
+
+* ``ok``: nothing that is wanted is absent.
+* ``degraded``: something is absent, and its owner works on it.
+* ``failed``: a vital component has been absent for longer than ``FAILED_AFTER_S``, or the owner of an absent
+  component has no further attempt to make.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import msgspec
+
+from backbone.component.messages import Absence, ComponentState
+
+FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery that is an aim (a killed creator, 5 s)
+
+
+class HealthWord(StrEnum):
+    """How a mission is."""
+
+    OK = "ok"
+    DEGRADED = "degraded"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """How a mission is, and what it lacks.
+
+    Attributes:
+        word: The verdict.
+        absent: What is wanted and absent: vital components first, then by name.
+    """
+
+    word: HealthWord
+    absent: tuple[Absence, ...] = ()
+
+    def lines(self, now_s: float) -> list[str]:
+        """Return one line for each absent component, for people."""
+        return [line(absence, now_s) for absence in self.absent]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return ``health`` and ``absent`` as plain data."""
+        return {"health": str(self.word), "absent": [msgspec.to_builtins(_fields(each)) for each in self.absent]}
+
+
+def line(absence: Absence, now_s: float) -> str:
+    """Return one absence as a line for people.
+
+    Example:
+        >>> line(Absence("scout1", 2.0, "killed by SIGKILL", "starts again in 0.1 s"), 3.5)
+        'scout1 is absent for 1.5 s: killed by SIGKILL; starts again in 0.1 s'
+    """
+    parts = [f"{absence.name} is absent for {max(0.0, now_s - absence.since_s):.1f} s: {absence.cause}"]
+    parts += [part for part in (absence.doing, absence.remedy) if part]
+    return "; ".join(parts)
+
+
+def health(
+    components: Mapping[str, ComponentState], missed: Iterable[Absence], now_s: float, rate: float = 1.0
+) -> Health:
+    """Return the mission's health.
+
+    Args:
+        components: State of each registered component, by address.
+        missed: What the observer itself misses: services that are not registered, or did not answer.
+        now_s: Mission time.
+        rate: Mission seconds per second of the machine.
+    """
+    absent: dict[str, Absence] = {}
+    for absence in (*missed, *(each for state in components.values() for each in state.absent)):
+        known = absent.get(absence.name)
+        if known is None or absence.since_s < known.since_s:
+            absent[absence.name] = absence
+    found = tuple(sorted(absent.values(), key=lambda each: (not each.vital, each.name)))
+    return Health(_word(found, now_s, rate), found)
+
+
+def _word(absent: Iterable[Absence], now_s: float, rate: float) -> HealthWord:
+    word = HealthWord.OK
+    for absence in absent:
+        too_long = absence.vital and now_s - absence.since_s > FAILED_AFTER_S * rate
+        if too_long or not absence.doing:
+            return HealthWord.FAILED
+        word = HealthWord.DEGRADED
+    return word
+
+
+def _fields(absence: Absence) -> dict[str, Any]:
+    return {name: getattr(absence, name) for name in absence.__struct_fields__}
