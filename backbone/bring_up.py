@@ -31,8 +31,10 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import Absence, Stop, Stopping
+from backbone.component.process import run_with_heartbeat
 from backbone.creator.messages import (
+    READY_WITHIN_S,
     EndedBy,
     ListProcesses,
     ProcessEnded,
@@ -50,10 +52,11 @@ from backbone.mission.model import Host, MissionDescription
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem, component_of
+from backbone.naming import Subsystem, address, component_of
 from backbone.operators import OperatorAction, tell_acted
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Ended, ListPlacements, Placements, Start, Started, StopComponent
+from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
+from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -62,7 +65,7 @@ START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of
 STOP_TIME_S = 10.0  # chosen: asking, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
 LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 CORE_POLICY = RestartPolicy(
-    back_off_s=0.02, back_off_most_s=0.5, limit=20, window_s=60.0, after_good_end=True
+    back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
 )  # chosen: a dead hub stops everybody, and leases outlast a restart of the RC manager only if its pause stays short
 FIRST_PORT, LAST_PORT = 20000, 32000  # chosen: below the ports the system hands out to outgoing connections
 
@@ -115,10 +118,6 @@ class MissionAlreadyUp(Refusal):
     remedy = "Take it down with 'scout-backbone down', or give this one another name."
 
 
-class CoreServiceLost(BackboneError):
-    """A core service ended so often that it was given up."""
-
-
 class Observer(Protocol):
     """Who watches a mission come up and go down."""
 
@@ -155,14 +154,17 @@ class Launcher(Component[NoParameters]):
         super().__init__(launch, bus, clock)
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
+        self._wishes: list[Wish] = []
         self.outcome = Outcome()
         keeper.on_fell = self._core_service_fell
+        keeper.on_silent = self._core_service_silent
+        keeper.on_changed = self.changed
 
     async def connect(self) -> None:
         """Start the core services in order, each waited for until it is ready."""
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
-                await self._keeper.start(launch, CORE_POLICY, START_TIME_S)
+                await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
 
     async def serve(self) -> None:
         """Start the mission through the placer, then let it run."""
@@ -198,6 +200,15 @@ class Launcher(Component[NoParameters]):
             return Processes(self.launch.host, [], self._keeper.processes())
         return await super().answer(asked)
 
+    def absences(self) -> list[Absence]:
+        """Return core services and components of the mission file that are wanted and missing."""
+        core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
+        mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
+        if self.outcome.ready_after_s is None:
+            name = self._description.name
+            mission.append(Absence(name, 0.0, "the mission is coming up", "its components are being started"))
+        return [*core, *mission]
+
     async def drain(self) -> None:
         """Stop the mission in reverse order of its start, then the core services but the nameserver."""
         async with self._step("stop consoles"):
@@ -221,17 +232,43 @@ class Launcher(Component[NoParameters]):
             await self._start_all(behavior_orders(description))
 
     async def _start_all(self, orders: list[Start]) -> None:
-        """Ask the placer for all of them at once.
+        """Have all of them running, and running again whenever one is missing; return when all run.
 
         Raises:
             Refusal: The first that could not be started.
         """
-        outcomes = await asyncio.gather(
-            *(self.bus.ask(PLACER, order, Started, within_s=START_TIME_S) for order in orders), return_exceptions=True
-        )
-        for outcome in outcomes:
-            if isinstance(outcome, BaseException):
-                raise outcome
+        placed = [asyncio.get_running_loop().create_future() for _ in orders]
+        for order, first in zip(orders, placed, strict=True):
+            self.start_task(self._keep(order, first), f"keep {order.name}")
+        await asyncio.gather(*placed)
+
+    async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
+        """Fulfill one wish of the mission file until the component is ordered to stop."""
+
+        def now_placed(_placement: Placement, _was_there: bool) -> None:
+            if not placed.done():
+                placed.set_result(None)
+
+        wish = Wish(order.name)
+        self._wishes.append(wish)
+        subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
+        try:
+            stopped = await keep_placed(
+                self.bus,
+                self.clock,
+                wish,
+                order,
+                address(subsystem, order.name),
+                on_placed=now_placed,
+                on_changed=self.changed,
+            )
+        except Refusal as refusal:
+            placed.set_exception(refusal)
+            return
+        finally:
+            placed.cancel()
+        self._wishes.remove(wish)
+        self.tell(order.name, f"is not wanted any more: {stopped}")
 
     # ------------------------------------------------------------------ stop
     async def _stop_consoles(self) -> None:
@@ -270,12 +307,11 @@ class Launcher(Component[NoParameters]):
 
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
-        self.story.note(fell.name, f"fell: {fell.how}")
-        if fell.restart_in_s < 0 and self.outcome.failure is None:
-            self.outcome.failure = CoreServiceLost(
-                f"{fell.name} fell too often: {fell.how}\n" + "\n".join(fell.last_lines)
-            )
-            self.end(f"{fell.name} was given up")
+        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
+
+    def _core_service_silent(self, name: str, silent_s: float) -> None:
+        self.tell(name, f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again")
+        self.changed()
 
     @contextlib.asynccontextmanager
     async def _step(self, step: str) -> AsyncIterator[None]:
@@ -342,7 +378,7 @@ async def _with_hub(
     loop.add_signal_handler(signal.SIGTERM, launcher.end, signal.SIGTERM.name)
     loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
     try:
-        await launcher.run()
+        await run_with_heartbeat(own, clock, launcher.run(), lambda: launcher.feedback or str(launcher.state))
     except BackboneError as error:
         launcher.outcome.failure = launcher.outcome.failure or error
     finally:

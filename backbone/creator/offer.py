@@ -68,7 +68,7 @@ async def offer(mission: str, endpoint: str, host: str, tags: Sequence[str]) -> 
             requester=source,
             run_directory=str(directory),
         )
-        await keeper.start(launch, RestartPolicy(after_good_end=True), READY_WITHIN_S)
+        await keeper.start(launch, RestartPolicy(), READY_WITHIN_S)
         return await ended
     finally:
         await keeper.close()
