@@ -63,8 +63,7 @@ class Fault:
             return True
         restarts, restarts_before = look.sight.get("restarts", {}), before.sight.get("restarts", {})
         return any(
-            look.pid(row) != before.pid(row) or restarts.get(row, 0) != restarts_before.get(row, 0)
-            for row in self.rows
+            look.pid(row) != before.pid(row) or restarts.get(row, 0) != restarts_before.get(row, 0) for row in self.rows
         )
 
 
