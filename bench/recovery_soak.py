@@ -98,10 +98,8 @@ def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
         seen.add(pid)
         with contextlib.suppress(psutil.Error):
             process = psutil.Process(pid)
-            shared = next(
-                (row for row, rows in ROWS.items() if name in rows and len(rows) > 1 and "zygote" not in row), ""
-            )
-            found[shared or name] = {
+            shared = "hardware" if name in HARDWARE else name
+            found[shared] = {
                 "mb": round(process.memory_full_info().uss / 1e6, 1),
                 "fds": process.num_fds(),
                 "threads": process.num_threads(),
@@ -113,7 +111,5 @@ def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
 def compared(name: str, before: dict[str, float], after: dict[str, float]) -> dict[str, Any]:
     """Return what a process used before and after, and what of it has grown by more than ``GROWTH``."""
     both = {kind: [before[kind], after.get(kind)] for kind in before}
-    grown = [
-        kind for kind, (was, now) in both.items() if was is not None and now is not None and now > was * (1 + GROWTH)
-    ]
+    grown = [kind for kind, (was, now) in both.items() if now is not None and now > (was or 0.0) * (1 + GROWTH)]
     return {"process": name, **both, "grown": grown}
