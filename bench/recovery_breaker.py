@@ -51,6 +51,7 @@ CALM_S = 6.0  # chosen: longer than a turn, so that the usual gap of pictures at
 STAYS_S = 2.0  # chosen: twice the time for which a component waits for a companion out of sight
 MENDED_WITHIN_S = 40.0  # chosen: what takes longer is not mended
 DOWN_WITHIN_S = 30.0
+SHOWN = 5  # how many violations are spelt out
 
 
 class Breaker:
@@ -149,7 +150,8 @@ class Breaker:
             "up_exit": self.mission.launcher.poll(),
             "left": len(left),
             "folder_left": self.mission.directory.exists(),
-            "violations": violations(self.mission.trace),
+            "violations": len(broken := violations(self.mission.trace)),
+            **({"violated": broken[:SHOWN]} if broken else {}),
         }
 
 
@@ -164,16 +166,16 @@ def rounded(seconds: float | None) -> float | None:
     return None if seconds is None else round(seconds, 2)
 
 
-def violations(trace: Path) -> int | str:
-    """Return how many rules the trace breaks; a text where no judge of traces is at hand."""
+def violations(trace: Path) -> list[str]:
+    """Return the rules the trace breaks, for people; a text where no judge of traces is at hand."""
     if not trace.exists():
-        return "no trace"
+        return ["no trace"]
     try:
         judging = judge()
     except pytest.skip.Exception:
-        return "no judge"
+        return ["no judge"]
     events = [json.loads(line) for line in trace.read_text().splitlines() if line.endswith("}")]
-    return len(judging.check(events))
+    return [f"{found.code} at {found.t} {found.arc}: {found.msg}" for found in judging.check(events)]
 
 
 @contextlib.contextmanager

@@ -48,7 +48,7 @@ def struck_coming_up(victim: str, name: str, patience_s: float) -> dict[str, Any
             breaking.attend(fault)
             if is_up(mission):
                 whole_s = breaking.watch.looks[-1].at_s
-        up = {"up_in_s": rounded(None if whole_s == math.inf else whole_s - fault.at_s)}
+        up: dict[str, Any] = {"up_in_s": rounded(None if whole_s == math.inf else whole_s - fault.at_s)}
         while fault.lifted_s == math.inf:
             time.sleep(POLL_S)
             breaking.attend(fault)

@@ -321,11 +321,30 @@ def test_an_rc_that_does_not_confirm_counts_as_held_until_its_lease_is_over(pool
             await here.clock.sleep_s(LEASE_S - 0.1)
             assert not one.is_open
             assert not two.is_open
+            await here.clock.sleep_s(0.2)
             here.rcs["left"].hangs = False
             here.rcs["left"].holders.clear()
             await here.clock.sleep_s(2.0)
             assert two.is_open
             assert two.granted_s >= asked_s + LEASE_S - 1e-6
+
+    run_virtual(main())
+
+
+def test_an_rc_that_was_away_is_free_as_soon_as_it_says_so_itself(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            here.rcs["left"].end("it is killed")
+            await here.clock.sleep_s(0.3)
+            assert not one.is_open
+            came_back_s = here.clock.now_s()
+            await here.rc(HARDWARE[0])
+            await here.clock.sleep_s(LEASE_S)
+            assert one.is_open
+            assert one.granted_s - came_back_s < 0.3  # and not only when the lease of its earlier life is over
 
     run_virtual(main())
 
