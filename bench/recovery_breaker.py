@@ -101,6 +101,8 @@ class Breaker:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(fault.pid, signal.SIGCONT)
             fault.lifted_s = now_s
+        if fault.name == "SIGTERM" and now_s > fault.at_s + STAYS_S and psutil.pid_exists(fault.pid):
+            fault.replaced_s = min(fault.replaced_s, fault.at_s)  # zygotes take no notice of it
         if fault.victim.endswith("zygote") and fault.replaced_s == math.inf and self.watch.looks:
             look = self.watch.looks[-1]
             keeper = "launcher" if fault.victim == "core_zygote" else "creator-base"
