@@ -93,6 +93,10 @@ class Breaker:
                 os.kill(fault.pid, number)
             if fault.kills:
                 fault.lifted_s = fault.at_s
+            if fault.victim.endswith("zygote") and fault.name == "SIGTERM":
+                time.sleep(POLL_S)
+                if any(process.pid == fault.pid for process in marked_of(self.mission)):
+                    fault.replaced_s = fault.at_s  # zygotes take no notice of it
 
     def attend(self, fault: Fault) -> None:
         """Let a stopped process go on when its time has come; see whether what is no component was replaced."""
@@ -101,8 +105,6 @@ class Breaker:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(fault.pid, signal.SIGCONT)
             fault.lifted_s = now_s
-        if fault.name == "SIGTERM" and now_s > fault.at_s + STAYS_S and psutil.pid_exists(fault.pid):
-            fault.replaced_s = min(fault.replaced_s, fault.at_s)  # zygotes take no notice of it
         if fault.victim.endswith("zygote") and fault.replaced_s == math.inf and self.watch.looks:
             look = self.watch.looks[-1]
             keeper = "launcher" if fault.victim == "core_zygote" else "creator-base"
@@ -169,15 +171,25 @@ def rounded(seconds: float | None) -> float | None:
 
 
 def violations(trace: Path) -> list[str]:
-    """Return the rules the trace breaks, for people; a text where no judge of traces is at hand."""
+    """Return the rules the trace breaks, for people; a text where no judge of traces is at hand.
+
+    Each life of the RC manager is judged by itself: it begins with a ``meta`` line, and with what it adopts.
+    """
     if not trace.exists():
         return ["no trace"]
     try:
         judging = judge()
     except pytest.skip.Exception:
         return ["no judge"]
-    events = [json.loads(line) for line in trace.read_text().splitlines() if line.endswith("}")]
-    return [f"{found.code} at {found.t} {found.arc}: {found.msg}" for found in judging.check(events)]
+    lives: list[list[dict[str, Any]]] = []
+    for line in trace.read_text().splitlines():
+        if line.endswith("}"):  # one that was killed may not have finished its last line
+            event = json.loads(line)
+            if event["ev"] == "meta":
+                lives.append([])
+            lives[-1].append(event)
+    broken = [found for life in lives for found in judging.check(life)]
+    return [f"{found.code} at {found.t} {found.arc}: {found.msg}" for found in broken]
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from recovery_mission import Look, console_arcs
 
-PICTURES_FLOW_S = 1.5  # chosen: at a switch the picture settles for 0.3 s; five times that is no switch
+PICTURES_FLOW_S = 0.6  # chosen: twice the time for which a picture settles at a switch
 
 
 @dataclass(slots=True)
