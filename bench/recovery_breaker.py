@@ -107,8 +107,8 @@ class Breaker:
             fault.lifted_s = now_s
         if fault.victim.endswith("zygote") and fault.replaced_s == math.inf and self.watch.looks:
             look = self.watch.looks[-1]
-            keeper = "launcher" if fault.victim == "core_zygote" else "creator-base"
-            if "rows" in look.sight and self.mission.zygote_of(look.pid(keeper), look) not in (0, fault.pid):
+            keeper_pid = self.mission.launcher.pid if fault.victim == "core_zygote" else look.pid("creator-base")
+            if "rows" in look.sight and self.mission.zygote_of(keeper_pid, look) not in (0, fault.pid):
                 fault.replaced_s = now_s
 
     def see_through(self, expected: Expected, faults: Sequence[Fault]) -> dict[str, Any]:

@@ -182,7 +182,7 @@ class BenchMission:
     def processes(self, look: Look) -> dict[str, int]:
         """Return the process of everything that can be a victim by its own name, the zygotes included."""
         found = {name: look.pid(name) for name in look.sight["rows"] if look.pid(name)}
-        found["core_zygote"] = self.zygote_of(found["launcher"], look)
+        found["core_zygote"] = self.zygote_of(self.launcher.pid, look)
         found["zygote"] = self.zygote_of(found.get("creator-base", 0), look)
         return {name: pid for name, pid in found.items() if pid}
 

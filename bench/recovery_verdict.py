@@ -112,10 +112,11 @@ class Judgement:
                 self._judge(look, pictures_s, began_s)
 
     def _judge(self, look: Look, pictures_s: Sequence[float], began_s: float) -> None:
-        whole = not self.lacks(look, pictures_s)
+        lacking = self.lacks(look, pictures_s)
+        whole = not lacking
         if self.noticed_s == math.inf and any(f.is_noticed(look, self.expected.before) for f in self.faults):
             self.noticed_s = look.at_s
-        if not whole and look.word == "ok":
+        if set(lacking) - {"console as a process"} and look.word == "ok":  # a person's, and no wish of the mission
             self._unsaid_since_s = min(self._unsaid_since_s, max(began_s, look.began_s))
             self.unsaid_s = max(self.unsaid_s, look.at_s - self._unsaid_since_s)
         else:

@@ -38,7 +38,8 @@ log = logging.getLogger(__name__)
 
 RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
 ASK_AGAIN_S = 0.1  # chosen: a killed RC is back after two or three of these; a twentieth of a lease
-ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it answers
+ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
+CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; one that hangs must not cost the next its turn
 
 Note = Callable[[str, str], Any]
 
@@ -132,7 +133,7 @@ class ContextSwitch:
         return True
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
-        within_s = ARC_REPLY_S + question.deadline_s / self._clock.rate
+        within_s = CLOSE_S + question.deadline_s / self._clock.rate
         try:
             await self._bus.ask(_in_pool(arc), question, GateClosed, within_s=within_s)
         except (Refusal, LinkError) as error:
