@@ -19,9 +19,9 @@ from typing import Any
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
-from backbone.bus.zenoh_bus import HubUnreachable, ZenohBus, client_config
+from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import Absence
-from backbone.errors import LinkError, Refusal
+from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.health import Health, health
 from backbone.keys import Conversation
 from backbone.mission_picture import MissionPicture, look
