@@ -10,7 +10,7 @@ import asyncio
 import json
 import os
 import sys
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager
 from enum import IntEnum
 from importlib import import_module
@@ -20,6 +20,7 @@ from typing import Annotated, Any
 import typer
 
 from backbone.errors import BackboneError, LinkError, Refusal, code_of
+from backbone.printable import printable_lines
 
 
 class ExitCode(IntEnum):
@@ -65,8 +66,25 @@ def main() -> None:
 
 
 def say(line: str) -> None:
-    """Talk to the person."""
-    print(line, file=sys.stderr, flush=True)
+    """Talk to the person; whatever the line quotes of the bus, it is printable."""
+    print(printable_lines(line), file=sys.stderr, flush=True)
+
+
+def show(lines: Iterable[str]) -> None:
+    """Print data for people on stdout, printable."""
+    for line in lines:
+        print(printable_lines(line), flush=True)
+
+
+def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
+    """Return what a person reads of an error that ended a command, and the command's exit code."""
+    match error:
+        case Refusal():
+            code = ExitCode.NO_BACKBONE if code_of(error).startswith("run.") else ExitCode.REFUSED
+            return f"refused [{code_of(error)}]: {error}", code
+        case LinkError():
+            return f"no answer: {error} (is the mission up? see 'scout-backbone status')", ExitCode.NO_BACKBONE
+    return str(error), ExitCode.UNEXPECTED
 
 
 def run(work: Callable[[], Awaitable[int]]) -> None:
@@ -79,15 +97,9 @@ def run(work: Callable[[], Awaitable[int]]) -> None:
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             code = runner.run(guarded())
-    except Refusal as refusal:
-        say(f"refused [{code_of(refusal)}]: {refusal}")
-        code = ExitCode.NO_BACKBONE if code_of(refusal).startswith("run.") else ExitCode.REFUSED
-    except LinkError as error:
-        say(f"no answer: {error} (is the mission up? see 'scout-backbone status')")
-        code = ExitCode.NO_BACKBONE
     except BackboneError as error:
-        say(str(error))
-        code = ExitCode.UNEXPECTED
+        line, code = complaint_of(error)
+        say(line)
     raise typer.Exit(int(code))
 
 
@@ -183,10 +195,11 @@ def up(
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
     from backbone.bring_up import UpOptions
     from backbone.mission_console import bring_up_on_console
+    from backbone.verdict import VerdictPipe
 
     options = UpOptions(speed=speed, trace=trace, for_s=for_s)
-    ready_to = os.fdopen(tell_fd, "w", encoding="utf-8") if tell_fd is not None else None
-    run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), ready_to=ready_to))
+    verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
+    run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), verdict=verdict))
 
 
 @app.command()

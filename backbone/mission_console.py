@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections import deque
-from typing import Any, TextIO
+from typing import Any
 
 from rich.console import Console
 from rich.live import Live
 
 from backbone.bring_up import Outcome, UpOptions, run_mission
 from backbone.bus.interface import Bus, Clock
-from backbone.cli import ExitCode
+from backbone.cli import ExitCode, complaint_of
 from backbone.component.messages import StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
@@ -20,8 +20,10 @@ from backbone.mission.model import MissionDescription
 from backbone.mission_picture import holders_line, look
 from backbone.mission_screen import live_screen
 from backbone.operators import OperatorActed
+from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
+from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
@@ -34,11 +36,11 @@ class ConsoleObserver:
     Args:
         console: Where to.
         live: True: a picture that is redrawn; False: lines.
-        ready_to: Told the same lines until all is ready, then closed: the one who waits for that.
+        verdict: Pipe to the command that waits until all is ready; None: no command waits.
     """
 
-    def __init__(self, console: Console, *, live: bool, ready_to: TextIO | None = None) -> None:
-        self._console, self._live, self._ready_to = console, live, ready_to
+    def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
+        self._console, self._live, self._verdict = console, live, verdict
         self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
         self._told = ""
 
@@ -55,20 +57,23 @@ class ConsoleObserver:
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
 
     def tell(self, line: str) -> None:
-        """Print one line, also to whoever waits for readiness."""
+        """Print one line, also for the command that waits until all is ready."""
         self._print(line)
-        if self._ready_to is not None:
-            print(line, file=self._ready_to, flush=True)
+        if self._verdict is not None:
+            self._verdict.talk(line)
+
+    def decide(self, exit_code: int) -> None:
+        """Give the command that waits its exit code, unless it has one."""
+        if self._verdict is not None:
+            self._verdict.decide(exit_code)
 
     def _print(self, line: str) -> None:
-        self._console.print(line, highlight=False, markup=False, soft_wrap=True)
+        self._console.print(printable_lines(line), highlight=False, markup=False, soft_wrap=True)
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Show the mission until cancelled."""
         self.tell("all ready; end with Ctrl-C or 'scout-backbone down'")
-        if self._ready_to is not None:
-            self._ready_to.close()
-            self._ready_to = None
+        self.decide(ExitCode.DONE)
         if self._live:
             await self._show_live(bus, clock)
         else:
@@ -87,11 +92,11 @@ class ConsoleObserver:
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
     def _heard_act(self, envelope: Envelope[Any]) -> None:
-        act: OperatorActed = envelope.body
+        act: OperatorActed = printable_all(envelope.body)
         self._show_event(StoryEvent(act.at_s, envelope.source, act.sentence, act.subject, envelope.cause))
 
     def _heard_event(self, envelope: Envelope[Any]) -> None:
-        self._show_event(envelope.body)
+        self._show_event(printable_all(envelope.body))
 
     def _show_event(self, event: StoryEvent) -> None:
         self._events.append(event)
@@ -109,22 +114,25 @@ class ConsoleObserver:
 
 
 async def bring_up_on_console(
-    description: MissionDescription, options: UpOptions, *, live: bool, ready_to: TextIO | None = None
+    description: MissionDescription, options: UpOptions, *, live: bool, verdict: VerdictPipe | None = None
 ) -> int:
     """Run the mission, tell a person about it, and return the exit code."""
     console = Console(file=sys.stdout if live else sys.stderr)
-    observer = ConsoleObserver(console, live=live, ready_to=ready_to)
+    observer = ConsoleObserver(console, live=live, verdict=verdict)
     observer.tell(f"mission {description.name} comes up")
     try:
         outcome = await run_mission(description, options, observer)
     except (Refusal, LinkError) as error:
         observer.tell(f"could not be started: {error}")
+        observer.decide(complaint_of(error)[1])
         raise
     except BackboneError as error:
         outcome = Outcome(failure=error)
     for line in last_lines(outcome):
         observer.tell(line)
-    return ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
+    code = ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
+    observer.decide(code)
+    return code
 
 
 def last_lines(outcome: Outcome) -> list[str]:
