@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import sys
 from collections.abc import Awaitable, Callable, Iterable
@@ -47,6 +48,10 @@ app = typer.Typer(
 
 EXPERIMENTS = "mission_control.experiments.cli"
 SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
+LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to work out
+LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer one is a slip of the hand
+MOST_SEEDS = 1_000_000  # chosen: a day of work
+LARGEST_SEED = 2**32 - 1  # as numpy has it
 PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
 
 MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
@@ -55,6 +60,13 @@ Endpoint = Annotated[
     str | None, typer.Option("--connect", help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse what is no number, which no range refuses; for options with a range."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
+    return value
 
 
 def main() -> None:
@@ -130,7 +142,10 @@ def check(
         bool, typer.Option("--dry-run", help="Also work out placement and the first minute of the schedule.")
     ] = False,
     for_s: Annotated[
-        float | None, typer.Option("--for", min=0.1, help="Mission seconds of the dry run; default: 60.")
+        float | None,
+        typer.Option(
+            "--for", min=0.1, max=LONGEST_DRY_RUN_S, callback=finite, help="Mission seconds of the dry run; default: 60."
+        ),
     ] = None,
     trace: Annotated[
         Path | None, typer.Option("--trace", help="Write the dry run's scheduling decisions, JSON lines.")
@@ -182,9 +197,16 @@ def up(
     mission_file: MissionFile,
     headless: Annotated[bool, typer.Option("--headless", help="No live picture; one line a step.")] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Return when all is ready; the mission goes on.")] = False,
-    speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.01, max=100.0, callback=finite, help="Mission seconds a second.")
+    ] = 1.0,
     trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
-    for_s: Annotated[float | None, typer.Option("--for", min=0.0, help="End after these mission seconds.")] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option(
+            "--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."
+        ),
+    ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
@@ -390,8 +412,8 @@ def creator(
 
 @app.command()
 def simulate(
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="How many missions.")] = 100,
-    first: Annotated[int, typer.Option("--first", min=0, help="Seed of the first.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, max=MOST_SEEDS, help="How many missions.")] = 100,
+    first: Annotated[int, typer.Option("--first", min=0, max=LARGEST_SEED, help="Seed of the first.")] = 0,
     chaos: Annotated[
         bool, typer.Option("--chaos", help="Lose, delay and double messages, cut off and kill components.")
     ] = False,

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 from backbone.bus.interface import Clock, current_cause
 from backbone.component.messages import StoryEvent
+from backbone.printable import printable_all
 
 LENGTH = 512  # chosen: some minutes of a busy component, under 100 kB
 
@@ -25,8 +26,8 @@ class StoryBook:
         self._events: deque[StoryEvent] = deque(maxlen=LENGTH)
 
     def note(self, subject: str, what: str) -> StoryEvent:
-        """Keep that this happened to the subject now, because of the message being handled."""
-        event = StoryEvent(self._clock.now_s(), self._where, what, subject, current_cause.get())
+        """Keep that this happened to the subject now, because of the message being handled; as printable text."""
+        event = printable_all(StoryEvent(self._clock.now_s(), self._where, what, subject, current_cause.get()))
         self._events.append(event)
         return event
 
