@@ -59,6 +59,9 @@ MissionName = Annotated[str | None, typer.Option("--mission", help="Name of the 
 Endpoint = Annotated[
     str | None, typer.Option("--connect", help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission.")
 ]
+NameOrCause = Annotated[
+    str, typer.Argument(help="A name, an address, or a cause as stories show it: backbone/rc_manager#112.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
@@ -83,9 +86,9 @@ def say(line: str) -> None:
 
 
 def show(lines: Iterable[str]) -> None:
-    """Print data for people on stdout, printable."""
+    """Print data on stdout, printable and whole."""
     for line in lines:
-        print(printable_lines(line), flush=True)
+        print(printable_lines(line, most=sys.maxsize), flush=True)
 
 
 def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
@@ -144,7 +147,7 @@ def check(
     for_s: Annotated[
         float | None,
         typer.Option(
-            "--for", min=0.1, max=LONGEST_DRY_RUN_S, callback=finite, help="Mission seconds of the dry run; default: 60."
+            "--for", min=0.1, max=LONGEST_DRY_RUN_S, callback=finite, help="Mission seconds of the dry run; or 60."
         ),
     ] = None,
     trace: Annotated[
@@ -171,7 +174,7 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
     from backbone.dry_run_screen import screen
 
     dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
-    Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(screen(dry))
+    Console(width=_width(), markup=False, emoji=False).print(screen(dry))
     if trace is not None:
         try:
             dry.write_trace(trace)
@@ -203,9 +206,7 @@ def up(
     trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
     for_s: Annotated[
         float | None,
-        typer.Option(
-            "--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."
-        ),
+        typer.Option("--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."),
     ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
@@ -231,63 +232,52 @@ def status(
     mission: MissionName = None,
     connect: Endpoint = None,
 ) -> None:
-    """Show components by subsystem, who holds which resource, and the schedule."""
+    """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
 
     async def work() -> int:
-        from rich.console import Console
-        from rich.live import Live
+        from backbone.status import Shown, show_status
 
-        from backbone.mission_picture import look
-        from backbone.mission_screen import live_screen, screen
-
-        async with visiting(mission, connect) as (bus, clock):
-            if as_json:
-                print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
-                while watch:
-                    await clock.sleep_s(clock.rate)
-                    print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
-                return ExitCode.DONE
-            console = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
-            if not watch:
-                console.print(screen(await look(bus, clock.now_s())))
-                return ExitCode.DONE
-            with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
-                while True:
-                    live.update(live_screen(await look(bus, clock.now_s()), None, console.height), refresh=True)
-                    await clock.sleep_s(0.5 * clock.rate)
+        if connect is not None and mission is None:
+            raise typer.BadParameter("--connect needs --mission NAME")
+        source = f"ui_console/cli-{os.getpid()}"
+        return await show_status(mission, connect, source, Shown(as_json=as_json, watch=watch, width=_width()))
 
     run(work)
 
 
 @app.command()
-def why(name: str, as_json: AsJson = False, mission: MissionName = None, connect: Endpoint = None) -> None:
+def why(name: NameOrCause, as_json: AsJson = False, mission: MissionName = None, connect: Endpoint = None) -> None:
     """Say why a request waits or runs, why a component is where it is, until when."""
 
     async def work() -> int:
         from backbone.reasons import reasons_for
 
         async with visiting(mission, connect) as (bus, clock):
-            reasons = await reasons_for(bus, name)
-            if as_json:
-                print(json.dumps(reasons.to_json()))
-            else:
-                print("\n".join(reasons.lines(clock.now_s())))
+            reasons = await reasons_for(bus, name, clock)
+            show([json.dumps(reasons.to_json())] if as_json else reasons.lines(clock.now_s()))
         return ExitCode.DONE
 
     run(work)
 
 
 @app.command()
-def story(name: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+def story(name: NameOrCause, mission: MissionName = None, connect: Endpoint = None) -> None:
     """Tell the events that touched a component, request or resource, with their causes."""
 
     async def work() -> int:
         from backbone.reasons import story_of
 
         async with visiting(mission, connect) as (bus, _clock):
-            for event in await story_of(bus, name):
-                cause = f"   because of {event.cause}" if event.cause else ""
-                print(f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}")
+            told = await story_of(bus, name)
+        for event in told.events:
+            cause = f"   because of {event.cause}" if event.cause else ""
+            show([f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}"])
+        if not told.events:
+            say(f"no component has an event about {name}")
+        if told.missing:
+            say(f"incomplete: {len(told.missing)} did not tell their part")
+            for missing in told.missing:
+                say(f"  {missing}")
         return ExitCode.DONE
 
     run(work)
@@ -315,7 +305,7 @@ def start(
         async with visiting(mission, connect) as (bus, clock):
             started = await bus.ask(ADDRESS, Start(type_, name, parameters, host), Started, within_s=60.0)
             tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
-            print(f"{started.address} on {started.host}, process {started.pid}")
+            show([f"{started.address} on {started.host}, process {started.pid}"])
             for reason in started.reasons:
                 say(reason)
         return ExitCode.DONE
@@ -334,7 +324,7 @@ def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> No
         async with visiting(mission, connect) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
             tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
-            print(f"{name} ended by {ended.by}")
+            show([f"{name} ended by {ended.by}"])
         return ExitCode.DONE
 
     run(work)
@@ -370,7 +360,7 @@ def set_(
                     lines = [json.dumps(shown.to_json())]
                 else:
                     lines = shown.lines() if parameter is None else shown.of(parameter)
-            print("\n".join(lines))
+            show(lines)
         return ExitCode.DONE
 
     run(work)
@@ -433,6 +423,11 @@ def simulate(
 def experiment(context: typer.Context) -> None:
     """Run the papers' experiments on simulated robots: 'surveillance', 'load'; see 'experiment --help'."""
     import_module(EXPERIMENTS).run(context.args)
+
+
+def _width() -> int | None:
+    """Return how wide tables are; None: as the terminal."""
+    return None if sys.stdout.isatty() else PIPE_WIDTH
 
 
 def _parameter(given: str) -> tuple[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from rich.console import Console
 from rich.live import Live
+from rich.text import Text
 
 from backbone.bring_up import Outcome, UpOptions, run_mission
 from backbone.bus.interface import Bus, Clock
@@ -17,7 +18,7 @@ from backbone.component.messages import StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
-from backbone.mission_picture import holders_line, look
+from backbone.mission_picture import MissionPicture, holders_line, look
 from backbone.mission_screen import live_screen
 from backbone.operators import OperatorActed
 from backbone.printable import printable_all, printable_lines
@@ -82,13 +83,14 @@ class ConsoleObserver:
 
     async def _show_live(self, bus: Bus, clock: Clock) -> None:
         console = self._console
+        picture: MissionPicture | None = None
         with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
             while True:
                 try:
-                    picture = await look(bus, clock.now_s())
+                    picture = await look(bus, clock.now_s(), before=picture, rate=clock.rate)
                     live.update(live_screen(picture, self._events, console.height), refresh=True)
                 except LinkError as error:
-                    live.update(f"the nameserver does not answer: {error}", refresh=True)
+                    live.update(Text(f"the nameserver does not answer: {error}"), refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
     def _heard_act(self, envelope: Envelope[Any]) -> None:
@@ -117,7 +119,7 @@ async def bring_up_on_console(
     description: MissionDescription, options: UpOptions, *, live: bool, verdict: VerdictPipe | None = None
 ) -> int:
     """Run the mission, tell a person about it, and return the exit code."""
-    console = Console(file=sys.stdout if live else sys.stderr)
+    console = Console(file=sys.stdout if live else sys.stderr, markup=False, emoji=False)
     observer = ConsoleObserver(console, live=live, verdict=verdict)
     observer.tell(f"mission {description.name} comes up")
     try:

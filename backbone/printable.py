@@ -38,17 +38,17 @@ def printable(text: str, most: int = MOST_CHARACTERS) -> str:
     return shown if len(text) <= most else f"{shown}… ({len(text) - most} more)"
 
 
-def printable_lines(text: str) -> str:
+def printable_lines(text: str, most: int = MOST_CHARACTERS) -> str:
     r"""Return the text with its lines kept, each of them printable.
 
     Example:
         >>> printable_lines("one\ntwo\tthree")
         'one\ntwo    three'
     """
-    if text.isprintable() and len(text) <= MOST_CHARACTERS:
+    if text.isprintable() and len(text) <= most:
         return text
     lines = text.split("\n")
-    shown = [printable(line.replace("\t", "    ")) for line in lines[:MOST_LINES]]
+    shown = [printable(line.replace("\t", "    "), most) for line in lines[:MOST_LINES]]
     return "\n".join([*shown, f"… ({len(lines) - MOST_LINES} lines more)"] if len(lines) > MOST_LINES else shown)
 
 

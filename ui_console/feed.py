@@ -149,7 +149,7 @@ class ConsoleFeed:
     async def why(self, name: str) -> list[str]:
         """Return for people why this robot, ARC, behavior, console or component is as it is."""
         try:
-            return (await reasons_for(self._bus, name)).lines(self._clock.now_s())
+            return (await reasons_for(self._bus, name, self._clock)).lines(self._clock.now_s())
         except Refusal as refusal:
             return [refusal.detail, refusal.remedy]
         except LinkError as error:

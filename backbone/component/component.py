@@ -35,6 +35,7 @@ from backbone.component.messages import (
     MissionTime,
     Parameters,
     SetParameter,
+    StandingStop,
     Statistics,
     Stop,
     Stopping,
@@ -166,6 +167,10 @@ class Component(Generic[P]):
         """Return the components this one wants and that are absent; call ``changed`` when the answer changes."""
         return []
 
+    def standing_stop(self) -> StandingStop | None:
+        """Return the emergency stop in force on this component; call ``changed`` when the answer changes."""
+        return None
+
     def publish_news(self) -> None:
         """Publish what spectators should know now.
 
@@ -250,6 +255,7 @@ class Component(Generic[P]):
             self.feedback,
             launch.requester,
             self.absences(),
+            self.standing_stop(),
         )
 
     # ------------------------------------------------------------------ the shell

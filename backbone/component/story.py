@@ -32,13 +32,13 @@ class StoryBook:
         return event
 
     def of(self, subject: str = "") -> list[StoryEvent]:
-        """Return the events about a subject, or all, oldest first."""
+        """Return the events about a subject or because of a message, or all, oldest first."""
         return [event for event in self._events if not subject or _is_about(event, subject)]
 
 
 def _is_about(event: StoryEvent, subject: str) -> bool:
-    """Say whether the event's subject or a whole name in its text is this one: not scout10 for scout1."""
-    return event.subject == subject or _spoken_of(subject).search(event.what) is not None
+    """Say whether the event's subject, its cause or a whole name in its text is this one: not scout10 for scout1."""
+    return subject in (event.subject, event.cause) or _spoken_of(subject).search(event.what) is not None
 
 
 @lru_cache(maxsize=64)

@@ -129,7 +129,7 @@ def surveillance(
 def load(
     policy: Annotated[Policy, typer.Option("--policy", help="How to ask.")] = Policy.PAPER,
     channels: Annotated[int, typer.Option("--channels", min=1, max=4, help="Video frequencies.")] = 1,
-    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, callback=finite, help="Share of time driven.")] = 1.0,
+    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, callback=finite, help="Share of time")] = 1.0,
     trials: Trials = 100,
     seed: Seed = 1,
     jobs: Jobs = 0,

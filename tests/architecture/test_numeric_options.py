@@ -47,7 +47,7 @@ def test_there_are_numeric_options() -> None:
 
 
 @pytest.mark.parametrize("value", ["1e400", "nan", "inf", "-inf", "-1e12", "1e12"])
-@pytest.mark.parametrize(("program", "command", "option", "is_whole"), OPTIONS, ids=lambda each: str(each))
+@pytest.mark.parametrize(("program", "command", "option", "is_whole"), OPTIONS, ids=str)
 def test_a_number_out_of_its_range_is_wrong_usage(
     program: str, command: str, option: str, is_whole: bool, value: str
 ) -> None:
