@@ -31,7 +31,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import Absence, Stop, Stopping
 from backbone.creator.messages import (
     EndedBy,
     ListProcesses,
@@ -45,6 +45,7 @@ from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.health_watch import HealthWatch
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission_picture import LAUNCHER
@@ -155,6 +156,7 @@ class Launcher(Component[NoParameters]):
         super().__init__(launch, bus, clock)
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
+        self._health_watch = HealthWatch(bus, clock, self.changed)
         self.outcome = Outcome()
         keeper.on_fell = self._core_service_fell
 
@@ -165,7 +167,8 @@ class Launcher(Component[NoParameters]):
                 await self._keeper.start(launch, CORE_POLICY, START_TIME_S)
 
     async def serve(self) -> None:
-        """Start the mission through the placer, then let it run."""
+        """Start the mission through the placer, then let it run; publish its health meanwhile."""
+        self.start_task(self._health_watch.run(), "health")
         try:
             await self._start_mission()
         except BackboneError as error:
@@ -191,6 +194,10 @@ class Launcher(Component[NoParameters]):
         """End because the operator pressed Ctrl-C."""
         tell_acted(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
         self.end(signal.SIGINT.name)
+
+    def absences(self) -> list[Absence]:
+        """Return the core services and processes that the launcher misses."""
+        return self._health_watch.absences()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Tell of the core services' processes."""

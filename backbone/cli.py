@@ -267,8 +267,8 @@ def story(name: NameOrCause, mission: MissionName = None, connect: Endpoint = No
     async def work() -> int:
         from backbone.reasons import story_of
 
-        async with visiting(mission, connect) as (bus, _clock):
-            told = await story_of(bus, name)
+        async with visiting(mission, connect) as (bus, clock):
+            told = await story_of(bus, name, clock)
         for event in told.events:
             cause = f"   because of {event.cause}" if event.cause else ""
             show([f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}"])

@@ -16,9 +16,10 @@ from backbone.bus.interface import Bus, Clock
 from backbone.cli import ExitCode, complaint_of
 from backbone.component.messages import StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.health import HealthWord, MissionHealth, line
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
-from backbone.mission_picture import MissionPicture, holders_line, look
+from backbone.mission_picture import LAUNCHER, MissionPicture, holders_line, look
 from backbone.mission_screen import live_screen
 from backbone.operators import OperatorActed
 from backbone.printable import printable_all, printable_lines
@@ -43,7 +44,7 @@ class ConsoleObserver:
     def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
         self._console, self._live, self._verdict = console, live, verdict
         self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
-        self._told = ""
+        self._told = self._health_told = ""
 
     def began(self, step: str) -> None:
         """Say nothing yet: a step that hangs is named by ``Outcome.failure``."""
@@ -53,7 +54,8 @@ class ConsoleObserver:
         self.tell(f"  ✓ {step:<42} {took_s * 1000:7.0f} ms")
 
     def connected(self, bus: Bus) -> None:
-        """Listen to what components tell people."""
+        """Listen to what components tell people, and to the mission's health."""
+        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
 
@@ -93,6 +95,19 @@ class ConsoleObserver:
                     live.update(Text(f"the nameserver does not answer: {error}"), refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
+    def _heard_health(self, envelope: Envelope[Any]) -> None:
+        heard: MissionHealth = printable_all(envelope.body)
+        told = f"health {heard.word}"
+        names = ", ".join(absence.name for absence in heard.absent)
+        if (told := f"{told}: {names}" if names else told) == self._health_told or self._live:
+            return
+        is_first, self._health_told = not self._health_told, told
+        if is_first and heard.word is HealthWord.OK:
+            return
+        self._print(f"{envelope.stamp_s:9.2f} s  health {heard.word}")
+        for absence in heard.absent:
+            self._print(f"{'':9}    {line(absence, envelope.stamp_s)}")
+
     def _heard_act(self, envelope: Envelope[Any]) -> None:
         act: OperatorActed = printable_all(envelope.body)
         self._show_event(StoryEvent(act.at_s, envelope.source, act.sentence, act.subject, envelope.cause))
@@ -130,8 +145,8 @@ async def bring_up_on_console(
         raise
     except BackboneError as error:
         outcome = Outcome(failure=error)
-    for line in last_lines(outcome):
-        observer.tell(line)
+    for last in last_lines(outcome):
+        observer.tell(last)
     code = ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
     observer.decide(code)
     return code

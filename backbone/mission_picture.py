@@ -148,7 +148,7 @@ async def look(
     """
     try:
         listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
-    except LinkError as error:
+    except (LinkError, Refusal) as error:
         if before is None:
             raise
         missed = [Absence("nameserver", now_s, f"no answer: {error}", "the launcher restarts it", vital=True)]

@@ -172,7 +172,9 @@ def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> Render
     troubles = _troubles(picture)
     for line in troubles:
         line.no_wrap = False
-    parts: list[RenderableType] = [_head(picture), *troubles, components_table(picture)]
+    parts: list[RenderableType] = [_head(picture), *troubles]
+    if picture.components:
+        parts.append(components_table(picture))
     if picture.schedule is not None:
         parts += [rcs_table(picture.schedule), requests_table(picture.schedule, picture.at_s)]
     newest = list(events)

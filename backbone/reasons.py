@@ -140,7 +140,7 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         _or_error(bus, PLACER, AskPlacement(name), Placement),
         _or_error(bus, NAMESERVER, Resolve(name), Resolved),
         _look_or_none(bus, clock),
-        story_of(bus, text) if asked.message else _nothing_told(),
+        story_of(bus, text, clock) if asked.message else _nothing_told(),
     )
     absent = picture.health.absent if picture is not None else ()
     reasons = Reasons(
@@ -170,7 +170,7 @@ class Told:
     missing: Sequence[str] = ()
 
 
-async def story_of(bus: Bus, text: str) -> Told:
+async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     """Ask every component for the events about a name, an address or a message.
 
     Raises:
@@ -178,8 +178,9 @@ async def story_of(bus: Bus, text: str) -> Told:
     """
     asked = Asked.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    stories = await asyncio.gather(
-        *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components)
+    picture, *stories = await asyncio.gather(
+        _look_or_none(bus, clock),
+        *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
     )
     events = [event for story in stories if isinstance(story, Story) for event in story.events]
     missing = [
@@ -188,6 +189,9 @@ async def story_of(bus: Bus, text: str) -> Told:
         if not isinstance(story, Story)
     ]
     missing += [f"{address}: it did not say yet who it is" for address in listing.unknown]
+    named = {component_of(missed.partition(": ")[0]) for missed in missing}
+    absent = picture.health.absent if picture is not None else ()
+    missing += [f"{each.name}: it is absent, {each.cause}" for each in absent if each.name not in named]
     if not listing.complete:
         missing.append("the nameserver began a moment ago: components may be missing in its list")
     return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing))

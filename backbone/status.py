@@ -16,7 +16,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import ExitCode
 from backbone.component.messages import Absence
-from backbone.errors import LinkError
+from backbone.errors import HubUnreachable, LinkError
 from backbone.health import HealthWord
 from backbone.mission_picture import MissionPicture, look
 from backbone.mission_screen import live_screen, screen
@@ -94,16 +94,18 @@ async def _pictures(
 def picture_without_hub(found: run_files.RunFile, error: LinkError) -> MissionPicture:
     """Return what is known of a mission from its run file alone: its launcher lives, its hub does not answer."""
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-    now_s = clock.now_s()
-    missed = [Absence("nameserver", now_s, f"no answer: {error}", "the launcher restarts it", vital=True)]
-    if _is_paused(found.launcher_pid):
-        cause = f"its process {found.launcher_pid} is paused (SIGSTOP)"
-        remedy = f"kill -CONT {found.launcher_pid}, or 'scout-backbone down'."
+    now_s, pid = clock.now_s(), found.launcher_pid
+    silence = f"no answer: {error}" if not isinstance(error, HubUnreachable) else f"nothing answers at {found.endpoint}"
+    if _is_paused(pid):
+        remedy = f"Let it go on with 'kill -CONT {pid}', or end the mission with 'scout-backbone down'."
         missed = [
-            Absence("launcher", now_s, cause, "", remedy, vital=True),
-            Absence("nameserver", now_s, f"no answer: {error}", "", "Let the launcher run again.", vital=True),
+            Absence("launcher", now_s, f"its process {pid} is paused", "", remedy, vital=True),
+            Absence("nameserver", now_s, silence, "", "Let the launcher go on, which restarts it.", vital=True),
         ]
-    return MissionPicture(found.mission, now_s, {}, rate=clock.rate).gone_stale(missed, now_s)
+    else:
+        missed = [Absence("nameserver", now_s, silence, f"the launcher, process {pid}, restarts it", vital=True)]
+    problem = "nothing else is known: no component can be reached without the nameserver"
+    return MissionPicture(found.mission, now_s, {}, problems=(problem,), missed=tuple(missed), rate=clock.rate)
 
 
 def _is_paused(pid: int) -> bool:
