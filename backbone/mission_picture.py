@@ -92,7 +92,9 @@ class MissionPicture:
     def gone_stale(self, missed: Iterable[Absence], at_s: float) -> MissionPicture:
         """Return this picture at a later time at which the nameserver did not answer."""
         since_s = self.at_s if self.stale_since_s is None else self.stale_since_s
-        found = tuple(missed)
+        new = tuple(missed)
+        names = {absence.name for absence in new}
+        found = (*new, *(absence for absence in self.missed if absence.name not in names))
         problems = tuple(f"{absence.name}: {absence.cause}" for absence in found)
         return dataclasses.replace(self, at_s=at_s, missed=found, stale_since_s=since_s, problems=problems)
 
@@ -202,7 +204,7 @@ def _lacks(listing: Components, processes: Mapping[str, ProcessState]) -> list[s
     lines = []
     if unknown:
         lines.append(f"the list is incomplete: {_count(unknown)} did not say yet how they are")
-    if running and not listing.complete:
+    if running:
         lines.append(f"the list is incomplete: {_count(running)} run and are not registered yet")
     elif not listing.complete and not unknown:
         lines.append("the list may be incomplete: the nameserver began a moment ago and components still come back")

@@ -187,8 +187,13 @@ def test_without_a_nameserver_there_is_no_first_picture() -> None:
             (process("scout1"), process("scout3")),
             "the list is incomplete: 1 components (scout3) run and are not registered yet",
         ),
+        (
+            Components(LISTED, True, 9.5),
+            tuple(process(f"scout{number}") for number in range(2, 309)),
+            "the list is incomplete: 307 components (scout10, scout100",
+        ),
     ],
-    ids=["hub began a moment ago", "many unknown", "one that hangs", "run and do not come back"],
+    ids=["hub began a moment ago", "many unknown", "one that hangs", "do not come back", "come back too late"],
 )
 def test_a_list_that_is_not_whole_says_so(listing: Components, processes: tuple[ProcessState, ...], says: str) -> None:
     picture = looked(listing, processes)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from running_mission import RunningMission, mission_up
 
+from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.health import MissionHealth
 from backbone.keys import Conversation
 from backbone.mission_picture import LAUNCHER
@@ -112,6 +113,32 @@ def test_a_standing_emergency_stop_is_in_status_and_why_until_it_is_lifted(missi
     asyncio.run(stop(""))
     wait_for(mission, lambda _, found: not found["stops"], "the stop is lifted")
     assert "STOPPED" not in mission.command("scout-backbone", "why", "scout1", "--mission", mission.name).stdout
+
+
+def test_a_stranger_on_the_bus_writes_no_escape_to_any_terminal(mission: RunningMission) -> None:
+    hostile = "\x1b]0;owned\x07\x1b[2J\rall is well [/red]"
+
+    async def main() -> None:
+        async with mission.bus() as bus:
+            for at in ("ui_console/tester", "resource_pool/scout1"):
+                bus.publish(at, Conversation.LOG, StoryEvent(1.0, at, hostile, hostile, hostile))
+            scout = next(c for c in mission.status()["components"] if c["name"] == "scout2")
+            state = ComponentState(
+                "resource_pool/scout2", "scout", scout["host"], scout["pid"], LifeState.READY, 1.0, hostile
+            )
+            bus.publish("resource_pool/scout2", Conversation.STATUS, state)
+            await asyncio.sleep(0.5)
+
+    asyncio.run(main())
+    mission.wait_for_line("all is well", 10.0)
+    shown = [
+        mission.command("scout-backbone", *words, "--mission", mission.name)
+        for words in (["status"], ["status", "--json"], ["why", "scout2"], ["story", "scout2"])
+    ]
+    assert "all is well [/red]" in shown[0].stdout
+    assert all(done.returncode == 0 for done in shown)
+    for text in ("".join(done.stdout + done.stderr for done in shown), "".join(mission.lines)):
+        assert text.replace("\n", "").isprintable()
 
 
 def test_a_cause_in_a_story_can_be_asked_about(mission: RunningMission) -> None:
