@@ -47,6 +47,7 @@ from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.health_watch import HealthWatch
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission_picture import LAUNCHER
@@ -155,6 +156,7 @@ class Launcher(Component[NoParameters]):
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
         self._wishes: list[Wish] = []
+        self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
         self.outcome = Outcome()
         keeper.on_fell = self._core_service_fell
         keeper.on_silent = self._core_service_silent
@@ -167,7 +169,8 @@ class Launcher(Component[NoParameters]):
                 await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
 
     async def serve(self) -> None:
-        """Start the mission through the placer, then let it run."""
+        """Start the mission through the placer, then let it run; publish its health meanwhile."""
+        self.start_task(self._health_watch.run(), "health")
         try:
             await self._start_mission()
         except BackboneError as error:
@@ -201,7 +204,10 @@ class Launcher(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return core services and components of the mission file that are wanted and missing."""
+        """Return core services and components of the mission file that are missing, and what its look missed."""
+        return [*self._own_absences(), *self._health_watch.absences()]
+
+    def _own_absences(self) -> list[Absence]:
         core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
         mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
         if self.outcome.ready_after_s is None:

@@ -19,6 +19,7 @@ ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the re
 SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.STOPPED: Severity.ALARM,
     AlarmKind.LOST: Severity.ALARM,
+    AlarmKind.ABSENT: Severity.ALARM,
     AlarmKind.UNSAFE: Severity.ALARM,
     AlarmKind.RC_DOWN: Severity.ALARM,
     AlarmKind.LINK: Severity.ALARM,

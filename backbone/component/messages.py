@@ -42,6 +42,24 @@ class Absence(Message, frozen=True):
     vital: bool = False
 
 
+class StandingStop(Message, frozen=True):
+    """An emergency stop that is in force: the component moves nothing until an operator lifts it.
+
+    Attributes:
+        number: Grows with each stop; the one that is lifted is named by it.
+        by: The operator who stopped the component.
+        reason: As given; may be empty.
+        since_s: Mission time of the stop.
+        is_confirmed: False if the hardware did not confirm that it stands still.
+    """
+
+    number: int
+    by: str
+    reason: str
+    since_s: float
+    is_confirmed: bool = True
+
+
 class ComponentState(Message, frozen=True):
     """Answer to ``AskState``; also published as the component's status on every change.
 
@@ -55,6 +73,7 @@ class ComponentState(Message, frozen=True):
         feedback: One line for people: what it is doing.
         requester: Address of whoever had it started.
         absent: Components that this one wants and that are absent.
+        stop: The emergency stop in force on it; None: there is none.
     """
 
     address: str
@@ -66,6 +85,7 @@ class ComponentState(Message, frozen=True):
     feedback: str = ""
     requester: str = ""
     absent: list[Absence] = []
+    stop: StandingStop | None = None
 
 
 class AskTime(Message, frozen=True):

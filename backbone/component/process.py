@@ -20,6 +20,7 @@ from backbone.component.component import Component
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.errors import BackboneError, Refusal
+from backbone.printable import PrintableFormatter
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
 
@@ -65,12 +66,10 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -
         begin: Called before there is a loop.
     """
     faulthandler.enable()
-    logging.basicConfig(
-        level=os.environ.get("SCOUT_LOG", "INFO"),
-        stream=sys.stderr,
-        format=f"%(asctime)s %(levelname)s {launch.name} %(name)s: %(message)s",
-        force=True,
-    )
+    logging.basicConfig(level=os.environ.get("SCOUT_LOG", "INFO"), stream=sys.stderr, force=True)
+    form = PrintableFormatter(f"%(asctime)s %(levelname)s {launch.name} %(name)s: %(message)s")
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(form)
     try:
         work = begin()
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:

@@ -51,11 +51,13 @@ class Components(Message, frozen=True):
         complete: False for the moment after the hub's own restart in which components still reconnect
             (``RECONNECT_S``): absence proves nothing then.
         hub_since_s: Mission time at which the hub began to listen.
+        unknown: Addresses that are alive and did not say yet who they are, sorted; they are not in the list.
     """
 
     components: list[ComponentState]
     complete: bool
     hub_since_s: float
+    unknown: list[str] = []
 
 
 class Appeared(Message, frozen=True):

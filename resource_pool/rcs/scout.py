@@ -18,6 +18,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import StandingStop
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -191,11 +192,20 @@ class Scout(ResourceController[ScoutParameters]):
                 self._latch.confirm(False)
             else:
                 self._latch.confirm(True)
+            self.changed()
         if is_new:
             self._tell_stop(self._latch.state, f"was stopped{f': {reason}' if reason else ''}")
         return self._latch.state
 
+    def standing_stop(self) -> StandingStop | None:
+        """Return the stop in force, for everybody who looks at the mission."""
+        state = self._latch.state
+        if not state.is_stopped:
+            return None
+        return StandingStop(state.number, state.by, state.reason, state.at_s, state.is_confirmed)
+
     def _tell_stop(self, state: StopState, what: str) -> None:
+        self.changed()
         self.bus.publish(self.address, Conversation.EVENTS, state)
         self.tell(self.name, f"{what} (by {state.by})")
 

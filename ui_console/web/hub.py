@@ -208,6 +208,7 @@ class WebHub:
             "requests": team.requests(),
             "timeline": team.timeline(now_s),
             "hosts": team.hosts(now_s),
+            "health": team.health(now_s),
             "parameters": team.parameters(),
             "components": team.components(),
             "log": team.log(),
