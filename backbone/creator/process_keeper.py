@@ -21,6 +21,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.launch import Launch
+from backbone.component.logs import log_path
 from backbone.component.membership import (
     PROCESSES,
     Admit,
@@ -70,7 +71,6 @@ from backbone.creator.supervision import (
     WakeAt,
 )
 from backbone.creator.zygote import NoProcess
-from backbone.creator.zygote_process import log_path
 from backbone.errors import BackboneError, Refusal
 from backbone.naming import IllegalName, Subsystem, component_of
 

@@ -40,7 +40,7 @@ class TraceFile:
         try:
             write_all(self._descriptor, json.dumps(line).encode() + b"\n")
         except OSError as error:
-            self.stopped_by = error.strerror
+            self.stopped_by = str(error.strerror)
             with contextlib.suppress(OSError):  # no file but a device or pipe
                 os.ftruncate(self._descriptor, end)
             self.close()

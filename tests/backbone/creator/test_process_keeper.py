@@ -14,6 +14,7 @@ from in_process_zygote import InProcessZygote
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.launch import Launch
+from backbone.component.logs import log_path
 from backbone.creator.messages import (
     AlreadyHere,
     EndedBy,
@@ -23,7 +24,6 @@ from backbone.creator.messages import (
     StartFailed,
 )
 from backbone.creator.process_keeper import LAST_LINES, ProcessKeeper, last_lines
-from backbone.creator.zygote_process import log_path
 from backbone.naming import Subsystem
 
 POLICY = RestartPolicy(back_off_s=0.1, limit=2, window_s=60.0)
