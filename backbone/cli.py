@@ -11,7 +11,7 @@ import json
 import os
 import sys
 from collections.abc import Awaitable, Callable
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, suppress
 from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
@@ -65,8 +65,9 @@ def main() -> None:
 
 
 def say(line: str) -> None:
-    """Talk to the person."""
-    print(line, file=sys.stderr, flush=True)
+    """Talk to the person; what is done does not depend on whether that can be written."""
+    with suppress(OSError):
+        print(line, file=sys.stderr, flush=True)
 
 
 def run(work: Callable[[], Awaitable[int]]) -> None:

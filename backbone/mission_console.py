@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
 from collections import deque
-from typing import Any, TextIO
+from typing import IO, Any, TextIO
 
 from rich.console import Console
 from rich.live import Live
@@ -58,16 +59,17 @@ class ConsoleObserver:
         """Print one line, also to whoever waits for readiness."""
         self._print(line)
         if self._ready_to is not None:
-            print(line, file=self._ready_to, flush=True)
+            _tell_if_possible(line, self._ready_to)
 
     def _print(self, line: str) -> None:
-        self._console.print(line, highlight=False, markup=False, soft_wrap=True)
+        _tell_if_possible(line, self._console.file)
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Show the mission until cancelled."""
         self.tell("all ready; end with Ctrl-C or 'scout-backbone down'")
         if self._ready_to is not None:
-            self._ready_to.close()
+            with contextlib.suppress(OSError):  # the one who waited is gone
+                self._ready_to.close()
             self._ready_to = None
         if self._live:
             await self._show_live(bus, clock)
@@ -106,6 +108,12 @@ class ConsoleObserver:
         if line != self._told:
             self._told = line
             self._print(f"{schedule.at_s:9.2f} s  {line}")
+
+
+def _tell_if_possible(line: str, file: IO[str]) -> None:
+    """Print the line; a mission goes on also when its disk is full or nobody reads any longer."""
+    with contextlib.suppress(OSError):
+        print(line, file=file, flush=True)
 
 
 async def bring_up_on_console(

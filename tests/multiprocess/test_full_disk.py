@@ -51,6 +51,18 @@ def test_up_refuses_a_trace_that_cannot_be_written_before_anything_starts(tmp_pa
     assert "Traceback" not in done.stderr
 
 
+def test_a_mission_goes_on_when_nothing_it_tells_can_be_written(tmp_path: Path) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [str(BIN / "scout-backbone"), "up", str(MISSION_XML), "--headless", "--for", "8"],
+            env={**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)},
+            stderr=full,
+            timeout=90,
+            check=False,
+        )
+    assert done.returncode == 0
+
+
 def let_nothing_be_written(mission: RunningMission) -> None:
     """Needs no rights: no process of the mission, and none it starts, may make a file any longer."""
     for process in mission.processes():
