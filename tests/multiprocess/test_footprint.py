@@ -15,9 +15,8 @@ from running_mission import RunningMission, mission_up
 from backbone.bus.zenoh_bus import client_config
 from backbone.keys import Conversation, key
 
-WARM_UP_S, HOSTILE_S = 30.0, 180.0
+WARM_UP_S, HOSTILE_S = 180.0, 180.0  # a framegrabber fills its stores of noise and pictures for three minutes
 LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
-NOT_YET = ("nameserver",)
 FEW_BYTES = 10_000  # the big ones are for a test of their own; here it is many that counts
 
 
@@ -31,7 +30,7 @@ def test_of_every_process_of_a_mission_there_is_a_footprint() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(900)
 def test_a_mission_does_not_grow_among_those_who_send_nonsense() -> None:
     with mission_up() as mission:
         addresses = [f"{c['subsystem']}/{c['name']}" for c in mission.status()["components"] if "cli-" not in c["name"]]
@@ -44,7 +43,7 @@ def test_a_mission_does_not_grow_among_those_who_send_nonsense() -> None:
         restarted = {name for name in before.keys() & after.keys() if before[name].pid != after[name].pid}
         assert not restarted, mission.story()
         assert all(one.log_kb < LOG_KB for one in after.values()), after
-        assert not {name: what for name, what in grown(before, after).items() if name not in NOT_YET}
+        assert not grown(before, after)
 
 
 def bother(session: zenoh.Session, mission: RunningMission, addresses: list[str], seconds: float) -> int:
