@@ -332,12 +332,15 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
 
     Raises:
         MissionAlreadyUp: A mission of this name runs on this machine.
+        RunFolderUnusable: Its files cannot be written.
+        TraceUnwritable: Its trace cannot be written.
         BackboneError: The nameserver could not be started.
     """
     began_s = time.monotonic()
     refuse_if_up(description.name)
-    directory = run_files.run_directory(description.name)
-    (directory / "log").mkdir(parents=True, exist_ok=True, mode=0o700)
+    if options.trace is not None:
+        run_files.require_writable(options.trace)
+    directory = run_files.prepare(description.name)
     clock = MissionClock(began_s, options.speed)
     own = _launch(description, "launcher", "launcher", "", clock, directory)
     observer.began("nameserver")

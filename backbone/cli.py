@@ -12,7 +12,7 @@ import math
 import os
 import sys
 from collections.abc import Awaitable, Callable, Iterable
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, suppress
 from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
@@ -81,8 +81,9 @@ def main() -> None:
 
 
 def say(line: str) -> None:
-    """Talk to the person; whatever the line quotes of the bus, it is printable."""
-    print(printable_lines(line), file=sys.stderr, flush=True)
+    """Talk to the person, printable; the command goes on also if that cannot be written."""
+    with suppress(OSError):
+        print(printable_lines(line), file=sys.stderr, flush=True)
 
 
 def show(lines: Iterable[str]) -> None:

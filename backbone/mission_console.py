@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
 from collections import deque
-from typing import Any
+from typing import IO, Any
 
 from rich.console import Console
 from rich.live import Live
@@ -71,7 +72,7 @@ class ConsoleObserver:
             self._verdict.decide(exit_code)
 
     def _print(self, line: str) -> None:
-        self._console.print(printable_lines(line), highlight=False, markup=False, soft_wrap=True)
+        _tell_if_possible(printable_lines(line), self._console.file)
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Show the mission until cancelled."""
@@ -128,6 +129,12 @@ class ConsoleObserver:
         if line != self._told:
             self._told = line
             self._print(f"{schedule.at_s:9.2f} s  {line}")
+
+
+def _tell_if_possible(line: str, file: IO[str]) -> None:
+    """Print the line; a mission goes on also when its disk is full or nobody reads any longer."""
+    with contextlib.suppress(OSError):
+        print(line, file=file, flush=True)
 
 
 async def bring_up_on_console(

@@ -11,7 +11,6 @@ cut, with the number of characters that are missing.
 from __future__ import annotations
 
 import dataclasses
-import logging
 from collections.abc import Mapping
 from typing import Any, TypeVar, cast
 
@@ -55,14 +54,6 @@ def printable_lines(text: str, most: int = MOST_CHARACTERS) -> str:
 def printable_all(value: Value) -> Value:
     """Return the message, dataclass, list or dictionary with every text in it one printable line; itself if all are."""
     return cast(Value, _clean(value))
-
-
-class PrintableFormatter(logging.Formatter):
-    """Writes log records whose texts came over the bus; a traceback keeps its lines."""
-
-    def format(self, record: logging.LogRecord) -> str:
-        """Return the record as printable lines."""
-        return printable_lines(super().format(record))
 
 
 def _clean(value: Any) -> Any:

@@ -58,11 +58,11 @@ class VerdictPipe:
             return
         try:
             print(msgspec.json.encode(said).decode(), file=self._file, flush=True)
-        except BrokenPipeError:  # the command was killed; the mission does not depend on it
+        except OSError:  # the command was killed; the mission does not depend on it
             self._close()
 
     def _close(self) -> None:
-        with contextlib.suppress(BrokenPipeError):
+        with contextlib.suppress(OSError):
             self._file.close()
 
 

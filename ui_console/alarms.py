@@ -30,6 +30,7 @@ SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.TAKEN: Severity.NOTICE,
     AlarmKind.REFUSED: Severity.NOTICE,
     AlarmKind.NO_ANSWER: Severity.WARNING,
+    AlarmKind.NOT_RECORDED: Severity.WARNING,
     AlarmKind.VISITOR: Severity.WARNING,
 }
 _WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}

@@ -349,6 +349,8 @@ class TeamModel:
         self.alarms.end(AlarmKind.LOST, name, at_s)
         is_rc = _is_in(Subsystem.RESOURCE_POOL, component.address)
         self._so("not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s)
+        has_no_trace = "the trace of the schedule stopped" in component.feedback
+        self._so(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
 
     def _take_list(self, listed: Mapping[str, ComponentState], at_s: float, is_complete: bool) -> None:
         for component in listed.values():

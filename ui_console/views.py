@@ -38,6 +38,7 @@ class AlarmKind(StrEnum):
     TAKEN = "taken"  # this console's robot went to somebody else
     REFUSED = "refused"  # somebody said no to this console
     NO_ANSWER = "no_answer"  # somebody did not answer this console
+    NOT_RECORDED = "not_recorded"  # the trace of the schedule cannot be written any more
     VISITOR = "visitor"  # somebody who was not let in, or misbehaves, at the web console
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, cast
@@ -48,6 +48,7 @@ _TIMEOUT_PAYLOAD = b"Timeout"
 # of a burst of 1000 up to 360 were dropped; with batching none was, at a thirtieth of the cost for the sender.
 _URGENT = (zenoh.Priority.REAL_TIME, zenoh.CongestionControl.BLOCK)
 _SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
+MOST_PUBLISHERS = 64  # chosen: of a component's own far fewer; a framegrabber has one for each ARC it had
 _REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
 _BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
 _QUALITY = {
@@ -158,7 +159,7 @@ class ZenohBus(Speaker):
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()
-        self._publishers: dict[tuple[str, Conversation], zenoh.Publisher] = {}
+        self._publishers: OrderedDict[tuple[str, Conversation], zenoh.Publisher] = OrderedDict()
 
     @classmethod
     def open(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -279,6 +280,7 @@ class ZenohBus(Speaker):
     def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
         """Publish over the session and return what was said, in its envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
+        self._publishers.move_to_end((address, conversation))
         self.published += 1
         envelope = self.envelope(message)
         publisher.put(write(envelope))
@@ -292,6 +294,9 @@ class ZenohBus(Speaker):
             congestion_control=congestion_control,
             allowed_destination=zenoh.Locality.REMOTE if self._shared else zenoh.Locality.ANY,
         )
+        while len(self._publishers) > MOST_PUBLISHERS:
+            _, longest_silent = self._publishers.popitem(last=False)
+            longest_silent.undeclare()  # type: ignore[no-untyped-call]
         return publisher
 
     def subscribe(

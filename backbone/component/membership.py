@@ -86,6 +86,13 @@ class NotItsCreator(Refusal):
     remedy = "Ask the placer to start or stop the component."
 
 
+class AskedAgain(Refusal):
+    """The end of this life was asked for once more; only the newest question is answered when it comes."""
+
+    code = "component.asked_again"
+    remedy = "Nothing to do: the newer question waits."
+
+
 ProcessQuestion = Admit | AwaitEnd | EndMember
 
 

@@ -12,12 +12,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
-from pathlib import Path
-from typing import Any, TextIO, assert_never
+from typing import Any, assert_never
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
@@ -92,6 +90,7 @@ from backbone.rc_manager.messages import (
 from backbone.rc_manager.roll_call import Found, RollCall
 from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
+from backbone.rc_manager.trace_file import TraceFile
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -142,7 +141,7 @@ class RcManager(Component[RcManagerParameters]):
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
-        self._trace: TextIO | None = None
+        self._trace = TraceFile("")
         self._context_switch = ContextSwitch(bus, clock, self.story.note)
         self._roll_call = RollCall(bus, clock)
         self._found = Found({}, {})
@@ -152,8 +151,9 @@ class RcManager(Component[RcManagerParameters]):
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
         """Learn the hardware and, after a restart, who holds it; then watch the nameserver for changes."""
-        if self.parameters.trace:
-            self._trace = Path(self.parameters.trace).open("a", encoding="utf-8", buffering=1)  # noqa: ASYNC230, SIM115
+        self._trace = TraceFile(self.parameters.trace)
+        if self._trace.stopped_by:
+            self._trace_stopped()
         for record in self.manager.opening_lines():
             self._record(record)
         found = await self._roll_call.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
@@ -186,9 +186,8 @@ class RcManager(Component[RcManagerParameters]):
         for task in [*self._switches.values(), *self._starts.values()]:
             task.cancel()
         await asyncio.gather(*self._switches.values(), *self._starts.values(), return_exceptions=True)
-        if self._trace is not None:
-            self._trace.write(json.dumps({"ev": "end", "t": round(self.clock.now_s(), 6)}) + "\n")
-            self._trace.close()
+        self._trace.write({"ev": "end", "t": round(self.clock.now_s(), 6)})
+        self._trace.close()
 
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
@@ -305,11 +304,19 @@ class RcManager(Component[RcManagerParameters]):
 
     def _record(self, record: Record) -> None:
         line = dict(record.line)
-        if self._trace is not None:
-            self._trace.write(json.dumps(line) + "\n")
+        if not self._trace.write(line):
+            self._trace_stopped()
         subject = str(line.get("arc") or line.get("id") or "")
         self.story.note(subject, f"{line['ev']}{': ' + record.cause if record.cause else ''}")
         self.bus.publish(self.address, Conversation.EVENTS, TraceLine(line))
+
+    def _trace_stopped(self) -> None:
+        """Let people know; the mission goes on without a trace."""
+        self.tell(self.name, self._why_no_trace())
+        self.changed()
+
+    def _why_no_trace(self) -> str:
+        return f"the trace of the schedule stopped: {self._trace.stopped_by}"
 
     # ------------------------------------------------------------------ context switches
     async def _connect(self, order: ConnectArc) -> None:
@@ -515,6 +522,8 @@ class RcManager(Component[RcManagerParameters]):
         schedule = self.manager.schedule(self.clock.now_s())
         running = sum(1 for request in schedule.requests if request.state == "running")
         feedback = f"{running} of {len(schedule.requests)} ARCs run"
+        if self._trace.stopped_by:
+            feedback += f"; {self._why_no_trace()}"
         if feedback != self.feedback:
             self.feedback = feedback
             super().publish_news()

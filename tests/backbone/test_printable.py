@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import logging
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import Absence, ComponentState, LifeState
-from backbone.printable import MOST_CHARACTERS, PrintableFormatter, printable, printable_all, printable_lines
+from backbone.printable import MOST_CHARACTERS, printable, printable_all, printable_lines
 
 HOSTILE = [
     "\x1b]0;owned\x07",
@@ -58,8 +56,3 @@ def test_every_text_within_a_message_is_printable_afterwards() -> None:
 def test_a_message_that_is_printable_is_handed_on_as_it_is() -> None:
     state = ComponentState("x/y", "t", "h", 4711, LifeState.READY, 0.5, "fine", absent=[Absence("a", 1.0, "b")])
     assert printable_all(state) is state
-
-
-def test_a_log_keeps_the_lines_of_a_traceback_and_no_escape() -> None:
-    record = logging.LogRecord("n", logging.INFO, "f", 1, "%s ended\nbecause of %s", ("a\x1b[2J", "b"), None)
-    assert PrintableFormatter("%(message)s").format(record) == "a\\x1b[2J ended\nbecause of b"

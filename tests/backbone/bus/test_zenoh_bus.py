@@ -307,3 +307,51 @@ async def test_an_opening_that_is_cancelled_closes_its_session() -> None:
             assert await asyncio.to_thread(gone.wait, DEADLINE_S), "the session that opened after all was not closed"
     finally:
         await asyncio.to_thread(hub.close)
+
+
+class CountedSession:
+    """A session that counts the publishers that stand."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._of = session
+        self.standing = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._of, name)
+
+    def declare_publisher(self, at: str, **how: Any) -> CountedPublisher:
+        self.standing += 1
+        return CountedPublisher(self, self._of.declare_publisher(at, **how))
+
+
+class CountedPublisher:
+    def __init__(self, session: CountedSession, publisher: zenoh.Publisher) -> None:
+        self._session, self._of = session, publisher
+
+    def put(self, payload: bytes) -> None:
+        self._of.put(payload)
+
+    def undeclare(self) -> None:
+        self._session.standing -= 1
+        self._of.undeclare()
+
+
+async def test_who_publishes_under_ever_new_addresses_does_not_grow() -> None:
+    """As a framegrabber does for each ARC that holds it: every visit of a console has one of its own."""
+    endpoint = free_endpoint()
+    async with hub_at(endpoint), joined(endpoint, ASKER) as [listener]:
+        heard: list[str] = []
+        listener.subscribe("resource_pool/*", Conversation.FRAMES, Stop, lambda one: heard.append(one.body.reason))
+        session = CountedSession(zenoh_bus.open_session(client_config(endpoint)))
+        bus = ZenohBus("hostile", SERVER, CLOCK, session)  # type: ignore[arg-type]
+        try:
+            for number in [*range(300), 0]:
+                bus.publish(f"resource_pool/arc-{number}", Conversation.FRAMES, Stop(str(number)))
+            assert session.standing == zenoh_bus.MOST_PUBLISHERS
+            async with asyncio.timeout(DEADLINE_S):
+                while len(heard) < 301:
+                    bus.publish("resource_pool/arc-0", Conversation.FRAMES, Stop("again"))
+                    await CLOCK.sleep_s(0.05)
+            assert heard[:301] == [*map(str, range(300)), "0"]
+        finally:
+            await bus.close()

@@ -249,3 +249,16 @@ def test_the_nameserver_tells_what_it_counted_and_decided(local_mission: Any, be
     assert told[0].startswith("registered as resource_pool/scout1 on a")
     assert told[1].startswith("appeared on a")
     assert story.events[0].cause.startswith("resource_pool/scout1#")
+
+
+def test_a_hub_that_cannot_note_that_it_began_waits_as_after_a_restart(tmp_path: Path, beside: Any) -> None:
+    (tmp_path / "run").touch()  # no folder can be made there
+
+    async def main() -> None:
+        network = LocalNetwork()
+        async with beside(nameserver(network, str(tmp_path / "run" / "mission"))):
+            assert not (await listed(network)).complete
+            await VirtualClock().sleep_s(3.0)
+            assert (await listed(network)).complete
+
+    run_virtual(main())
