@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 
 from backbone.bus.interface import Bus, Clock
@@ -34,13 +35,19 @@ class HealthWatch:
         return list(self._picture.missed)
 
     async def run(self) -> None:
-        """Look and publish until cancelled."""
+        """Look and publish until cancelled; a look that waits for an answer delays no word about what is known."""
+        async with asyncio.TaskGroup() as loops:
+            loops.create_task(self._look_again_and_again())
+            while True:
+                self._say(self._health())
+                await self._clock.sleep_s(LOOK_EVERY_S / 2 * self._clock.rate)
+
+    async def _look_again_and_again(self) -> None:
         while True:
             missed = self.absences()
             self._picture = await self._look()
             if self.absences() != missed:
                 self._changed()
-            self._say(self._health())
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
 
     async def _look(self) -> MissionPicture:
@@ -51,7 +58,7 @@ class HealthWatch:
         # The launcher's own state in the list is a look old: what it missed then may be back.
         others = {at: state for at, state in self._picture.components.items() if at != self._bus.source}
         missed = [*self._own(), *self._picture.missed]
-        return health(others, missed, self._picture.at_s, self._clock.rate)
+        return health(others, missed, self._clock.now_s(), self._clock.rate)
 
     def _say(self, found: Health) -> None:
         now_s, said = self._clock.now_s(), found.to_message()
