@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from backbone.naming import Subsystem, address
+from backbone.ranges import Line, MachineTime, Mention, Name, NameOrNone, Rate, Values
 from backbone.wire import Message
 
 
@@ -28,19 +27,19 @@ class Launch(Message, frozen=True):
             class path this is the launch of the shared process itself, and ``requester`` its creator.
     """
 
-    mission: str
+    mission: Name
     subsystem: Subsystem
-    name: str
-    type: str
-    class_path: str
-    host: str
-    endpoint: str
-    clock_origin_monotonic_s: float
-    clock_rate: float
-    parameters: dict[str, Any] = {}
-    requester: str = ""
-    run_directory: str = ""
-    process: str = ""
+    name: Name
+    type: Mention
+    class_path: Line
+    host: Mention
+    endpoint: Line
+    clock_origin_monotonic_s: MachineTime
+    clock_rate: Rate
+    parameters: Values = {}
+    requester: Mention = ""
+    run_directory: Line = ""
+    process: NameOrNone = ""
 
     @property
     def is_shared_process(self) -> bool:

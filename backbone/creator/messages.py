@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
+from typing import Annotated
 
 from backbone.errors import Refusal
 from backbone.naming import Subsystem
+from backbone.ranges import (
+    FEW,
+    MANY,
+    Count,
+    Duration,
+    ExitCode,
+    Line,
+    Mention,
+    Name,
+    NameOrNone,
+    Pause,
+    Pid,
+    Share,
+    Text,
+    Values,
+)
 from backbone.wire import Message
 
 TYPE = "creator"
@@ -26,10 +42,10 @@ class RestartPolicy(Message, frozen=True):
     """
 
     restart: bool = True
-    back_off_s: float = 0.05
-    back_off_most_s: float = 2.0
-    limit: int = 5
-    window_s: float = 30.0
+    back_off_s: Duration = 0.05
+    back_off_most_s: Duration = 2.0
+    limit: Count = 5
+    window_s: Duration = 30.0
     after_good_end: bool = False
 
 
@@ -51,23 +67,23 @@ class Spawn(Message, frozen=True):
     """
 
     subsystem: Subsystem
-    name: str
-    type: str
-    class_path: str
-    parameters: dict[str, Any] = {}
-    requester: str = ""
+    name: Name
+    type: Mention
+    class_path: Line
+    parameters: Values = {}
+    requester: Mention = ""
     policy: RestartPolicy = RestartPolicy()
-    ready_within_s: float = 20.0
+    ready_within_s: Duration = 20.0
     pinned: bool = False
-    tags: list[str] = []
-    process: str = ""
+    tags: Annotated[list[Mention], FEW] = []
+    process: NameOrNone = ""
 
 
 class Spawned(Message, frozen=True):
     """Answer to ``Spawn``: it is ready."""
 
-    address: str
-    pid: int
+    address: Mention
+    pid: Pid
 
 
 class EndProcess(Message, frozen=True):
@@ -83,10 +99,10 @@ class EndProcess(Message, frozen=True):
         term_s: Seconds it has after SIGTERM.
     """
 
-    name: str
-    reason: str = ""
-    ask_s: float = 1.5
-    term_s: float = 0.5
+    name: Mention
+    reason: Text = ""
+    ask_s: Duration = 1.5
+    term_s: Duration = 0.5
 
 
 class EndedBy(StrEnum):
@@ -101,9 +117,9 @@ class EndedBy(StrEnum):
 class ProcessEnded(Message, frozen=True):
     """Answer to ``EndProcess``: nothing of it is left."""
 
-    name: str
+    name: Mention
     by: EndedBy
-    exit_code: int
+    exit_code: ExitCode
 
 
 class ListProcesses(Message, frozen=True):
@@ -124,20 +140,20 @@ class ProcessState(Message, frozen=True):
     """
 
     spawn: Spawn
-    pid: int
-    restarts: int
+    pid: Pid
+    restarts: Count
     given_up: bool
-    last_end: str
-    silent_s: float = 0.0
-    doing: str = ""
+    last_end: Text
+    silent_s: Duration = 0.0
+    doing: Text = ""
 
 
 class Processes(Message, frozen=True):
     """Answer to ``ListProcesses``: the truth about this host, from which others rebuild their picture."""
 
-    host: str
-    tags: list[str]
-    processes: list[ProcessState]
+    host: Mention
+    tags: Annotated[list[Mention], FEW]
+    processes: Annotated[list[ProcessState], MANY]
 
 
 class HostLoad(Message, frozen=True):
@@ -152,12 +168,12 @@ class HostLoad(Message, frozen=True):
         components: Number of components this creator runs.
     """
 
-    host: str
-    tags: list[str]
-    cpu: float
-    memory: float
-    cores: int
-    components: int
+    host: Mention
+    tags: Annotated[list[Mention], FEW]
+    cpu: Share
+    memory: Share
+    cores: Count
+    components: Count
 
 
 class ProcessFell(Message, frozen=True):
@@ -170,10 +186,10 @@ class ProcessFell(Message, frozen=True):
         last_lines: The end of its log.
     """
 
-    name: str
-    how: str
-    restart_in_s: float
-    last_lines: list[str]
+    name: Mention
+    how: Text
+    restart_in_s: Pause
+    last_lines: Annotated[list[Text], FEW]
 
 
 class StartFailed(Refusal):
