@@ -513,7 +513,7 @@ class ImpossibleUse(Refusal):
     """An RC cannot be held like that."""
 
     code = "rc.impossible_use"
-    remedy = "Connect with a lease and with periods that are finite and above 0."
+    remedy = "Connect with the next epoch, a lease of at most an hour, and periods that are finite and above 0."
 
 
 class EmergencyStopped(Refusal):

@@ -40,6 +40,8 @@ ADDRESS = "backbone/rc_manager"
 
 LEASE_S = 2.0  # chosen: outlives a restart of the hub or RC manager (under 1 s), ends an orphan's hold soon
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
+EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
+EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
 BEAT_EVERY_S = 0.3  # chosen: ARC to RC manager; a hung ARC is noticed within BEAT_MISSED_S
 BEAT_MISSED_S = 1.0  # chosen: three beats
 
@@ -534,7 +536,7 @@ class MissingRuntime(SchedulingRefusal):
     """The request lacks a usable minimum run time."""
 
     code = "scheduling.minimum_runtime"
-    remedy = "Give minimum_runtime_s above 0 and maximum_runtime_s of 0 or at least the minimum."
+    remedy = "Give minimum_runtime_s of 1 ms to a day, and maximum_runtime_s of 0 or at least the minimum."
 
 
 class UnknownRc(SchedulingRefusal):
@@ -584,6 +586,16 @@ class Held(Refusal):
 
     code = "rc.held"
     remedy = "Disconnect the holder first."
+
+
+def most_epoch(now_s: float) -> int:
+    """Return the largest epoch that can have been given by this mission time: an RC begins with the time of its start.
+
+    Example:
+        >>> most_epoch(2.5)
+        1002500
+    """
+    return int(max(0.0, now_s) * EPOCHS_PER_S) + EPOCHS_AHEAD
 
 
 RcManagerQuestion = (
