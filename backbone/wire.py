@@ -147,6 +147,16 @@ def kinds_of(accepts: type[Any] | types.UnionType) -> tuple[type[Any], ...]:
     return typing.get_args(accepts) or (accepts,)
 
 
+def refuse_oversized(length: int) -> None:
+    """Return if a message of so many bytes may be read: asked before they are copied out of the bus.
+
+    Raises:
+        OversizedMessage: It may not.
+    """
+    if length > MAX_MESSAGE_BYTES:
+        raise OversizedMessage(f"message of {length} bytes", bytes=length)
+
+
 @functools.cache
 def holds_values_of_any_kind(kind: Any) -> bool:
     """Say whether a value of this type, or one inside it, may be of any kind, so that types alone do not hold it."""
@@ -176,8 +186,7 @@ class Reader(Generic[Body]):
             UnknownMessage: A message, but none that is accepted here.
             MalformedMessage: Anything else that does not fit, with the place where it does not.
         """
-        if len(raw) > MAX_MESSAGE_BYTES:
-            raise OversizedMessage(f"message of {len(raw)} bytes", bytes=len(raw))
+        refuse_oversized(len(raw))
         try:
             envelope = self._decoder.decode(raw)
         except _UNREADABLE as error:
