@@ -9,6 +9,7 @@ Rules of this file:
 * A message that cannot be read is refused with a class that says which of the four ways it is bad:
   too big, not readable, of a schema nobody here knows, or of another version of a known one.
 * Reading never half succeeds: either the whole typed message, or a refusal.
+* Each field has its range (``ranges``); what is beyond is malformed.
 
 A change of a struct that old readers cannot read gets a new version: ``class Drive(Message, tag="Drive/2")``.
 """
@@ -18,6 +19,7 @@ from __future__ import annotations
 import functools
 import types
 import typing
+from collections.abc import Hashable
 from typing import Any, Generic, TypeVar, cast
 
 import msgspec
@@ -175,7 +177,9 @@ class Reader(Generic[Body]):
     def __init__(self, accepts: type[Body] | types.UnionType) -> None:
         self._accepted = tuple(sorted(schema_of(kind) for kind in kinds_of(accepts)))
         self._decoder = msgspec.msgpack.Decoder(Envelope[accepts])  # type: ignore[valid-type]
-        self._of_any_kind = frozenset(kind for kind in kinds_of(accepts) if holds_values_of_any_kind(kind))
+        self._of_any_kind = frozenset(
+            kind for kind in kinds_of(accepts) if holds_values_of_any_kind(cast("Hashable", kind))
+        )
 
     def read(self, raw: bytes) -> Envelope[Body]:
         """Return the envelope these bytes hold.

@@ -34,7 +34,16 @@ from backbone.bus.interface import (
 from backbone.bus.speaker import Speaker, settle
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
-from backbone.wire import Envelope, MalformedMessage, Message, OversizedMessage, Reader, Refused, refuse_oversized, write
+from backbone.wire import (
+    Envelope,
+    MalformedMessage,
+    Message,
+    OversizedMessage,
+    Reader,
+    Refused,
+    refuse_oversized,
+    write,
+)
 
 log = logging.getLogger(__name__)
 

@@ -27,13 +27,15 @@ class Chronicle:
             tell: Takes each line, in order.
         """
         self._tell = tell
-        self._rcs: set[str] = set()
+        self._is_up: dict[str, bool] = {}
         self._nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
         self._ids: dict[tuple[str, ...], str] = {}
         self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
 
     def record(self, line: trace.Line, cause: str = "") -> None:
         """Write this line."""
+        if line["ev"] == "rc_state":
+            self._is_up[line["id"]] = line["state"] == "up"
         self._story.append(line)
         self._tell(Record(line, cause))
 
@@ -43,13 +45,17 @@ class Chronicle:
 
     def has_introduced(self, rc: str) -> bool:
         """Say whether the RC was introduced."""
-        return rc in self._rcs
+        return rc in self._is_up
+
+    def says_up(self, rc: str) -> bool | None:
+        """Return whether the RC is up by the lines so far; None if no line was about it."""
+        return self._is_up.get(rc)
 
     def introduce_rc(self, rc: RcEntry, now_s: float) -> None:
         """Introduce an RC that was not: when it is up for the first time, or asked for before."""
-        if rc.name in self._rcs:
+        if rc.name in self._is_up:
             return
-        self._rcs.add(rc.name)
+        self._is_up[rc.name] = True
         self.record(
             trace.rc(
                 now_s,

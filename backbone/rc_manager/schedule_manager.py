@@ -690,6 +690,10 @@ class ScheduleManager:
         for promise, whom in broken(self._table, self._now_s):
             story = self._chronicle.story_of({arc.name for arc in whom})
             raise AssertionError("\n".join([f"broken at {self._now_s}: {promise}", *map(str, story)]))
+        for rc in self._table.rcs.values():
+            if self._chronicle.says_up(rc.name) not in (None, rc.up):
+                lines = map(str, self._chronicle.story_of({rc.name}))
+                raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))
 
     # Bookkeeping.
 
