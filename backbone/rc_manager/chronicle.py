@@ -20,13 +20,14 @@ STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a
 class Chronicle:
     """Hands out each line, and remembers the last ones."""
 
-    def __init__(self, tell: Callable[[Record], None]) -> None:
+    def __init__(self, tell: Callable[[Record], None], *, goes_on: bool = False) -> None:
         """Begin with nothing introduced.
 
         Args:
             tell: Takes each line, in order.
+            goes_on: True if the lines follow those of an earlier RC manager, by which an RC may be down.
         """
-        self._tell = tell
+        self._tell, self._goes_on = tell, goes_on
         self._is_up: dict[str, bool] = {}
         self._nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
         self._ids: dict[tuple[str, ...], str] = {}
@@ -68,6 +69,8 @@ class Chronicle:
         )
         if not rc.up:
             self.record(trace.rc_state(now_s, rc.name, up=False), "not started yet")
+        elif self._goes_on:
+            self.record(trace.rc_state(now_s, rc.name, up=True), "it answers this RC manager")
 
     def introduce_nodes(self, path: Path, now_s: float) -> None:
         """Introduce new nodes, new numbers and new parents on this way, parents first."""

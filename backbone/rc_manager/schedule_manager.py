@@ -96,6 +96,7 @@ class ScheduleManager:
         exact_up_to: int = EXACT_UP_TO,
         mission: str,
         mission_priority: int,
+        goes_on: bool = False,
     ) -> None:
         """Begin with no RCs and no ARCs.
 
@@ -105,6 +106,7 @@ class ScheduleManager:
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
             mission_priority: Its number among the consoles.
+            goes_on: True if the trace goes on after that of an earlier RC manager.
         """
         self._rules = rules
         self._tolerance_s = tolerance_s
@@ -124,7 +126,7 @@ class ScheduleManager:
         self._wake_s: float | None = None
         self._replaced_by: dict[str, Requested] = {}
         self._retrying: dict[str, ArcEntry] = {}
-        self._chronicle = Chronicle(self._tell)
+        self._chronicle = Chronicle(self._tell, goes_on=goes_on)
 
     # Events in, instructions out.
 

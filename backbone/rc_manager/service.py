@@ -132,6 +132,7 @@ class RcManager(Component[RcManagerParameters]):
             tolerance_s=TOLERANCE_S,
             mission=given.mission,
             mission_priority=given.mission_priority,
+            goes_on=bool(given.trace) and _has_lines(Path(given.trace)),
         )
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
@@ -590,6 +591,10 @@ class RcManager(Component[RcManagerParameters]):
             await self._request(current.request)  # its own question was lost, or is still on its way
         except (Refusal, LinkError) as error:
             self.story.note(arc, f"cannot be scheduled: {error}")
+
+
+def _has_lines(trace: Path) -> bool:
+    return trace.is_file() and trace.stat().st_size > 0
 
 
 def _rc(rc: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,34 @@ def test_an_rc_manager_that_starts_beside_an_rc_that_talks_nonsense_serves_the_o
                 assert one.is_open
 
     run_virtual(main())
+
+
+def test_a_trace_that_goes_on_after_a_restart_says_that_an_rc_is_up_again(
+    local_mission: Any, beside: Any, tmp_path: Path
+) -> None:
+    """By the lines of the first RC manager the frequency is down; the second one grants it."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, beside, tmp_path / "trace.jsonl") as here:
+            one = await here.arc("one")
+            async with here.beside(here.manager()):
+                await one.ask_for(request("one", "left", "video"))
+                await here.clock.sleep_s(1.0)
+                tell(here, "video", lambda state: replace(state, last_epoch=2**64 - 1))
+                await here.clock.sleep_s(1.0)
+                assert states_of(tmp_path, "video") == ["down"]
+            here.rcs["video"].tells = lambda state: state
+            async with here.beside(here.manager()):
+                await here.clock.sleep_s(3.0)
+                assert one.is_open
+                assert states_of(tmp_path, "video")[-1] == "up"
+
+    run_virtual(main())
+
+
+def states_of(folder: Path, rc: str) -> list[str]:
+    lines = map(json.loads, (folder / "trace.jsonl").read_text().splitlines())
+    return [line["state"] for line in lines if line["ev"] == "rc_state" and line["id"] == rc]
 
 
 def unreadable(_state: RcState) -> RcState:
