@@ -14,11 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
 from backbone.component.messages import Absence, ComponentState
+from backbone.ranges import MANY
 from backbone.wire import Message
 
 LOOK_EVERY_S = 0.5  # chosen: an absence is shown within two looks; machine seconds
@@ -44,7 +45,7 @@ class MissionHealth(Message, frozen=True):
     """
 
     word: HealthWord
-    absent: list[Absence] = []
+    absent: Annotated[list[Absence], MANY] = []
 
 
 @dataclass(frozen=True, slots=True)

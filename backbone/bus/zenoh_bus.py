@@ -34,7 +34,16 @@ from backbone.bus.interface import (
 from backbone.bus.speaker import Speaker, settle
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
-from backbone.wire import Envelope, MalformedMessage, Message, OversizedMessage, Reader, Refused, write
+from backbone.wire import (
+    Envelope,
+    MalformedMessage,
+    Message,
+    OversizedMessage,
+    Reader,
+    Refused,
+    refuse_oversized,
+    write,
+)
 
 log = logging.getLogger(__name__)
 
@@ -251,7 +260,7 @@ class ZenohBus(Speaker):
 
     async def _answer(self, reader: Reader[Any], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
-            question = reader.read(query.payload.to_bytes() if query.payload is not None else b"")
+            question = reader.read(_bytes_of(query.payload))
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
                 query.reply(own, self._write_reply(envelope), express=True)
@@ -465,7 +474,7 @@ class _Each:
 
     def hand_over(self, sample: zenoh.Sample) -> None:
         try:
-            envelope = self._reader.read(sample.payload.to_bytes())
+            envelope = self._reader.read(_bytes_of(sample.payload))
         except Refusal as unreadable:
             self._bus.unreadable += 1
             log.warning("unreadable publication on %s: %s", sample.key_expr, unreadable.detail)
@@ -496,6 +505,18 @@ class _Latest(_Each):
         taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
         for sample in reversed(taken):
             self.hand_over(sample)
+
+
+def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
+    """Return what was sent; what is too long for a message is not even copied.
+
+    Raises:
+        OversizedMessage: It is.
+    """
+    if payload is None:
+        return b""
+    refuse_oversized(len(payload))
+    return payload.to_bytes()
 
 
 _readers: dict[Any, Reader[Any]] = {}

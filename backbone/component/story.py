@@ -9,8 +9,10 @@ from functools import lru_cache
 from backbone.bus.interface import Clock, current_cause
 from backbone.component.messages import StoryEvent
 from backbone.printable import printable_all
+from backbone.ranges import LONGEST_MENTION
 
 LENGTH = 512  # chosen: some minutes of a busy component, under 100 kB
+LONGEST_WHAT = 1_000  # chosen: a refusal with its remedy; 512 of them are half a megabyte
 
 
 class StoryBook:
@@ -26,8 +28,12 @@ class StoryBook:
         self._events: deque[StoryEvent] = deque(maxlen=LENGTH)
 
     def note(self, subject: str, what: str) -> StoryEvent:
-        """Keep that this happened to the subject now, because of the message being handled; as printable text."""
-        event = printable_all(StoryEvent(self._clock.now_s(), self._where, what, subject, current_cause.get()))
+        """Keep that this happened to the subject now, because of the message being handled; as printable text.
+
+        What is longer than ``LONGEST_WHAT`` is cut: others compose it too, and the book has its size.
+        """
+        what, subject, cause = what[:LONGEST_WHAT], subject[:LONGEST_MENTION], current_cause.get()[:LONGEST_MENTION]
+        event = printable_all(StoryEvent(self._clock.now_s(), self._where, what, subject, cause))
         self._events.append(event)
         return event
 

@@ -38,6 +38,7 @@ from backbone.component.logs import redirect
 from backbone.component.process import EXIT_BUG, run_process
 from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
+from backbone.ranges import ExitCode, Pid, Signal, Text
 from backbone.wire import Message
 
 log = logging.getLogger(__name__)
@@ -58,20 +59,20 @@ class Fork(Message, frozen=True):
 class Kill(Message, frozen=True):
     """Send the signal to everything that belongs to the component."""
 
-    pid: int
-    number: int
+    pid: Pid
+    number: Signal
 
 
 class Forked(Message, frozen=True):
     """It runs under this pid."""
 
-    pid: int
+    pid: Pid
 
 
 class ForkFailed(Message, frozen=True):
     """The system did not give another process."""
 
-    why: str
+    why: Text
 
 
 class Exited(Message, frozen=True):
@@ -82,8 +83,8 @@ class Exited(Message, frozen=True):
         returncode: Exit code, or the number of the signal that killed it, negative.
     """
 
-    pid: int
-    returncode: int
+    pid: Pid
+    returncode: ExitCode
 
 
 class ZygoteSettings(msgspec.Struct, frozen=True):

@@ -35,7 +35,7 @@ from backbone.nameserver.messages import (
     Resolved,
 )
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, Introduce, Registry
-from backbone.naming import IllegalName, component_of, read_claim
+from backbone.naming import IllegalName, component_of, is_component, read_claim
 from backbone.wire import Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -120,6 +120,9 @@ class Nameserver(Component[NoParameters]):
         self._registry.claim_changed(address, host, pid, stands=stands)
 
     def _token_changed(self, address: str, stands: bool) -> None:
+        if not is_component(address):  # a stranger's token: nobody would ever answer there, and each is kept
+            self.story.note(address, "ignored: no component can have this address")
+            return
         self._carry_out(self._registry.token_changed(address, stands=stands, now_s=self.clock.now_s()))
 
     def _status_heard(self, heard: Envelope[ComponentState]) -> None:

@@ -27,6 +27,12 @@ SERVER, ASKER = "backbone/server", "ui_console/asker"
 CLOCK = MissionClock.started_now()
 
 
+class Letter(Message, frozen=True):
+    """A message of any length."""
+
+    text: str
+
+
 async def within(work: Awaitable[Any], what: str, limit_s: float = DEADLINE_S) -> Any:
     try:
         async with asyncio.timeout(limit_s):
@@ -188,15 +194,15 @@ async def test_an_answer_that_cannot_be_written_is_a_bug_of_the_answerer() -> No
 
 async def test_a_large_message_passes_whole() -> None:
     async def answer(asked: Envelope[Any]) -> Message:
-        return Stop(asked.body.reason[::-1])
+        return Letter(asked.body.text[::-1])
 
     endpoint = free_endpoint()
     text = "0123456789" * 700_000
     async with hub_at(endpoint), joined(endpoint, SERVER, ASKER) as (server, asker):
-        server.serve(SERVER, Stop, answer)
+        server.serve(SERVER, Letter, answer)
         server.declare_alive(SERVER)
         await until_alive(asker, SERVER)
-        assert (await asker.ask(SERVER, Stop(text), Stop, within_s=DEADLINE_S)).reason == text[::-1]
+        assert (await asker.ask(SERVER, Letter(text), Letter, within_s=DEADLINE_S)).text == text[::-1]
 
 
 async def test_a_hub_that_dies_and_returns_is_noticed_and_everything_declared_stands_again() -> None:

@@ -228,8 +228,10 @@ def test_a_strangers_token_does_not_end_the_hub(local_mission: Any) -> None:
             stranger = network.join("resource_pool/stranger", VirtualClock())
             for odd in ("a/b/c", "resource_pool/scout1/a.b", "x/y", "resource_pool/Ünfug/-.1"):
                 stranger.declare_alive(odd)
-            await VirtualClock().sleep_s(0.5)
+            await VirtualClock().sleep_s(2.5)
             assert names(await listed(network)) == ["nameserver"]
+            counted = await stranger.ask(ADDRESS, AskStatistics(), Statistics, within_s=1)
+            assert counted.values["introductions_unanswered"] == 0  # nobody can answer there: it is not even asked
             await stranger.close()
 
     run_virtual(main())

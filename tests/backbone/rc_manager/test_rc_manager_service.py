@@ -81,6 +81,7 @@ class PlainRc(Component[Any]):
         self.last_epoch = 0
         self.log: list[tuple[str, str]] = []
         self.hangs = False
+        self.tells: Callable[[RcState], RcState] = lambda state: state
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         if self.hangs:
@@ -101,7 +102,9 @@ class PlainRc(Component[Any]):
                 return Disconnected(self.last_epoch)
             case AskRc():
                 holders = [Holder(arc, epoch, 0.0, 0.0) for arc, epoch in self.holders.items()]
-                return RcState(self.name, self.launch.type, self.sharable, 1.0, holders, self.last_epoch, 0, 0)
+                return self.tells(
+                    RcState(self.name, self.launch.type, self.sharable, 1.0, holders, self.last_epoch, 0, 0)
+                )
         return await super().answer(asked)
 
 
