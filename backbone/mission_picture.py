@@ -248,8 +248,8 @@ def _fallen(process: ProcessState, now_s: float, rate: float, listed: set[str]) 
         cause = f"it hangs: its event loop did not run for {process.silent_s:.1f} s"
         doing = "its creator ends and restarts it if it stays silent"
         return Absence(name, now_s - process.silent_s * rate, cause, doing, vital=is_core)
-    if not process.pid:
-        return Absence(name, now_s, process.last_end or "it has no process", _RESTARTS, vital=is_core)
+    if not process.pid and process.last_end:  # without an end before, it is being started for the first time
+        return Absence(name, now_s, process.last_end, _RESTARTS, vital=is_core)
     if is_core and name not in listed:  # other components come and go; one that starts is no absence
         return Absence(
             name, now_s, f"its process {process.pid} is not registered", process.doing or "it starts", vital=True
