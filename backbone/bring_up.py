@@ -29,6 +29,7 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.companion import Companion
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, Stop, Stopping
@@ -249,32 +250,33 @@ class Launcher(Component[NoParameters]):
         await asyncio.gather(*placed)
 
     async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
-        """Fulfill one wish of the mission file until the component is ordered to stop."""
+        """Fulfill one wish of the mission file; an order to stop suspends it until the component is started again."""
 
         def now_placed(_placement: Placement, _was_there: bool) -> None:
             if not placed.done():
                 placed.set_result(None)
 
-        wish = Wish(order.name)
-        self._wishes.append(wish)
         subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
-        try:
-            stopped = await keep_placed(
-                self.bus,
-                self.clock,
-                wish,
-                order,
-                address(subsystem, order.name),
-                on_placed=now_placed,
-                on_changed=self.changed,
-            )
-        except Refusal as refusal:
-            placed.set_exception(refusal)
-            return
-        finally:
-            placed.cancel()
-        self._wishes.remove(wish)
-        self.tell(order.name, f"is not wanted any more: {stopped}")
+        component = address(subsystem, order.name)
+        while True:
+            wish = Wish(order.name, started=placed.done())
+            self._wishes.append(wish)
+            try:
+                stopped = await keep_placed(
+                    self.bus, self.clock, wish, order, component, on_placed=now_placed, on_changed=self.changed
+                )
+            except Refusal as refusal:
+                placed.set_exception(refusal)
+                return
+            finally:
+                placed.cancel()
+                self._wishes.remove(wish)
+            self.tell(order.name, f"is not wanted any more: {stopped}")
+            again = Companion(self.bus, component)
+            try:
+                await again.wait_there()
+            finally:
+                again.close()
 
     # ------------------------------------------------------------------ stop
     async def _stop_consoles(self) -> None:

@@ -302,9 +302,14 @@ def start(
         from backbone.naming import component_of
         from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Start, Started
+        from backbone.placer.wishes import START_WITHIN_S
+        from backbone.start_by_hand import completed
 
         async with visiting(mission, connect) as (bus, clock):
-            started = await bus.ask(ADDRESS, Start(type_, name, parameters, host), Started, within_s=60.0)
+            order, remark = await completed(bus, Start(type_, name, parameters, host))
+            started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
+            if remark:
+                say(remark)
             tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
             show([f"{started.address} on {started.host}, process {started.pid}"])
             for reason in started.reasons:

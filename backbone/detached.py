@@ -72,6 +72,9 @@ async def take_down(mission: str | None) -> int:
     found = run_files.find(mission)
     launcher = psutil.Process(found.launcher_pid)
     waiting = os.pidfd_open(launcher.pid)
+    if launcher.status() == psutil.STATUS_STOPPED:
+        say(f"the launcher, process {launcher.pid}, was stopped; it is continued so that it can end its mission")
+        launcher.send_signal(signal.SIGCONT)
     try:
         for what, seconds, act in (
             ("asking", ASKED_S, None),
