@@ -157,6 +157,7 @@ class Launcher(Component[NoParameters]):
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
         self._wishes: list[Wish] = []
+        self._awaited: set[str] = set()
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
         self.outcome = Outcome()
         keeper.on_fell = self._core_service_fell
@@ -212,9 +213,15 @@ class Launcher(Component[NoParameters]):
         core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
         mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
         if self.outcome.ready_after_s is None:
-            name = self._description.name
-            mission.append(Absence(name, 0.0, "the mission is coming up", "its components are being started"))
+            mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
         return [*core, *mission]
+
+    def _being_started(self) -> str:
+        """Return which components the start waits for, and what they say they are doing."""
+        processes = self._health_watch.picture.processes
+        doing = {name: processes[name].doing for name in self._awaited if name in processes}
+        starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._awaited)]
+        return f"starts {', '.join(starts)}" if starts else "starts its services"
 
     async def drain(self) -> None:
         """Stop the mission in reverse order of its start, then the core services but the nameserver."""
@@ -253,9 +260,11 @@ class Launcher(Component[NoParameters]):
         """Fulfill one wish of the mission file; an order to stop suspends it until the component is started again."""
 
         def now_placed(_placement: Placement, _was_there: bool) -> None:
+            self._awaited.discard(order.name)
             if not placed.done():
                 placed.set_result(None)
 
+        self._awaited.add(order.name)
         subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
         component = address(subsystem, order.name)
         while True:

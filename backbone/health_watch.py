@@ -34,6 +34,11 @@ class HealthWatch:
         """Return what the look itself missed; reports of other owners are in their own states."""
         return list(self._picture.missed)
 
+    @property
+    def picture(self) -> MissionPicture:
+        """The mission at the last look."""
+        return self._picture
+
     async def run(self) -> None:
         """Look and publish until cancelled; a look that waits for an answer delays no word about what is known."""
         async with asyncio.TaskGroup() as loops:

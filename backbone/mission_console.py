@@ -30,6 +30,7 @@ from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
+PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start is over by then
 REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds; more costs a core that the mission needs
 
 
@@ -46,6 +47,7 @@ class ConsoleObserver:
         self._console, self._live, self._verdict = console, live, verdict
         self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
         self._told = self._health_told = ""
+        self._is_up, self._last_progress_s = False, 0.0
 
     def began(self, step: str) -> None:
         """Say nothing yet: a step that hangs is named by ``Outcome.failure``."""
@@ -78,6 +80,7 @@ class ConsoleObserver:
         """Show the mission until cancelled."""
         self.tell("all ready; end with Ctrl-C or 'scout-backbone down'")
         self.decide(ExitCode.DONE)
+        self._is_up = True
         if self._live:
             await self._show_live(bus, clock)
         else:
@@ -98,6 +101,9 @@ class ConsoleObserver:
 
     def _heard_health(self, envelope: Envelope[Any]) -> None:
         heard: MissionHealth = printable_all(envelope.body)
+        if not self._is_up:
+            self._heard_while_coming_up(heard, envelope.stamp_s)
+            return
         told = f"health {heard.word}"
         names = ", ".join(absence.name for absence in heard.absent)
         if (told := f"{told}: {names}" if names else told) == self._health_told or self._live:
@@ -108,6 +114,13 @@ class ConsoleObserver:
         self._print(f"{envelope.stamp_s:9.2f} s  health {heard.word}")
         for absence in heard.absent:
             self._print(f"{'':9}    {line(absence, envelope.stamp_s)}")
+
+    def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
+        """Say every now and then what a start that takes long waits for."""
+        if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
+            self._last_progress_s = at_s
+            for absence in heard.absent:
+                self.tell(f"  … {line(absence, at_s)}")
 
     def _heard_act(self, envelope: Envelope[Any]) -> None:
         act: OperatorActed = printable_all(envelope.body)
