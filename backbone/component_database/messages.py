@@ -30,7 +30,8 @@ class ComponentType(Message, frozen=True):
         multiplicity: How many may run.
         core: True for core services, which only the bring-up starts.
         tags: Host tags its components need.
-        restart: True if its creator restarts it after an unexpected end.
+        restart: True if its creator restarts it however it ended, unless it was ordered to; False: its owner asks for
+            another one.
         needs: Kinds of RC it holds one of each; empty if it is no ARC.
     """
 
