@@ -1,7 +1,8 @@
-"""Heartbeat of a process: a counter in a small file that its event loop writes and its creator reads.
+"""Heartbeat of a process: the time stamp of a small file, which its event loop counts up and its creator reads.
 
 No message crosses the bus, so a lost hub never makes a process look hung, and reading costs the process nothing.
-A process without a file, because the disk is full, is judged by its use of the processor alone.
+A time stamp needs no room on the disk: on a full one only the line that says what the process is doing is missing. A
+process that could not even make its file is not judged once it is ready.
 
 Prior art: systemd's watchdog notifications. Here the supervisor reads at its own pace.
 """
@@ -10,7 +11,6 @@ from __future__ import annotations
 
 import logging
 import os
-import struct
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,8 +22,9 @@ log = logging.getLogger(__name__)
 
 BEAT_EVERY_S = 0.25  # chosen: a hung process is seen within 1 s, at four wake-ups of the event loop a second
 DOING_BYTES = 160  # chosen: a line for people
-_RECORD = struct.Struct(f"<Q{DOING_BYTES}s")
 _NS = 1e-9
+_ONE_BEAT_NS = 1_000_000_000  # chosen: every file system keeps whole seconds
+_LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file in which nothing has beaten yet is later
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +53,7 @@ class Heartbeat:
     """
 
     def __init__(self, run_directory: str, doing: Callable[[], str] = str) -> None:
-        self._doing, self._beats, self._file = doing, 0, -1
+        self._doing, self._beats, self._file, self._said = doing, 0, -1, b""
         if not run_directory:
             return
         path = heartbeat_path(run_directory, os.getpid())
@@ -76,12 +77,13 @@ class Heartbeat:
 
     def _write(self) -> None:
         self._beats += 1
-        doing = self._doing().encode(errors="replace")[:DOING_BYTES]
-        try:
-            os.pwrite(self._file, _RECORD.pack(self._beats, doing), 0)
-        except OSError as error:
-            log.warning("heartbeats end: %s", error)
-            self.close()
+        doing = self._doing().encode(errors="replace")[:DOING_BYTES].ljust(DOING_BYTES)
+        if doing != self._said:
+            with suppress(OSError):  # a full disk
+                os.pwrite(self._file, doing, 0)
+                self._said = doing
+        stamp_ns = self._beats * _ONE_BEAT_NS
+        os.utime(self._file, ns=(stamp_ns, stamp_ns))
 
 
 def heartbeat_path(run_directory: str, pid: int) -> Path:
@@ -99,13 +101,12 @@ def read_vitals(run_directory: str, pid: int) -> Vitals | None:
         ran_ns, queued_ns = b"0", b"0"
     beats, doing = 0, b""
     if run_directory:
-        try:
-            record = heartbeat_path(run_directory, pid).read_bytes()
-        except OSError:
-            record = b""
-        if len(record) == _RECORD.size:
-            beats, doing = _RECORD.unpack(record)
-    return Vitals(beats, int(ran_ns) * _NS, int(queued_ns) * _NS, doing.rstrip(b"\0").decode(errors="replace"))
+        with suppress(OSError):
+            path = heartbeat_path(run_directory, pid)
+            stamp_ns = path.stat().st_mtime_ns
+            beats = 0 if stamp_ns > _LATEST_NS else stamp_ns // _ONE_BEAT_NS
+            doing = path.read_bytes()
+    return Vitals(beats, int(ran_ns) * _NS, int(queued_ns) * _NS, doing.decode(errors="replace").strip())
 
 
 def forget_heartbeat(run_directory: str, pid: int) -> None:

@@ -328,16 +328,18 @@ class ProcessKeeper:
             for pid in {one.pid for one in self._supervision if one.pid} | self._shared.pids():
                 if (vitals := self._read_vitals(run_directory, pid)) is not None:
                     self._doing[pid] = vitals.doing
-                    self._observed(pid, self._silences.setdefault(pid, Silence()).look(vitals, now_s), now_s)
+                    silent_s = self._silences.setdefault(pid, Silence()).look(vitals, now_s)
+                    self._observed(pid, silent_s, now_s, beats=vitals.beats > 0)
             trouble = self._zygote.keep_running()
             if trouble != self._zygote_trouble:
                 self._zygote_trouble, self._zygote_trouble_since_s = trouble, now_s
                 self.on_changed()
 
-    def _observed(self, pid: int, silent_s: float, now_s: float) -> None:
+    def _observed(self, pid: int, silent_s: float, now_s: float, *, beats: bool) -> None:
         self._do_shared(self._shared.observed(pid, silent_s, now_s))
-        for name in [one.name for one in self._supervision if one.pid == pid]:
-            self._do(self._supervision.observed(name, silent_s, now_s))
+        for one in [one for one in self._supervision if one.pid == pid]:
+            if beats or one.phase is not Phase.READY:  # a ready process that never beat could not make its file
+                self._do(self._supervision.observed(one.name, silent_s, now_s))
 
     def _exited(self, pid: int, returncode: int) -> None:
         self._silences.pop(pid, None)

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.heartbeat import (
     BEAT_EVERY_S,
@@ -59,6 +61,19 @@ def test_a_folder_that_cannot_be_written_harms_nobody(tmp_path: Path) -> None:
     vitals = read_vitals(str(tmp_path), os.getpid())
     assert vitals is not None
     assert vitals.beats == 0
+
+
+def test_a_full_disk_stops_no_heartbeat(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that filled up once made every process look hung, and all of them were killed."""
+
+    def full(*_arguments: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "pwrite", full)
+    beat_for(str(tmp_path), 10 * BEAT_EVERY_S + 0.01, "records")
+    vitals = read_vitals(str(tmp_path), os.getpid())
+    assert vitals is not None
+    assert (vitals.beats, vitals.doing) == (11, "")
 
 
 def test_a_process_that_has_ended_has_no_vitals(tmp_path: Path) -> None:

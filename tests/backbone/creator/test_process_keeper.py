@@ -174,6 +174,17 @@ def test_a_ready_process_without_a_sign_of_life_is_reported_then_replaced(on_ben
     on_bench(body)
 
 
+def test_a_ready_process_that_could_not_make_its_file_is_not_judged(on_bench: Callable) -> None:
+    async def body(bench: Bench) -> None:
+        pid = await bench.start("Quiet", "scout1")
+        bench.vitals[pid] = Vitals(0)
+        await VirtualClock().sleep_s(10.0)
+        assert bench.keeper.absences() == []
+        assert pid in bench.zygote.lives
+
+    on_bench(body)
+
+
 def test_a_starved_process_is_not_taken_for_hung(on_bench: Callable) -> None:
     async def body(bench: Bench) -> None:
         pid = await bench.start("Quiet", "scout1")
