@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import logging
 import os
 import signal
@@ -19,7 +18,6 @@ import socket
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -31,7 +29,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import Absence, Stop, Stopping
 from backbone.creator.messages import (
     EndedBy,
     ListProcesses,
@@ -44,6 +42,7 @@ from backbone.creator.messages import (
 from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.door import SECRET_NAME, keep_secret, new_secret, read_secret_file, secret_of, socket_endpoint
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import Host, MissionDescription
@@ -52,8 +51,9 @@ from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorAction, tell_acted
+from backbone.other_hosts import OtherHosts, door_for_others
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Ended, ListPlacements, Placements, Start, Started, StopComponent
+from backbone.placer.messages import Ended, ListPlacements, NoHost, Placements, Start, Started, StopComponent
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -64,7 +64,8 @@ LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 CORE_POLICY = RestartPolicy(
     back_off_s=0.02, back_off_most_s=0.5, limit=20, window_s=60.0, after_good_end=True
 )  # chosen: a dead hub stops everybody, and leases outlast a restart of the RC manager only if its pause stays short
-FIRST_PORT, LAST_PORT = 20000, 32000  # chosen: below the ports the system hands out to outgoing connections
+MEET_TIME_S = 5.0  # chosen: the placer hears of a creator milliseconds after its token, on a busy machine later
+MEET_EACH_S = 0.1  # chosen: nobody notices this pause, and it is a hundred times what asking costs
 
 
 @dataclass(frozen=True)
@@ -75,11 +76,13 @@ class UpOptions:
         speed: Mission seconds per second of the machine.
         trace: File for the schedule trace, or None.
         for_s: Mission seconds after readiness until it ends by itself, or None: until told.
+        secret_file: File with the secret that other machines prove, or None: a new secret for each run.
     """
 
     speed: float = 1.0
     trace: Path | None = None
     for_s: float | None = None
+    secret_file: Path | None = None
 
 
 @dataclass
@@ -115,6 +118,20 @@ class MissionAlreadyUp(Refusal):
     remedy = "Take it down with 'scout-backbone down', or give this one another name."
 
 
+class PortTaken(Refusal):
+    """The hub cannot listen for other machines where the mission file says."""
+
+    code = "run.port"
+    remedy = "State another port or address at the mission's first host, or stop what listens there."
+
+
+class TraceUnwritable(Refusal):
+    """The file of the schedule trace cannot be opened for writing."""
+
+    code = "run.trace"
+    remedy = "Name a file in a folder that exists and that you may write into."
+
+
 class CoreServiceLost(BackboneError):
     """A core service ended so often that it was given up."""
 
@@ -127,6 +144,9 @@ class Observer(Protocol):
 
     def done(self, step: str, took_s: float) -> None:
         """Take note that this step is done after these seconds of the machine."""
+
+    def told(self, line: str) -> None:
+        """Take note of what a person should know or do now."""
 
     def connected(self, bus: Bus) -> None:
         """Listen to what the mission says; the hub is up, nothing else is."""
@@ -156,6 +176,8 @@ class Launcher(Component[NoParameters]):
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
         self.outcome = Outcome()
+        self._others = OtherHosts(description, clock.now_s())
+        self._others_changed = asyncio.Event()
         keeper.on_fell = self._core_service_fell
 
     async def connect(self) -> None:
@@ -163,6 +185,11 @@ class Launcher(Component[NoParameters]):
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
                 await self._keeper.start(launch, CORE_POLICY, START_TIME_S)
+        self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
+
+    def absences(self) -> list[Absence]:
+        """Return the declared machines that are missing."""
+        return self._others.absences()
 
     async def serve(self) -> None:
         """Start the mission through the placer, then let it run."""
@@ -204,12 +231,39 @@ class Launcher(Component[NoParameters]):
             await self._stop_consoles()
         async with self._step("stop mission"):
             await self._stop_mission()
+        if self._others.offering:
+            async with self._step("stop creators of other hosts"):
+                await self._stop_other_hosts()
         async with self._step("stop core services"):
             for launch in reversed(core_launches(self._description, self.launch, self._options)):
                 self.outcome.ended.append(await self._keeper.end(launch.name, "the mission ends"))
 
     # ------------------------------------------------------------------ start
+    def _backbone_changed(self, address: str, stands: bool) -> None:
+        if self._others.token_changed(address, stands, self.clock.now_s()):
+            self.changed()
+        self._others_changed.set()
+
+    async def _wait_for_other_hosts(self) -> None:
+        """Return as soon as every declared machine has its creator in the mission."""
+        if self._others.missing:
+            self._observer.told(f"the mission's secret, for its other hosts: {_secret_path(self.launch)}")
+        for host in self._others.missing:
+            self._observer.told(
+                f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
+            )
+        while self._others.missing:
+            self.report(f"waits for host {', '.join(self._others.missing)}")
+            await asyncio.gather(*(self._wait_for_host(host) for host in self._others.missing))
+
+    async def _wait_for_host(self, host: str) -> None:
+        async with self._step(f"host {host}"):
+            while host in self._others.missing:
+                self._others_changed.clear()
+                await self._others_changed.wait()
+
     async def _start_mission(self) -> None:
+        await self._wait_for_other_hosts()
         description = self._description
         hardware = [Start(c.type, c.name, c.parameters, c.host, process=c.process) for c in description.components]
         hardware += [Start(r.type, r.name, r.rc_parameters(), r.host, process=r.process) for r in description.resources]
@@ -226,12 +280,23 @@ class Launcher(Component[NoParameters]):
         Raises:
             Refusal: The first that could not be started.
         """
-        outcomes = await asyncio.gather(
-            *(self.bus.ask(PLACER, order, Started, within_s=START_TIME_S) for order in orders), return_exceptions=True
-        )
+        outcomes = await asyncio.gather(*(self._start_one(order) for order in orders), return_exceptions=True)
         for outcome in outcomes:
             if isinstance(outcome, BaseException):
                 raise outcome
+
+    async def _start_one(self, order: Start) -> None:
+        """Ask the placer for it, again for a moment while the placer may not have met the other machines' creators."""
+        until_s = time.monotonic() + (MEET_TIME_S if self._others.names else 0.0)
+        while True:
+            try:
+                await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+            except NoHost:
+                if time.monotonic() >= until_s:
+                    raise
+            else:
+                return
+            await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
 
     # ------------------------------------------------------------------ stop
     async def _stop_consoles(self) -> None:
@@ -268,6 +333,21 @@ class Launcher(Component[NoParameters]):
             return
         self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
 
+    async def _stop_other_hosts(self) -> None:
+        """Have the other machines end their creators and return when they did; a silent one ends all by itself."""
+        stops = (
+            self.bus.ask(offer, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
+            for offer in self._others.offering
+        )
+        await asyncio.gather(*stops, return_exceptions=True)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(STOP_TIME_S):
+                while self._others.offering:
+                    self._others_changed.clear()
+                    await self._others_changed.wait()
+        for offer in self._others.offering:
+            self._observer.told(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
+
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
         self.story.note(fell.name, f"fell: {fell.how}")
@@ -294,16 +374,19 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     """
     began_s = time.monotonic()
     refuse_if_up(description.name)
-    directory = run_files.run_directory(description.name)
-    (directory / "log").mkdir(parents=True, exist_ok=True, mode=0o700)
-    clock = MissionClock(began_s, options.speed)
-    own = _launch(description, "launcher", "launcher", "", clock, directory)
-    observer.began("nameserver")
-    zygote = await Zygote.spawn_fresh(run_directory=str(directory))
+    _refuse_trace(options.trace)
+    directory = run_files.make_directory(description.name)
     try:
-        return await _with_hub(zygote, own, clock, description, options, observer, began_s)
+        endpoint = _make_door(description, options, directory)
+        clock = MissionClock(began_s, options.speed)
+        own = _launch(description, endpoint, clock, directory)
+        observer.began("nameserver")
+        zygote = await Zygote.spawn_fresh(run_directory=str(directory))
+        try:
+            return await _with_hub(zygote, own, clock, description, options, observer, began_s)
+        finally:
+            await zygote.close()
     finally:
-        await zygote.close()
         run_files.remove(description.name)
 
 
@@ -317,9 +400,11 @@ async def _with_hub(
     began_s: float,
 ) -> Outcome:
     keeper = ProcessKeeper(zygote)
-    hub = _service_launch(own, "nameserver", "nameserver", description, {})
+    others = door_for_others(description)
+    hub = _service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
     await keeper.start_hub(hub, CORE_POLICY)
-    bus = await ZenohBus.open_when_up(own.mission, own.address, clock, client_config(own.endpoint))
+    config = client_config(own.endpoint, secret_of(own.run_directory))
+    bus = await ZenohBus.open_when_up(own.mission, own.address, clock, config)
     observer.connected(bus)
     keeper.use(bus)
     await keeper.wait_ready(hub.name, START_TIME_S)
@@ -364,7 +449,11 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
         "component_database": lambda _: {"types": types},
         "placer": lambda _: {},
-        "creator": lambda host: {"tags": list(host.tags), "preload": arc_modules(description.types)},
+        "creator": lambda host: {
+            "tags": list(host.tags),
+            "preload": arc_modules(description.types),
+            "types": types,
+        },
         "dependency_database": lambda _: {"resources": resources},
         "rc_manager": lambda _: {
             **description.core_parameters("rc_manager"),
@@ -376,7 +465,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     hosts = {host.name: host for host in description.hosts}
     launches = []
     for service in description.core:
-        here = is_this_machine(hosts[service.host]) or service.host == own.host
+        here = hosts[service.host].is_loopback or service.host == own.host
         if service.type == "nameserver" or not here:
             continue
         name = creator_name(service.host) if service.type == "creator" else service.type
@@ -401,30 +490,66 @@ def refuse_if_up(mission: str) -> None:
     )
 
 
-def is_this_machine(host: Host) -> bool:
-    """Say whether the host's address is a loopback address."""
+def _refuse_trace(trace: Path | None) -> None:
+    """Return if the trace can be written, or none is wanted.
+
+    Raises:
+        TraceUnwritable: It cannot.
+    """
+    if trace is None:
+        return
     try:
-        return ipaddress.ip_address(host.address).is_loopback
-    except ValueError:
-        return host.address == "localhost"
+        trace.open("a").close()
+    except OSError as error:
+        raise TraceUnwritable(f"{trace}: {error.strerror or error}", file=str(trace)) from error
 
 
-def _launch(
-    description: MissionDescription,
-    component_type: str,
-    name: str,
-    class_path: str,
-    clock: MissionClock,
-    directory: Path,
-) -> Launch:
+def _make_door(description: MissionDescription, options: UpOptions, directory: Path) -> str:
+    """Return where the hub will listen on this machine; with other machines their secret lies beside it afterwards.
+
+    Raises:
+        SocketPathTooLong: The folder's path is too long for a socket.
+        PortTaken: The hub could not listen for the other machines.
+        NoSecret: The file that should hold the secret does not.
+    """
+    endpoint = socket_endpoint(directory)
+    (directory / SECRET_NAME).unlink(missing_ok=True)
+    if description.other_hosts:
+        _refuse_taken_port(description.hosts[0])
+        given = options.secret_file
+        keep_secret(directory, read_secret_file(given) if given is not None else new_secret())
+    return endpoint
+
+
+def _refuse_taken_port(host: Host) -> None:
+    """Return if a hub can listen at the host's address and port.
+
+    Raises:
+        PortTaken: It cannot.
+    """
+    try:
+        family, kind, protocol, _, where = socket.getaddrinfo(host.address, host.port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, kind, protocol) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(where)
+            probe.listen()
+    except OSError as error:
+        raise PortTaken(f"port {host.port} of {host.address}: {error.strerror or error}", port=host.port) from error
+
+
+def _secret_path(own: Launch) -> Path:
+    return Path(own.run_directory) / SECRET_NAME
+
+
+def _launch(description: MissionDescription, endpoint: str, clock: MissionClock, directory: Path) -> Launch:
     return Launch(
         mission=description.name,
         subsystem=Subsystem.BACKBONE,
-        name=name,
-        type=component_type,
-        class_path=class_path,
+        name="launcher",
+        type="launcher",
+        class_path="",
         host=description.hosts[0].name,
-        endpoint=f"tcp/{description.hosts[0].address}:{_free_port(description.hosts[0].address)}",
+        endpoint=endpoint,
         clock_origin_monotonic_s=clock.origin_monotonic_s,
         clock_rate=clock.rate,
         requester=LAUNCHER,
@@ -437,19 +562,6 @@ def _service_launch(
 ) -> Launch:
     class_path = next(t.class_path for t in description.types if t.name == component_type)
     return msgspec.structs.replace(own, name=name, type=component_type, class_path=class_path, parameters=parameters)
-
-
-def _free_port(host_address: str) -> int:
-    """Return a port of this machine's address that nobody listens on; the hub keeps it over its restarts."""
-    start = FIRST_PORT + os.getpid() * 7 % (LAST_PORT - FIRST_PORT)
-    for port in chain(range(start, LAST_PORT), range(FIRST_PORT, start)):
-        with socket.socket() as probe:
-            try:
-                probe.bind((host_address, port))
-            except OSError:
-                continue
-            return port
-    raise LinkError(f"no free port between {FIRST_PORT} and {LAST_PORT}")
 
 
 async def end_mission(bus: Bus) -> None:

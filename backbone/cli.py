@@ -13,6 +13,7 @@ import sys
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractAsyncContextManager
 from enum import IntEnum
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -53,6 +54,14 @@ MissionName = Annotated[str | None, typer.Option("--mission", help="Name of the 
 Endpoint = Annotated[
     str | None, typer.Option("--connect", help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission.")
 ]
+SecretFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--secret-file",
+        envvar="SCOUT_SECRET_FILE",
+        help="File with the mission's secret, with --connect; '-' reads it from standard input.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
@@ -91,13 +100,33 @@ def run(work: Callable[[], Awaitable[int]]) -> None:
     raise typer.Exit(int(code))
 
 
-def visiting(mission: str | None, endpoint: str | None) -> AbstractAsyncContextManager[tuple[Any, Any]]:
+def visiting(
+    mission: str | None, endpoint: str | None, secret_file: Path | None
+) -> AbstractAsyncContextManager[tuple[Any, Any]]:
     """Return ``async with`` a bus to a mission that is up, and its clock."""
     from backbone import visit
 
     if endpoint is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
-    return visit.visiting(mission, endpoint, f"ui_console/cli-{os.getpid()}")
+    secret = read_secret_option(secret_file) if endpoint is not None else ""
+    return visit.visiting(mission, endpoint, f"ui_console/cli-{os.getpid()}", secret)
+
+
+def read_secret_option(secret_file: Path | None) -> str:
+    """Return the secret in that file, or typed unseen for ``-``; empty if none was named.
+
+    Raises:
+        NoSecret: There is none in it.
+    """
+    from getpass import getpass
+
+    from backbone.door import read_secret, read_secret_file
+
+    if secret_file is None:
+        return ""
+    if str(secret_file) != "-":
+        return read_secret_file(secret_file)
+    return read_secret(getpass("secret of the mission: ") if sys.stdin.isatty() else sys.stdin.readline())
 
 
 def read_or_exit(mission_file: Path) -> Any:
@@ -173,6 +202,9 @@ def up(
     speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
     trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
     for_s: Annotated[float | None, typer.Option("--for", min=0.0, help="End after these mission seconds.")] = None,
+    secret_file: Annotated[
+        Path | None, typer.Option("--secret-file", help="Secret for the other hosts; default: a new one each time.")
+    ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
@@ -180,11 +212,12 @@ def up(
     if detach:
         from backbone.detached import up_detached
 
-        raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
+        given = partial(up_detached, speed=speed, trace=trace, for_s=for_s, secret_file=secret_file)
+        raise typer.Exit(given(description.name, mission_file))
     from backbone.bring_up import UpOptions
     from backbone.mission_console import bring_up_on_console
 
-    options = UpOptions(speed=speed, trace=trace, for_s=for_s)
+    options = UpOptions(speed=speed, trace=trace, for_s=for_s, secret_file=secret_file)
     ready_to = os.fdopen(tell_fd, "w", encoding="utf-8") if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), ready_to=ready_to))
 
@@ -195,6 +228,7 @@ def status(
     watch: Annotated[bool, typer.Option("--watch", help="Keep showing it.")] = False,
     mission: MissionName = None,
     connect: Endpoint = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Show components by subsystem, who holds which resource, and the schedule."""
 
@@ -205,7 +239,7 @@ def status(
         from backbone.mission_picture import look
         from backbone.mission_screen import live_screen, screen
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             if as_json:
                 print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
                 while watch:
@@ -225,13 +259,19 @@ def status(
 
 
 @app.command()
-def why(name: str, as_json: AsJson = False, mission: MissionName = None, connect: Endpoint = None) -> None:
+def why(
+    name: str,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
     """Say why a request waits or runs, why a component is where it is, until when."""
 
     async def work() -> int:
         from backbone.reasons import reasons_for
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             reasons = await reasons_for(bus, name)
             if as_json:
                 print(json.dumps(reasons.to_json()))
@@ -243,13 +283,18 @@ def why(name: str, as_json: AsJson = False, mission: MissionName = None, connect
 
 
 @app.command()
-def story(name: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+def story(
+    name: str,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
     """Tell the events that touched a component, request or resource, with their causes."""
 
     async def work() -> int:
         from backbone.reasons import story_of
 
-        async with visiting(mission, connect) as (bus, _clock):
+        async with visiting(mission, connect, secret_file) as (bus, _clock):
             for event in await story_of(bus, name):
                 cause = f"   because of {event.cause}" if event.cause else ""
                 print(f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}")
@@ -268,6 +313,7 @@ def start(
     ] = None,
     mission: MissionName = None,
     connect: Endpoint = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Start one more component through the placer."""
     parameters = dict(_parameter(given) for given in parameter or [])
@@ -277,7 +323,7 @@ def start(
         from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Start, Started
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             started = await bus.ask(ADDRESS, Start(type_, name, parameters, host), Started, within_s=60.0)
             tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
             print(f"{started.address} on {started.host}, process {started.pid}")
@@ -289,14 +335,19 @@ def start(
 
 
 @app.command()
-def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+def stop(
+    name: str,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
     """Stop one component for good."""
 
     async def work() -> int:
         from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
             tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             print(f"{name} ended by {ended.by}")
@@ -316,6 +367,7 @@ def set_(
     as_json: AsJson = False,
     mission: MissionName = None,
     connect: Endpoint = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Set priority, parent or a run time of whoever asks for resources, or any parameter; without a value show it."""
     if value is not None and as_json:
@@ -325,7 +377,7 @@ def set_(
         from backbone.attributes import attributes_of, change
         from backbone.operators import OperatorAction, login_name, tell_acted
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
                 lines = await change(bus, name, parameter, _value(value), login_name())
                 tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {_value(value)!r}")
@@ -358,15 +410,17 @@ def creator(
     host: Annotated[str, typer.Option("--host", help="Name of this machine in the mission.")],
     connect: Annotated[str, typer.Option("--connect", help="The mission's hub, tcp/HOST:PORT.")],
     mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
+    secret_file: SecretFile = None,
     tag: Annotated[list[str] | None, typer.Option("--tag", help="What this machine has; repeatable.")] = None,
 ) -> None:
-    """Offer this machine to a mission until Ctrl-C: its placer may start components here."""
+    """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
 
     async def work() -> int:
-        from backbone.creator.offer import offer
+        from backbone.creator.offer import Offered, Offering
 
+        offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
         say(f"{host} is offered to mission {mission}; end with Ctrl-C")
-        fell = await offer(mission, connect, host, tag or [])
+        fell = await Offering(offered, say).run()
         if fell is None:
             return ExitCode.DONE
         say(f"{fell.name} was given up: {fell.how}")

@@ -49,6 +49,10 @@ class ConsoleObserver:
         """Print the step with its time."""
         self.tell(f"  ✓ {step:<42} {took_s * 1000:7.0f} ms")
 
+    def told(self, line: str) -> None:
+        """Print the line."""
+        self.tell(f"  {line}")
+
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people."""
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)

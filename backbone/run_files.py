@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 import psutil
 
+from backbone.door import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 
@@ -77,15 +78,26 @@ def run_directory(mission: str) -> Path:
     return _directory() / legal(mission)
 
 
+def make_directory(mission: str) -> Path:
+    """Return the folder of a mission's files, which only this user can enter.
+
+    Raises:
+        IllegalName: The mission's name is no legal name.
+        UnsafeDirectory: Somebody else could put files there.
+    """
+    directory = run_directory(mission)
+    (directory / "log").mkdir(mode=0o700, parents=True, exist_ok=True)
+    directory.chmod(0o700)  # its parents' mode follows the umask
+    return directory
+
+
 def write(run_file: RunFile) -> Path:
     """Make the mission findable and return the file's path.
 
     Raises:
         UnsafeDirectory: Somebody else could put files there.
     """
-    directory = run_directory(run_file.mission)
-    directory.mkdir(mode=0o700, exist_ok=True)
-    directory.chmod(0o700)
+    directory = make_directory(run_file.mission)
     started_s = psutil.Process(run_file.launcher_pid).create_time()
     content = msgspec.json.encode(msgspec.structs.replace(run_file, launcher_started_s=started_s))
     path, part = directory / FILE_NAME, directory / f".{FILE_NAME}.{os.getpid()}"
@@ -121,6 +133,11 @@ def find(mission: str | None = None) -> RunFile:
         if run_file.mission == mission:
             return run_file
     raise MissionNotUp(f"mission {mission!r} is not up; up: {names or 'none'}", mission=mission, missions=names)
+
+
+def secret(run_file: RunFile) -> str:
+    """Return what the mission's hub asks its clients for; empty: nothing."""
+    return secret_of(str(run_directory(run_file.mission)))
 
 
 def find_all() -> list[RunFile]:

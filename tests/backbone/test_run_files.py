@@ -72,7 +72,7 @@ def test_a_broken_file_is_passed_over() -> None:
 
 def test_removing_leaves_nothing_and_may_be_done_twice(runtime_directory: Path) -> None:
     path = run_files.write(up("iros2001"))
-    (path.parent / "log").mkdir()
+    (path.parent / "log" / "scout1.log").touch()
     run_files.remove("iros2001")
     run_files.remove("iros2001")
     assert list((runtime_directory / "scout-backbone").iterdir()) == []
