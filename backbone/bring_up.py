@@ -253,12 +253,12 @@ class Launcher(Component[NoParameters]):
                 f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
             )
         while self._others.missing:
-            self.report(f"waits for host {', '.join(self._others.missing)}")
             await asyncio.gather(*(self._wait_for_host(host) for host in self._others.missing))
 
     async def _wait_for_host(self, host: str) -> None:
         async with self._step(f"host {host}"):
             while host in self._others.missing:
+                self.report(f"waits for host {', '.join(self._others.missing)}")
                 self._others_changed.clear()
                 await self._others_changed.wait()
 
