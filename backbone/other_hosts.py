@@ -85,6 +85,7 @@ class OtherHosts:
     def absences(self) -> list[Absence]:
         """Return the machines that are missing, with the remedy for each."""
         return [
-            Absence(host, absent.since_s, absent.cause, "waits for its creator", f"type there: {self.command(host)}")
-            for host, absent in self._absent.items()
+            Absence(host, absent.since_s, absent.cause, "waits for its creator", f"type there: {command}")
+            for host, command in self._commands.items()
+            if (absent := self._absent.get(host)) is not None
         ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import random
 import signal
 import socket
 import sys
@@ -143,7 +144,10 @@ class Attacker:
     def ways_in(self) -> Iterator[tuple[str, str, dict[str, str]]]:
         modes = MODES[:1] if self.only_client else MODES
         guesses = GUESSES[:1] if self.only_client else GUESSES
-        return itertools.cycle(itertools.product(self.endpoints, modes, guesses))
+        ways = list(itertools.product(self.endpoints, modes, guesses))
+        rng = random.Random(1)
+        while True:  # each kind of attack meets every way in
+            yield rng.choice(ways)
 
     def open(self, endpoint: str, mode: str, guess: dict[str, str]) -> zenoh.Session | None:
         settings = {
