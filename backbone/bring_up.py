@@ -42,7 +42,7 @@ from backbone.creator.messages import (
 from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
-from backbone.door import SECRET_NAME, keep_secret, new_secret, read_secret_file, secret_of, socket_endpoint
+from backbone.door import SECRET_NAME, keep_secret, new_secret, secret_of, socket_endpoint
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import Host, MissionDescription
@@ -76,13 +76,11 @@ class UpOptions:
         speed: Mission seconds per second of the machine.
         trace: File for the schedule trace, or None.
         for_s: Mission seconds after readiness until it ends by itself, or None: until told.
-        secret_file: File with the secret that other machines prove, or None: a new secret for each run.
     """
 
     speed: float = 1.0
     trace: Path | None = None
     for_s: float | None = None
-    secret_file: Path | None = None
 
 
 @dataclass
@@ -377,7 +375,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     _refuse_trace(options.trace)
     directory = run_files.make_directory(description.name)
     try:
-        endpoint = _make_door(description, options, directory)
+        endpoint = _make_door(description, directory)
         clock = MissionClock(began_s, options.speed)
         own = _launch(description, endpoint, clock, directory)
         observer.began("nameserver")
@@ -504,20 +502,20 @@ def _refuse_trace(trace: Path | None) -> None:
         raise TraceUnwritable(f"{trace}: {error.strerror or error}", file=str(trace)) from error
 
 
-def _make_door(description: MissionDescription, options: UpOptions, directory: Path) -> str:
+def _make_door(description: MissionDescription, directory: Path) -> str:
     """Return where the hub will listen on this machine; with other machines their secret lies beside it afterwards.
+
+    The secret is a new one, so that nothing of an earlier run can speak to this one.
 
     Raises:
         SocketPathTooLong: The folder's path is too long for a socket.
         PortTaken: The hub could not listen for the other machines.
-        NoSecret: The file that should hold the secret does not.
     """
     endpoint = socket_endpoint(directory)
     (directory / SECRET_NAME).unlink(missing_ok=True)
     if description.other_hosts:
         _refuse_taken_port(description.hosts[0])
-        given = options.secret_file
-        keep_secret(directory, read_secret_file(given) if given is not None else new_secret())
+        keep_secret(directory, new_secret())
     return endpoint
 
 

@@ -13,7 +13,6 @@ import sys
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractAsyncContextManager
 from enum import IntEnum
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -202,9 +201,6 @@ def up(
     speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
     trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
     for_s: Annotated[float | None, typer.Option("--for", min=0.0, help="End after these mission seconds.")] = None,
-    secret_file: Annotated[
-        Path | None, typer.Option("--secret-file", help="Secret for the other hosts; default: a new one each time.")
-    ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
@@ -212,12 +208,11 @@ def up(
     if detach:
         from backbone.detached import up_detached
 
-        given = partial(up_detached, speed=speed, trace=trace, for_s=for_s, secret_file=secret_file)
-        raise typer.Exit(given(description.name, mission_file))
+        raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
     from backbone.bring_up import UpOptions
     from backbone.mission_console import bring_up_on_console
 
-    options = UpOptions(speed=speed, trace=trace, for_s=for_s, secret_file=secret_file)
+    options = UpOptions(speed=speed, trace=trace, for_s=for_s)
     ready_to = os.fdopen(tell_fd, "w", encoding="utf-8") if tell_fd is not None else None
     run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), ready_to=ready_to))
 
@@ -419,8 +414,9 @@ def creator(
         from backbone.creator.offer import Offered, Offering
 
         offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
+        is_file = secret_file is not None and str(secret_file) != "-"
         say(f"{host} is offered to mission {mission}; end with Ctrl-C")
-        fell = await Offering(offered, say).run()
+        fell = await Offering(offered, say, secret_file if is_file else None).run()
         if fell is None:
             return ExitCode.DONE
         say(f"{fell.name} was given up: {fell.how}")

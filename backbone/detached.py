@@ -22,22 +22,13 @@ from backbone.operators import OperatorAction, tell_acted
 ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
 
 
-def up_detached(
-    mission: str,
-    mission_file: Path,
-    *,
-    speed: float,
-    trace: Path | None,
-    for_s: float | None,
-    secret_file: Path | None,
-) -> int:
+def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
     """Start a launcher in a session of its own; return 0 when all is ready, else how it ended."""
     told, telling = os.pipe()
     command = [sys.executable, "-m", "backbone.cli", "up", str(mission_file.absolute()), "--headless"]
     command += ["--tell-fd", str(telling), "--speed", str(speed)]
     command += ["--trace", str(trace.absolute())] if trace else []
     command += ["--for", str(for_s)] if for_s is not None else []
-    command += ["--secret-file", str(secret_file.absolute())] if secret_file else []
     launcher = subprocess.Popen(  # noqa: S603  our own command line
         command,
         stdin=subprocess.DEVNULL,

@@ -20,6 +20,7 @@ from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 
 FILE_NAME = "run.json"
+ENDED = ".ended-"  # a folder whose mission ends is hidden as .<mission>.ended-<pid of the zygote that removes it>
 START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports a process's start in hundredths, corrected by clock steps
 
 
@@ -79,13 +80,14 @@ def run_directory(mission: str) -> Path:
 
 
 def make_directory(mission: str) -> Path:
-    """Return the folder of a mission's files, which only this user can enter.
+    """Return the folder of a mission's files, which only this user can enter; nothing of a dead run is beside it.
 
     Raises:
         IllegalName: The mission's name is no legal name.
         UnsafeDirectory: Somebody else could put files there.
     """
     directory = run_directory(mission)
+    _remove_what_dead_zygotes_left(directory)
     (directory / "log").mkdir(mode=0o700, parents=True, exist_ok=True)
     directory.chmod(0o700)  # its parents' mode follows the umask
     return directory
@@ -144,6 +146,14 @@ def find_all() -> list[RunFile]:
     """Return the missions that are up on this machine, sorted by name."""
     found = (_read(folder / FILE_NAME) for folder in sorted(_directory().iterdir()) if is_legal(folder.name))
     return [run_file for run_file in found if run_file is not None and _is_fresh(run_file)]
+
+
+def _remove_what_dead_zygotes_left(directory: Path) -> None:
+    """Remove folders of earlier runs whose zygote was killed between hiding its folder and removing it."""
+    for hidden in directory.parent.glob(f".{directory.name}{ENDED}*"):
+        pid = hidden.name.rpartition(ENDED)[2]
+        if pid.isdecimal() and not psutil.pid_exists(int(pid)):
+            shutil.rmtree(hidden, ignore_errors=True)
 
 
 def _directory() -> Path:

@@ -12,10 +12,10 @@ import os
 import signal
 import socket
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import msgspec
 
@@ -32,6 +32,7 @@ from backbone.creator.messages import (
     ListProcesses,
     Processes,
     ProcessFell,
+    ProcessState,
     RestartPolicy,
     creator_name,
     offer_name,
@@ -39,7 +40,7 @@ from backbone.creator.messages import (
 from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
-from backbone.door import keep_secret
+from backbone.door import keep_secret, read_secret_file
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.naming import Subsystem, legal
 from backbone.visit import clock_elsewhere, mission_clock
@@ -49,7 +50,8 @@ OFFER_TYPE = "offer"
 READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), and 5 s after it nothing may run here
-SAME_MISSION_S = 1.0  # chosen: two readings of one clock differ by milliseconds, those of two missions by seconds
+SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, on a slow link by a tenth of a second
+ASK_AGAIN_S = 0.1  # chosen: a hub's nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
 DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeated
 POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=20, window_s=60.0, after_good_end=True)
@@ -60,7 +62,7 @@ class Ending(StrEnum):
 
     TOLD = "told to end"
     CUT_OFF = "the link to the mission was lost"
-    OTHER_MISSION = "another run of the mission has begun"
+    OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
     GIVEN_UP = "its creator was given up"
 
 
@@ -83,49 +85,58 @@ class Offered:
     secret: str = ""
 
 
-class Offer(Component[NoParameters]):
-    """Keeps the creator of this machine, as long as the mission can be reached.
+class KeepsCreator(Protocol):
+    """What an offer needs of the one that keeps its creator; see ``KeptCreator``."""
+
+    on_fell: Callable[[ProcessFell], None]
+
+    async def start(self, bus: Bus, clock: Clock) -> None:
+        """Have the creator running, or raise a ``BackboneError``."""
+
+    def processes(self) -> list[ProcessState]:
+        """Return the creator's process."""
+
+    async def close(self) -> None:
+        """Return when nothing runs here any more; right however often called."""
+
+
+class KeptCreator:
+    """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
+
+    Args:
+        launch: Of the offer.
 
     Attributes:
-        ending: Why it ended; meaningful after ``run``.
-        fell: How the creator fell, if it was given up.
+        on_fell: Called when the creator ended unexpectedly.
     """
 
-    accepts: ClassVar[Any] = ListProcesses
-
-    def __init__(self, launch: Launch, bus: Bus, clock: Clock, offered: Offered, on_ready: Callable[[], None]) -> None:
-        super().__init__(launch, bus, clock)
-        self._offered, self._on_ready = offered, on_ready
+    def __init__(self, launch: Launch, offered: Offered) -> None:
+        self.on_fell: Callable[[ProcessFell], None] = lambda _fell: None
+        self._launch, self._offered = launch, offered
         self._keeper: ProcessKeeper | None = None
-        self._link_up, self._link_down = asyncio.Event(), asyncio.Event()
-        self.ending = Ending.TOLD
-        self.fell: ProcessFell | None = None
 
-    async def connect(self) -> None:
-        """Have the creator running; its files lie in a folder of their own, with the mission's secret."""
-        self.start_task(self._watch_link(), "link")
-        answered = await self.bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
+    async def start(self, bus: Bus, clock: Clock) -> None:
+        """Have the creator running.
+
+        Raises:
+            LinkError: The mission's component database did not answer.
+            StartFailed: The creator did not become ready; the end of its log is in the detail.
+            NameTaken: The mission has a creator of this host.
+        """
+        answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
-        directory = run_files.make_directory(f"{self.launch.mission}-{self.launch.host}")
+        directory = run_files.make_directory(f"{self._launch.mission}-{self._launch.host}")
         if self._offered.secret:
             keep_secret(directory, self._offered.secret)
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
-        self._keeper = ProcessKeeper(self._zygote, self.clock)
-        self._keeper.on_fell = self._creator_fell
-        self._keeper.on_bug = self.fail
-        self._keeper.use(self.bus)
+        self._keeper = ProcessKeeper(self._zygote, clock)
+        self._keeper.on_fell = self.on_fell
+        self._keeper.use(bus)
         await self._keeper.start(self._creator_launch(types, directory), POLICY, READY_WITHIN_S)
-        self._on_ready()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
-        """Tell of the creator's process."""
-        if isinstance(asked.body, ListProcesses) and self._keeper is not None:
-            return Processes(self.launch.host, list(self._offered.tags), self._keeper.processes())
-        return await super().answer(asked)
-
-    async def drain(self) -> None:
-        """End the creator and all it started."""
-        await self.close()
+    def processes(self) -> list[ProcessState]:
+        """Return the creator's process."""
+        return self._keeper.processes() if self._keeper is not None else []
 
     async def close(self) -> None:
         """Return when nothing runs here any more; right however often called."""
@@ -136,8 +147,8 @@ class Offer(Component[NoParameters]):
 
     def _creator_launch(self, types: list[ComponentType], directory: Path) -> Launch:
         return msgspec.structs.replace(
-            self.launch,
-            name=creator_name(self.launch.host),
+            self._launch,
+            name=creator_name(self._launch.host),
             type=TYPE,
             class_path=_creator_class(types),
             parameters={
@@ -145,9 +156,46 @@ class Offer(Component[NoParameters]):
                 "preload": arc_modules(types),
                 "types": [msgspec.to_builtins(one) for one in types],
             },
-            requester=self.address,
+            requester=self._launch.address,
             run_directory=str(directory),
         )
+
+
+class Offer(Component[NoParameters]):
+    """Keeps the creator of this machine, as long as the mission can be reached.
+
+    Attributes:
+        ending: Why it ended; meaningful after ``run``.
+        fell: How the creator fell, if it was given up.
+    """
+
+    accepts: ClassVar[Any] = ListProcesses
+
+    def __init__(
+        self, launch: Launch, bus: Bus, clock: Clock, creator: KeepsCreator, on_ready: Callable[[], None]
+    ) -> None:
+        super().__init__(launch, bus, clock)
+        self._creator, self._on_ready = creator, on_ready
+        creator.on_fell = self._creator_fell
+        self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
+        self.ending = Ending.TOLD
+        self.fell: ProcessFell | None = None
+
+    async def connect(self) -> None:
+        """Have the creator running, or end meanwhile because the link is lost."""
+        self.start_task(self._watch_link(), "link")
+        await self._creator.start(self.bus, self.clock)
+        self._on_ready()
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Tell of the creator's process."""
+        if isinstance(asked.body, ListProcesses):
+            return Processes(self.launch.host, [], self._creator.processes())
+        return await super().answer(asked)
+
+    async def drain(self) -> None:
+        """End the creator and all it started."""
+        await self._creator.close()
 
     def _creator_fell(self, fell: ProcessFell) -> None:
         self.tell(fell.name, f"fell: {fell.how}")
@@ -156,31 +204,38 @@ class Offer(Component[NoParameters]):
             self._end_as(Ending.GIVEN_UP)
 
     async def _watch_link(self) -> None:
-        """End this life if the link stays down, or leads to another run of the mission when it is back."""
+        """End this life if the link stays down, or if the mission's time is another one when it is back."""
         self.bus.watch_link(self._link_changed)
         while True:
-            await self._link_down.wait()
+            await self._link_fell.wait()
+            self._link_fell.clear()
             try:
                 async with asyncio.timeout(CUT_OFF_S):
                     await self._link_up.wait()
             except TimeoutError:
                 self._end_as(Ending.CUT_OFF)
                 return
-            if await self._is_other_mission():
-                self._end_as(Ending.OTHER_MISSION)
+            if await self._is_other_time():
+                self._end_as(Ending.OTHER_TIME)
                 return
 
     def _link_changed(self, is_up: bool) -> None:
-        here, away = (self._link_up, self._link_down) if is_up else (self._link_down, self._link_up)
-        here.set()
-        away.clear()
+        if is_up:
+            self._link_up.set()
+        else:
+            self._link_up.clear()
+            self._link_fell.set()  # and stays so until it is judged, however soon the link is back
 
-    async def _is_other_mission(self) -> bool:
-        try:
-            again = await mission_clock(self.bus)
-        except LinkError:  # the link is gone again, or the nameserver still starts: the next change is judged
-            return False
-        return abs(again.now_s() - self.clock.now_s()) > SAME_MISSION_S * self.clock.rate
+    async def _is_other_time(self) -> bool:
+        """Compare the clocks as soon as the nameserver answers, which a hub's link precedes."""
+        while self._link_up.is_set():
+            try:
+                again = await mission_clock(self.bus)
+            except LinkError:
+                await self.clock.sleep_s(ASK_AGAIN_S * self.clock.rate)
+            else:
+                return abs(again.now_s() - self.clock.now_s()) > SAME_TIME_S * self.clock.rate
+        return False
 
     def _end_as(self, ending: Ending) -> None:
         self.ending = ending
@@ -192,10 +247,11 @@ class Offering:
 
     Args:
         say: Called with lines for the person who typed the command.
+        secret_file: Read anew before each life: a new run of the mission has a new secret. None: it stays.
     """
 
-    def __init__(self, offered: Offered, say: Callable[[str], None]) -> None:
-        self._offered, self._say = offered, say
+    def __init__(self, offered: Offered, say: Callable[[str], None], secret_file: Path | None = None) -> None:
+        self._offered, self._say, self._secret_file = offered, say, secret_file
         self._current: Offer | None = None
         self._lives: asyncio.Task[ProcessFell | None] | None = None
         self._is_told_to_end = self._was_in_the_mission = False
@@ -249,6 +305,8 @@ class Offering:
 
     async def _live(self) -> Offer:
         """Be one offer from the hub's first answer to its end."""
+        if self._secret_file is not None:
+            self._offered = replace(self._offered, secret=read_secret_file(self._secret_file))
         offered = self._offered
         await _dial(offered)
         name = offer_name(offered.host)
@@ -262,11 +320,13 @@ class Offering:
                 f"a hub listens at {offered.endpoint} and does not let this machine in: the secret is missing or not "
                 "the mission's (--secret-file), or the hub is just starting"
             ) from error
-        offer = self._current = Offer(_launch(offered, name, clock), bus, clock, offered, self._is_in_the_mission)
+        launch = _launch(offered, name, clock)
+        creator = KeptCreator(launch, offered)
+        offer = self._current = Offer(launch, bus, clock, creator, self._is_in_the_mission)
         try:
             await offer.run()
         finally:
-            await offer.close()
+            await creator.close()
             self._current = None
         return offer
 

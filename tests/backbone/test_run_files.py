@@ -99,3 +99,17 @@ def test_without_a_runtime_directory_a_folder_of_the_user_is_made(
 def test_a_mission_name_cannot_lead_out_of_the_folder() -> None:
     with pytest.raises(Refusal):
         run_files.run_directory("../elsewhere")
+
+
+def test_folders_that_killed_zygotes_hid_are_removed_at_the_next_beginning() -> None:
+    directory = run_files.make_directory("iros2001")
+    child = subprocess.Popen(["true"])
+    child.wait()
+    left, ending, others = (
+        directory.with_name(name)
+        for name in (f".iros2001.ended-{child.pid}", f".iros2001.ended-{os.getpid()}", f".m.ended-{child.pid}")
+    )
+    for hidden in (left, ending, others):
+        (hidden / "log").mkdir(parents=True)
+    run_files.make_directory("iros2001")
+    assert [left.exists(), ending.exists(), others.exists()] == [False, True, True]

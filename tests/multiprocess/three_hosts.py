@@ -135,10 +135,17 @@ class ThreeHosts:
     def type_what_up_prints(self, host: str) -> None:
         """Copy the secret, and type on that machine the command that ``up`` printed for it."""
         self.wait(f"up asks for {host}", lambda: host in self._asked_for(), 30.0)
-        secret = next(found["path"] for line in self.up.lines if (found := SECRET.search(line)))
-        machine = self.hosts[host]
-        shutil.copy(secret, machine.folder / "secret")
+        self.copy_the_secret_to(host)
         self.offers[host] = self.go_on_with(host, shlex.split(self._asked_for()[host]))
+
+    def asks_for_the_secret(self) -> bool:
+        """Say whether ``up`` waits for other machines."""
+        return any(SECRET.search(line) for line in self.up.lines)
+
+    def copy_the_secret_to(self, host: str) -> None:
+        """Copy the file that ``up`` named to where the printed command looks for it."""
+        secret = next(found["path"] for line in self.up.lines if (found := SECRET.search(line)))
+        shutil.copy(secret, self.hosts[host].folder / "secret")
 
     def left(self) -> list[str]:
         """Return the processes of the mission on all machines, and the files and sockets it left."""
