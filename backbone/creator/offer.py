@@ -185,6 +185,9 @@ class Offer(Component[NoParameters]):
         """Have the creator running, or end meanwhile because the link is lost."""
         self.start_task(self._watch_link(), "link")
         await self._creator.start(self.bus, self.clock)
+
+    async def serve(self) -> None:
+        """Let it be known that the machine is in the mission."""
         self._on_ready()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
