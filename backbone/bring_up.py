@@ -14,7 +14,6 @@ import contextlib
 import logging
 import os
 import signal
-import socket
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
@@ -30,30 +29,33 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, Stop, Stopping
+from backbone.component.process import run_with_heartbeat
+from backbone.core_launches import UpOptions, core_launches, launcher_launch, service_launch
 from backbone.creator.messages import (
+    READY_WITHIN_S,
     EndedBy,
     ListProcesses,
     ProcessEnded,
     Processes,
     ProcessFell,
     RestartPolicy,
-    creator_name,
 )
-from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
-from backbone.door import SECRET_NAME, keep_secret, new_secret, secret_of, socket_endpoint
+from backbone.door import SECRET_NAME, secret_of
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.mission.behavior_orders import behavior_orders
-from backbone.mission.model import Host, MissionDescription
+from backbone.mission.model import MissionDescription
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem, component_of
+from backbone.naming import Subsystem, address, component_of
 from backbone.operators import OperatorAction, tell_acted
 from backbone.other_hosts import OtherHosts, door_for_others
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Ended, ListPlacements, NoHost, Placements, Start, Started, StopComponent
+from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
+from backbone.placer.wishes import Wish, keep_placed
+from backbone.preconditions import make_door, refuse_if_up, refuse_trace
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -62,25 +64,10 @@ START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of
 STOP_TIME_S = 10.0  # chosen: asking, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
 LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 CORE_POLICY = RestartPolicy(
-    back_off_s=0.02, back_off_most_s=0.5, limit=20, window_s=60.0, after_good_end=True
+    back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
 )  # chosen: a dead hub stops everybody, and leases outlast a restart of the RC manager only if its pause stays short
 MEET_TIME_S = 5.0  # chosen: the placer hears of a creator milliseconds after its token, on a busy machine later
 MEET_EACH_S = 0.1  # chosen: nobody notices this pause, and it is a hundred times what asking costs
-
-
-@dataclass(frozen=True)
-class UpOptions:
-    """How a mission is run.
-
-    Attributes:
-        speed: Mission seconds per second of the machine.
-        trace: File for the schedule trace, or None.
-        for_s: Mission seconds after readiness until it ends by itself, or None: until told.
-    """
-
-    speed: float = 1.0
-    trace: Path | None = None
-    for_s: float | None = None
 
 
 @dataclass
@@ -107,31 +94,6 @@ class Outcome:
         """True if it came up, nothing failed, and every process ended in good order, be it after SIGTERM."""
         killed = any(end.by is EndedBy.SIGKILL for end in self.ended)
         return self.ready_after_s is not None and self.failure is None and not killed
-
-
-class MissionAlreadyUp(Refusal):
-    """A mission of this name runs on this machine."""
-
-    code = "run.already_up"
-    remedy = "Take it down with 'scout-backbone down', or give this one another name."
-
-
-class PortTaken(Refusal):
-    """The hub cannot listen for other machines where the mission file says."""
-
-    code = "run.port"
-    remedy = "State another port or address at the mission's first host, or stop what listens there."
-
-
-class TraceUnwritable(Refusal):
-    """The file of the schedule trace cannot be opened for writing."""
-
-    code = "run.trace"
-    remedy = "Name a file in a folder that exists and that you may write into."
-
-
-class CoreServiceLost(BackboneError):
-    """A core service ended so often that it was given up."""
 
 
 class Observer(Protocol):
@@ -173,21 +135,20 @@ class Launcher(Component[NoParameters]):
         super().__init__(launch, bus, clock)
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
+        self._wishes: list[Wish] = []
         self.outcome = Outcome()
         self._others = OtherHosts(description, clock.now_s())
         self._others_changed = asyncio.Event()
         keeper.on_fell = self._core_service_fell
+        keeper.on_silent = self._core_service_silent
+        keeper.on_changed = self.changed
 
     async def connect(self) -> None:
         """Start the core services in order, each waited for until it is ready."""
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
-                await self._keeper.start(launch, CORE_POLICY, START_TIME_S)
+                await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
         self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
-
-    def absences(self) -> list[Absence]:
-        """Return the declared machines that are missing."""
-        return self._others.absences()
 
     async def serve(self) -> None:
         """Start the mission through the placer, then let it run."""
@@ -223,6 +184,15 @@ class Launcher(Component[NoParameters]):
             return Processes(self.launch.host, [], self._keeper.processes())
         return await super().answer(asked)
 
+    def absences(self) -> list[Absence]:
+        """Return core services, components and machines of the mission file that are wanted and missing."""
+        core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
+        mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
+        if self.outcome.ready_after_s is None:
+            name = self._description.name
+            mission.append(Absence(name, 0.0, "the mission is coming up", "its components are being started"))
+        return [*core, *mission, *self._others.absences()]
+
     async def drain(self) -> None:
         """Stop the mission in reverse order of its start, then the core services but the nameserver."""
         async with self._step("stop consoles"):
@@ -245,7 +215,9 @@ class Launcher(Component[NoParameters]):
     async def _wait_for_other_hosts(self) -> None:
         """Return as soon as every declared machine has its creator in the mission."""
         if self._others.missing:
-            self._observer.told(f"the mission's secret, for its other hosts: {_secret_path(self.launch)}")
+            self._observer.told(
+                f"the mission's secret, for its other hosts: {Path(self.launch.run_directory) / SECRET_NAME}"
+            )
         for host in self._others.missing:
             self._observer.told(
                 f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
@@ -273,27 +245,49 @@ class Launcher(Component[NoParameters]):
             await self._start_all(behavior_orders(description))
 
     async def _start_all(self, orders: list[Start]) -> None:
-        """Ask the placer for all of them at once.
+        """Have all of them running, and running again whenever one is missing; return when all run.
 
         Raises:
             Refusal: The first that could not be started.
         """
-        outcomes = await asyncio.gather(*(self._start_one(order) for order in orders), return_exceptions=True)
-        for outcome in outcomes:
-            if isinstance(outcome, BaseException):
-                raise outcome
+        placed = [asyncio.get_running_loop().create_future() for _ in orders]
+        for order, first in zip(orders, placed, strict=True):
+            self.start_task(self._keep(order, first), f"keep {order.name}")
+        await asyncio.gather(*placed)
 
-    async def _start_one(self, order: Start) -> None:
-        """Ask the placer for it, again for a moment while the placer may not have met the other machines' creators."""
+    async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
+        """Fulfill one wish of the mission file until the component is ordered to stop."""
+
+        def now_placed(_placement: Placement, _was_there: bool) -> None:
+            if not placed.done():
+                placed.set_result(None)
+
+        wish = Wish(order.name)
+        self._wishes.append(wish)
+        subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
+        try:
+            stopped = await self._keep_placed(wish, order, address(subsystem, order.name), now_placed)
+        except Refusal as refusal:
+            placed.set_exception(refusal)
+            return
+        finally:
+            placed.cancel()
+        self._wishes.remove(wish)
+        self.tell(order.name, f"is not wanted any more: {stopped}")
+
+    async def _keep_placed(
+        self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
+    ) -> str:
+        """Keep it placed; begin again for a moment while the placer may not have met the other machines' creators."""
         until_s = time.monotonic() + (MEET_TIME_S if self._others.names else 0.0)
         while True:
             try:
-                await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+                return await keep_placed(
+                    self.bus, self.clock, wish, order, at, on_placed=now_placed, on_changed=self.changed
+                )
             except NoHost:
                 if time.monotonic() >= until_s:
                     raise
-            else:
-                return
             await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
 
     # ------------------------------------------------------------------ stop
@@ -348,12 +342,11 @@ class Launcher(Component[NoParameters]):
 
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
-        self.story.note(fell.name, f"fell: {fell.how}")
-        if fell.restart_in_s < 0 and self.outcome.failure is None:
-            self.outcome.failure = CoreServiceLost(
-                f"{fell.name} fell too often: {fell.how}\n" + "\n".join(fell.last_lines)
-            )
-            self.end(f"{fell.name} was given up")
+        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
+
+    def _core_service_silent(self, name: str, silent_s: float) -> None:
+        self.tell(name, f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again")
+        self.changed()
 
     @contextlib.asynccontextmanager
     async def _step(self, step: str) -> AsyncIterator[None]:
@@ -372,12 +365,12 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     """
     began_s = time.monotonic()
     refuse_if_up(description.name)
-    _refuse_trace(options.trace)
+    refuse_trace(options.trace)
     directory = run_files.make_directory(description.name)
     try:
-        endpoint = _make_door(description, directory)
+        endpoint = make_door(description, directory)
         clock = MissionClock(began_s, options.speed)
-        own = _launch(description, endpoint, clock, directory)
+        own = launcher_launch(description, endpoint, clock, directory)
         observer.began("nameserver")
         zygote = await Zygote.spawn_fresh(run_directory=str(directory))
         try:
@@ -399,7 +392,7 @@ async def _with_hub(
 ) -> Outcome:
     keeper = ProcessKeeper(zygote)
     others = door_for_others(description)
-    hub = _service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
+    hub = service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
     await keeper.start_hub(hub, CORE_POLICY)
     config = client_config(own.endpoint, secret_of(own.run_directory))
     bus = await ZenohBus.open_when_up(own.mission, own.address, clock, config)
@@ -425,7 +418,7 @@ async def _with_hub(
     loop.add_signal_handler(signal.SIGTERM, launcher.end, signal.SIGTERM.name)
     loop.add_signal_handler(signal.SIGINT, launcher.interrupted)
     try:
-        await launcher.run()
+        await run_with_heartbeat(own, clock, launcher.run(), lambda: launcher.feedback or str(launcher.state))
     except BackboneError as error:
         launcher.outcome.failure = launcher.outcome.failure or error
     finally:
@@ -433,133 +426,6 @@ async def _with_hub(
             loop.remove_signal_handler(number)
         launcher.outcome.ended += await keeper.close()
     return launcher.outcome
-
-
-# ---------------------------------------------------------------------- orders
-def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:
-    """Return the launches of the core services after the nameserver, in the papers' order.
-
-    Hosts that are other machines start their creator themselves (``scout-backbone creator``).
-    """
-    types = [msgspec.to_builtins(component_type) for component_type in description.types]
-    resources = [msgspec.to_builtins(resource) for resource in description.resources]
-    trace = str(options.trace.absolute()) if options.trace else ""
-    parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
-        "component_database": lambda _: {"types": types},
-        "placer": lambda _: {},
-        "creator": lambda host: {
-            "tags": list(host.tags),
-            "preload": arc_modules(description.types),
-            "types": types,
-        },
-        "dependency_database": lambda _: {"resources": resources},
-        "rc_manager": lambda _: {
-            **description.core_parameters("rc_manager"),
-            "mission": description.name,
-            "mission_priority": description.priority,
-            "trace": trace,
-        },
-    }
-    hosts = {host.name: host for host in description.hosts}
-    launches = []
-    for service in description.core:
-        here = hosts[service.host].is_loopback or service.host == own.host
-        if service.type == "nameserver" or not here:
-            continue
-        name = creator_name(service.host) if service.type == "creator" else service.type
-        given = parameters[service.type](hosts[service.host])
-        launch = _service_launch(own, service.type, name, description, given)
-        launches.append(msgspec.structs.replace(launch, host=service.host))
-    return launches
-
-
-def refuse_if_up(mission: str) -> None:
-    """Return if no mission of this name runs on this machine.
-
-    Raises:
-        MissionAlreadyUp: One does.
-    """
-    try:
-        running = run_files.find(mission)
-    except run_files.MissionNotUp:
-        return
-    raise MissionAlreadyUp(
-        f"mission {mission} is up since before, launcher process {running.launcher_pid}", pid=running.launcher_pid
-    )
-
-
-def _refuse_trace(trace: Path | None) -> None:
-    """Return if the trace can be written, or none is wanted.
-
-    Raises:
-        TraceUnwritable: It cannot.
-    """
-    if trace is None:
-        return
-    try:
-        trace.open("a").close()
-    except OSError as error:
-        raise TraceUnwritable(f"{trace}: {error.strerror or error}", file=str(trace)) from error
-
-
-def _make_door(description: MissionDescription, directory: Path) -> str:
-    """Return where the hub will listen on this machine; with other machines their secret lies beside it afterwards.
-
-    The secret is a new one, so that nothing of an earlier run can speak to this one.
-
-    Raises:
-        SocketPathTooLong: The folder's path is too long for a socket.
-        PortTaken: The hub could not listen for the other machines.
-    """
-    endpoint = socket_endpoint(directory)
-    (directory / SECRET_NAME).unlink(missing_ok=True)
-    if description.other_hosts:
-        _refuse_taken_port(description.hosts[0])
-        keep_secret(directory, new_secret())
-    return endpoint
-
-
-def _refuse_taken_port(host: Host) -> None:
-    """Return if a hub can listen at the host's address and port.
-
-    Raises:
-        PortTaken: It cannot.
-    """
-    try:
-        family, kind, protocol, _, where = socket.getaddrinfo(host.address, host.port, type=socket.SOCK_STREAM)[0]
-        with socket.socket(family, kind, protocol) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind(where)
-            probe.listen()
-    except OSError as error:
-        raise PortTaken(f"port {host.port} of {host.address}: {error.strerror or error}", port=host.port) from error
-
-
-def _secret_path(own: Launch) -> Path:
-    return Path(own.run_directory) / SECRET_NAME
-
-
-def _launch(description: MissionDescription, endpoint: str, clock: MissionClock, directory: Path) -> Launch:
-    return Launch(
-        mission=description.name,
-        subsystem=Subsystem.BACKBONE,
-        name="launcher",
-        type="launcher",
-        class_path="",
-        host=description.hosts[0].name,
-        endpoint=endpoint,
-        clock_origin_monotonic_s=clock.origin_monotonic_s,
-        clock_rate=clock.rate,
-        requester=LAUNCHER,
-        run_directory=str(directory),
-    )
-
-
-def _service_launch(
-    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, Any]
-) -> Launch:
-    class_path = next(t.class_path for t in description.types if t.name == component_type)
-    return msgspec.structs.replace(own, name=name, type=component_type, class_path=class_path, parameters=parameters)
 
 
 async def end_mission(bus: Bus) -> None:

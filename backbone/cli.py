@@ -209,7 +209,7 @@ def up(
         from backbone.detached import up_detached
 
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
-    from backbone.bring_up import UpOptions
+    from backbone.core_launches import UpOptions
     from backbone.mission_console import bring_up_on_console
 
     options = UpOptions(speed=speed, trace=trace, for_s=for_s)
@@ -416,11 +416,8 @@ def creator(
         offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
         is_file = secret_file is not None and str(secret_file) != "-"
         say(f"{host} is offered to mission {mission}; end with Ctrl-C")
-        fell = await Offering(offered, say, secret_file if is_file else None).run()
-        if fell is None:
-            return ExitCode.DONE
-        say(f"{fell.name} was given up: {fell.how}")
-        return ExitCode.MISSION_FAILED
+        await Offering(offered, say, secret_file if is_file else None).run()
+        return ExitCode.DONE
 
     run(work)
 

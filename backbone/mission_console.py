@@ -10,10 +10,11 @@ from typing import Any, TextIO
 from rich.console import Console
 from rich.live import Live
 
-from backbone.bring_up import Outcome, UpOptions, run_mission
+from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import ExitCode
 from backbone.component.messages import StoryEvent
+from backbone.core_launches import UpOptions
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription

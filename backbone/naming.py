@@ -70,16 +70,6 @@ def component_of(component_address: str) -> str:
     return component_address.rpartition("/")[2]
 
 
-def incarnation(host: str, pid: int) -> str:
-    """Return the name of one life of a component: ``<host>.<pid>``.
-
-    Example:
-        >>> incarnation("lab-pc", 4242)
-        'lab-pc.4242'
-    """
-    return f"{host}.{pid}"
-
-
 def claim_address(component_address: str, host: str, pid: int) -> str:
     """Return the address of the token that says which process was given a name, ready or not.
 
@@ -87,7 +77,7 @@ def claim_address(component_address: str, host: str, pid: int) -> str:
         >>> claim_address("resource_pool/scout1", "lab-pc", 4242)
         'resource_pool/scout1/lab-pc.4242'
     """
-    return f"{component_address}/{incarnation(host, pid)}"
+    return f"{component_address}/{host}.{pid}"
 
 
 def read_claim(claim: str) -> tuple[str, str, int]:

@@ -20,27 +20,19 @@ from typing import Any, ClassVar, Generic, TypeVar, assert_never
 import msgspec
 
 from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.asking import ask_until_answered
 from backbone.component.companion import Companion
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import LifeState
+from backbone.component.messages import Absence, LifeState
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import PathStep
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import (
-    AskPlacement,
-    CreatorSilent,
-    Ended,
-    NotPlaced,
-    Placement,
-    Start,
-    Started,
-    StopComponent,
-)
+from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, StopComponent
+from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope, Message, UnknownMessage
 from mission_control.behavior_tree import (
     ArcNeed,
@@ -74,6 +66,7 @@ log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
 START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
+ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
 
@@ -122,7 +115,9 @@ class Behavior(Component[B], Generic[B]):
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self._nodes = {node.name: node for node in self.parameters.children}
         self._children = Children(list(self._nodes), together=self.children_together)
-        self._watched: dict[str, asyncio.Task[None]] = {}
+        self._kept: dict[str, asyncio.Task[None]] = {}
+        self._wishes: dict[str, Wish] = {}
+        self._abandoned: dict[str, Absence] = {}
         self._heard_creators: dict[str, Subscription] = {}
         self._suspended_because = ""
         self._parent: Companion | None = None
@@ -261,8 +256,6 @@ class Behavior(Component[B], Generic[B]):
 
     async def serve(self) -> None:
         """Start, claim, bring up the children; then everything goes by events."""
-        if self._parent is not None:
-            self._begin(self._end_with(self._parent), "parent")
         await self.start()
         need = self.need()
         if need is not None and not self.status.is_final:
@@ -270,6 +263,8 @@ class Behavior(Component[B], Generic[B]):
             self.arc.frames(self._saw)
             self._keeping = self._begin(self._keep(self.arc, need), "arc")
         self._carry_out(self._children.begin())
+        if self._nodes:
+            self._begin(self._stop_children_of_an_earlier_life(), "children of an earlier life")
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Answer the ARC, the children, and whoever asks how far it is."""
@@ -294,8 +289,14 @@ class Behavior(Component[B], Generic[B]):
         try:
             async with asyncio.timeout(DRAIN_TIME_S):
                 await asyncio.gather(self._release(), *(self._stop_child(name) for name in stops))
-        except TimeoutError:  # they watch this behavior's token and end when it falls
+        except TimeoutError:  # the placer stops what a stopped behavior owned
             log.warning("%s leaves before its ARC or children have ended", self.name)
+
+    def absences(self) -> list[Absence]:
+        """Return children and ARC that are wanted and missing, and children it goes on without."""
+        wishes = [*self._wishes.values(), *([self.arc.wish] if self.arc is not None else [])]
+        absent = [absence for wish in wishes if (absence := wish.absence()) is not None]
+        return [*absent, *self._abandoned.values()]
 
     def statistics(self) -> dict[str, float]:
         """Return how often the RCs came and went, and how many pictures were seen."""
@@ -359,7 +360,7 @@ class Behavior(Component[B], Generic[B]):
             may_say_not_now=type(self).not_now is not Behavior.not_now,
         )
         try:
-            await arc.keep(self.clock, need.kind, parameters)
+            await arc.keep(self.clock, need.kind, parameters, on_changed=self.changed)
         except Refusal as refusal:
             self.report(f"no ARC: {refusal}")
             self.finish(BehaviorStatus.FAILURE, _why(refusal))
@@ -430,62 +431,76 @@ class Behavior(Component[B], Generic[B]):
         await asyncio.gather(*starting)
 
     async def _start_child(self, name: str) -> None:
-        order = self._nodes[name].order(self.path)
-        while True:
-            try:
-                host = await self._start_or_adopt(order)
-            except (LinkError, CreatorSilent) as error:
-                log.info("%s: started without an answer: %s", name, error)
-                await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
-                continue
-            except Refusal as refusal:
-                self.tell(name, f"could not be started: {refusal}")
-                self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
-                return
-            break
-        self._hear_creator(host)
-        watching = self._begin(self._watch_child(name), f"child {name}")
-        if watching is not None:
-            self._watched[name] = watching
+        self._abandoned.pop(name, None)
+        keeping = self._begin(self._keep_child(name), f"child {name}")
+        if keeping is not None:
+            self._kept[name] = keeping
 
-    async def _start_or_adopt(self, order: Start) -> str:
-        """Return the child's host. One that outlived an earlier life of this behavior is taken over as it is."""
+    async def _keep_child(self, name: str) -> None:
+        """Have the child running until it is ordered to stop. One from an earlier life of this behavior is adopted."""
+        wish = self._wishes[name] = Wish(name)
+        order, at = self._nodes[name].order(self.path), address(Subsystem.MISSION_CONTROL, name)
         try:
-            started = await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
-        except NameTaken:
-            child = address(Subsystem.MISSION_CONTROL, order.name)
-            state = await self.bus.ask(child, AskBehavior(), BehaviorState, within_s=REPLY_TIME_S)
-            placement = await self.bus.ask(PLACER, AskPlacement(order.name), Placement, within_s=REPLY_TIME_S)
-            self.story.note(order.name, "was running and is taken over")
-            self._child_reported(order.name, state.status, state.payload)
-            return placement.host
-        return started.host
+            stopped = await keep_placed(
+                self.bus, self.clock, wish, order, at, on_placed=self._child_placed, on_changed=self.changed
+            )
+        except Refusal as refusal:
+            self.tell(name, f"could not be started: {refusal}")
+            self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
+            return
+        self.tell(name, f"is not wanted any more: {stopped}")
+        del self._kept[name], self._wishes[name]
+        self._carry_out(self._children.left(name))
+
+    def _child_placed(self, placement: Placement, was_there: bool) -> None:
+        self._hear_creator(placement.host)
+        if was_there:
+            self.story.note(placement.name, "was running and is adopted")
+            self._begin(self._adopt(placement.name), f"adopt {placement.name}")
+
+    async def _adopt(self, name: str) -> None:
+        """Learn how far a child is that was running before."""
+        child = address(Subsystem.MISSION_CONTROL, name)
+        try:
+            state = await ask_until_answered(
+                self.bus,
+                self.clock,
+                child,
+                AskBehavior(),
+                BehaviorState,
+                each_s=REPLY_TIME_S,
+                within_s=ADOPT_WITHIN_S,
+            )
+        except (LinkError, Refusal) as error:  # it is being restarted, then it runs from its beginning
+            log.info("child %s does not say how far it is: %s", name, error)
+            return
+        self._child_reported(name, state.status, state.payload)
+
+    async def _stop_children_of_an_earlier_life(self) -> None:
+        """Stop children that an earlier life of this behavior left running and that this life does not start now."""
+        try:
+            placed = await ask_until_answered(
+                self.bus,
+                self.clock,
+                PLACER,
+                ListPlacements(),
+                Placements,
+                each_s=REPLY_TIME_S,
+                within_s=ADOPT_WITHIN_S,
+            )
+        except LinkError as error:
+            log.warning("%s does not know which children it left running: %s", self.name, error)
+            return
+        mine = [each.name for each in placed.placements if each.requester == self.address and each.name in self._nodes]
+        await asyncio.gather(*(self._stop_child(name) for name in mine if name not in self._children.status))
 
     async def _stop_child(self, name: str) -> None:
-        await _end_task(self._watched.pop(name, None))
+        await _end_task(self._kept.pop(name, None))
+        self._wishes.pop(name, None)
         try:
             await self.bus.ask(PLACER, StopComponent(name, f"{self.name} ends it"), Ended, within_s=START_TIME_S)
         except (Refusal, LinkError) as error:
             log.info("child %s: %s", name, error)
-
-    async def _watch_child(self, name: str) -> None:
-        """Notice that a child was ended by somebody else; one that fell is its creator's until given up."""
-        child = Companion(self.bus, address(Subsystem.MISSION_CONTROL, name))
-        try:
-            while True:
-                await child.wait_there()
-                await child.wait_gone()
-                try:
-                    await self.bus.ask(PLACER, AskPlacement(name), Placement, within_s=REPLY_TIME_S)
-                except NotPlaced:
-                    break
-                except LinkError as error:
-                    log.info("child %s is away, the placer does not answer: %s", name, error)
-        finally:
-            child.close()
-        self.tell(name, "was ended by somebody else")
-        self._watched.pop(name, None)
-        self._carry_out(self._children.left(name))
 
     def _hear_creator(self, host: str) -> None:
         if host not in self._heard_creators:
@@ -494,7 +509,7 @@ class Behavior(Component[B], Generic[B]):
 
     def _heard_fall(self, envelope: Envelope[Any]) -> None:
         fell: ProcessFell = envelope.body
-        if fell.name in self._nodes and fell.restart_in_s < 0:
+        if fell.name in self._nodes and fell.failing:
             why = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
             self._child_reported(fell.name, BehaviorStatus.FAILURE, why)
 
@@ -506,13 +521,14 @@ class Behavior(Component[B], Generic[B]):
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
         decision = await self.child_finished(name, status, payload)
         self.story.note(name, f"{decision} after {status}")
+        if decision is Decision.NEXT and "code" in payload:  # it could not do its work; its work itself did not fail
+            remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
+            cause = str(payload.get("detail", "it failed"))
+            self._abandoned[name] = Absence(name, self.clock.now_s(), cause, remedy=remedy)
+            self.changed()
         self._carry_out(self._children.decided(name, decision))
 
     # ------------------------------------------------------------------ the parent
-    async def _end_with(self, parent: Companion) -> None:
-        await parent.wait_gone()
-        self.end(f"its parent {component_of(parent.address)} is gone")
-
     async def _wind_up(self) -> None:
         """Give back what is held, end the children, and tell the parent until it has noted it."""
         await self._stop_acting()

@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+import types
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -144,7 +145,7 @@ class AggregateResourceController(Component[ArcParameters]):
     """Base of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
+    accepts: ClassVar[types.UnionType | type[Any] | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC it needs, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
@@ -191,6 +192,11 @@ class AggregateResourceController(Component[ArcParameters]):
         if role not in self._rcs:
             raise SwappedOut(f"{self.name} has no {role} yet", reason=self._gate.reason, by="", expected_start_s=-1.0)
         return self._rcs[role]
+
+    @property
+    def epochs(self) -> Mapping[str, int]:
+        """RC → epoch of the connections that are open to commands; empty while there are none."""
+        return self._gate.epochs if self._gate.is_open else {}
 
     async def tell_rc(self, role: str, command: Message) -> Applied:
         """Command one of the RCs and return what it applied."""

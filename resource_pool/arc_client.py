@@ -21,6 +21,7 @@ from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
+from backbone.placer.wishes import Wish
 from backbone.rc_manager.messages import PathNode, Usage
 from backbone.wire import Envelope, Message
 from resource_pool.messages import (
@@ -91,7 +92,6 @@ log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: a command that takes longer is worth a stop
 START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are only now being started
-AGAIN_FIRST_S, AGAIN_MOST_S = 0.05, 1.0  # chosen: a restarted placer is back within the first few; machine seconds
 
 
 class NotMyArc(Refusal):
@@ -129,6 +129,7 @@ class ArcClient:
         """
         self.arc = arc
         self.address = address(Subsystem.RESOURCE_POOL, arc)
+        self.wish = Wish(arc)
         self.granted: Resumed | None = None
         self.suspended: Suspended | None = None
         self._bus, self._listener, self._not_now = bus, listener, not_now
@@ -202,7 +203,15 @@ class ArcClient:
         order = Start(kind, self.arc, parameters)
         await self._bus.ask(PLACER, order, Started, within_s=START_TIME_S)
 
-    async def keep(self, clock: Clock, kind: str, parameters: dict[str, Any], *, rests: bool = False) -> None:
+    async def keep(
+        self,
+        clock: Clock,
+        kind: str,
+        parameters: dict[str, Any],
+        *,
+        rests: bool = False,
+        on_changed: Callable[[], None] = lambda: None,
+    ) -> None:
         """Claim the ARC, and claim it again whenever it is gone, until cancelled.
 
         The listener hears ``arc_suspended`` with the reason ``lost`` for a grant that ended with its ARC.
@@ -213,6 +222,7 @@ class ArcClient:
             parameters: Made by ``claim_parameters``.
             rests: The ARC was started with these parameters before and rests: it is only told that time is wanted
                 again, unless it is gone.
+            on_changed: Called when ``wish.absence()`` may have changed.
 
         Raises:
             Refusal: The ARC could not be started or its request can never be served.
@@ -220,8 +230,10 @@ class ArcClient:
         is_there = rests and await self._wake()
         while True:
             if not is_there:
-                await self._start_anew(clock, kind, parameters)
+                await self._start_anew(clock, kind, parameters, on_changed)
             is_there = False
+            self.wish.placed()
+            on_changed()
             companion = Companion(self._bus, self.address)
             agreeing = asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree")
             try:
@@ -230,6 +242,8 @@ class ArcClient:
                 companion.close()
                 agreeing.cancel()
                 await asyncio.gather(agreeing, return_exceptions=True)
+            self.wish.missing("it ended while it was wanted", clock.now_s())
+            on_changed()
             await self._lost()
 
     async def handle(self, notice: ArcNotice) -> Noted:
@@ -365,19 +379,26 @@ class ArcClient:
             return False
         return True
 
-    async def _start_anew(self, clock: Clock, kind: str, parameters: dict[str, Any]) -> None:
+    async def _start_anew(
+        self, clock: Clock, kind: str, parameters: dict[str, Any], on_changed: Callable[[], None]
+    ) -> None:
         """Start the ARC; one that an earlier life of the owner left behind is ended first."""
-        pause_s = AGAIN_FIRST_S
         while True:
             try:
                 return await self.start(kind, parameters)
             except NameTaken as refusal:
-                log.info("%s is left from before: %s", self.arc, refusal.detail)
+                cause = f"one from before has its name: {refusal.detail}"
                 await self._end_leftover()
             except (LinkError, CreatorSilent) as error:
-                log.info("%s: claimed without an answer: %s", self.arc, error)
+                cause = f"claimed without an answer: {error}"
+            except Refusal as refusal:
+                if not self.wish.started:
+                    raise
+                cause = f"it was refused: {refusal.detail}"
+            log.info("%s: %s", self.arc, cause)
+            pause_s = self.wish.not_started(cause, clock.now_s())
+            on_changed()
             await clock.sleep_s(pause_s * clock.rate)
-            pause_s = min(2 * pause_s, AGAIN_MOST_S)
 
     async def _end_leftover(self) -> None:
         try:

@@ -266,6 +266,18 @@ class Tune(Message, frozen=True):
     robot: str = ""
 
 
+class NothingHeard(Message, frozen=True):
+    """The transmitter of your robot is silent; said by a framegrabber to the ARC that holds it.
+
+    Attributes:
+        rc: The framegrabber.
+        epoch: Of its connection.
+    """
+
+    rc: str
+    epoch: int
+
+
 class Frame(Message, frozen=True):
     """One picture.
 

@@ -82,6 +82,9 @@ class ResourceController(Component[R], Generic[R]):
     """Kind of driver it is built on; empty: it has none, and so no driver's options."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
     """Parameters its driver takes over while it runs, if it can."""
+    outlasts_s: ClassVar[float] = 0.0
+    """How long what it commands goes on after the death of its process, mission seconds: for so long its successor
+    confirms no disconnection from a hold of the earlier life. 0: it ends with the process."""
     accepts: ClassVar[types.UnionType | type[Any] | None] = Connect | Disconnect | AskRc
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -91,8 +94,9 @@ class ResourceController(Component[R], Generic[R]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(_sort_out_options(launch, self.parameters_type) if self.driver_kind else launch, bus, clock)
-        first_epoch = int(clock.now_s() * EPOCHS_PER_S)
-        self.holds = HoldTable(self.name, sharable=self.parameters.sharable, last_epoch=first_epoch)
+        self._born_s = clock.now_s()
+        self._first_epoch = int(self._born_s * EPOCHS_PER_S)
+        self.holds = HoldTable(self.name, sharable=self.parameters.sharable, last_epoch=self._first_epoch)
         self.applied = self.refused_stale = self.refused_strangers = 0
         self._connects = self._lease_ends = self._faults = 0
         self._unsafe: dict[str, Hold] = {}
@@ -213,6 +217,8 @@ class ResourceController(Component[R], Generic[R]):
                     hold = self.holds.disconnect(arc, epoch) or self._unsafe.get(arc)
                     if hold is not None:
                         await self._end_hold(hold, reason)
+                if epoch <= self._first_epoch:  # a grant to an earlier life, whose hardware may not be safe yet
+                    await self.clock.sleep_until_s(self._born_s + self.outlasts_s)
                 return Disconnected(self.holds.last_epoch)
             case AskRc():
                 return self.rc_state()

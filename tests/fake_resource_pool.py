@@ -20,8 +20,10 @@ from backbone.placer.messages import (
     ADDRESS,
     AskPlacement,
     Ended,
+    ListPlacements,
     NotPlaced,
     Placement,
+    Placements,
     PlacerQuestion,
     Start,
     Started,
@@ -142,12 +144,22 @@ class FakePlacer:
         self.ended: list[str] = []
         self.refusals: dict[str, Refusal] = {}
         self.placed: dict[str, Start] = {}
+        self.requesters: dict[str, str] = {}
+        self.stopped: set[str] = set()
         self.on_arc: Callable[[FakeArc], None] = lambda arc: None
         self._lives: dict[str, asyncio.Task[None]] = {}
         self.bus = network.join(ADDRESS, clock)
         self.creator = network.join("backbone/creator-local", clock)
-        self.bus.serve(ADDRESS, PlacerQuestion, self._answer)
-        self.bus.declare_alive(ADDRESS)
+        self._declared = [self.bus.serve(ADDRESS, PlacerQuestion, self._answer), self.bus.declare_alive(ADDRESS)]
+
+    def silence(self) -> None:
+        """Answer nothing, as a placer that is being restarted."""
+        for declared in self._declared:
+            declared.close()
+
+    def speak(self) -> None:
+        """Answer again."""
+        self._declared = [self.bus.serve(ADDRESS, PlacerQuestion, self._answer), self.bus.declare_alive(ADDRESS)]
 
     async def close(self) -> None:
         for name in list(self.components):
@@ -164,7 +176,8 @@ class FakePlacer:
         if order.type in self.refusals:
             raise self.refusals[order.type]
         self.started.append(order.name)
-        self.placed[order.name] = order
+        self.placed[order.name], self.requesters[order.name] = order, requester
+        self.stopped.discard(order.name)
         if order.type in self.classes:
             await self._run(order, requester)
             made: Any = self.components[order.name]
@@ -176,7 +189,7 @@ class FakePlacer:
 
     async def restart(self, name: str) -> Any:
         """What a creator does after a death: the same order again."""
-        return await self.launch(self.placed[name])
+        return await self.launch(self.placed[name], self.requesters[name])
 
     async def kill(self, name: str) -> None:
         """End it as a SIGKILL does: nothing is drained, its token falls."""
@@ -187,9 +200,13 @@ class FakePlacer:
         life.cancel()
         await asyncio.wait({life})
 
-    def give_up(self, name: str) -> None:
+    def lose(self, name: str) -> None:
+        """Forget it, as a placer does that died together with the component's creator."""
+        del self.placed[name]
+
+    def fall_often(self, name: str) -> None:
         """Say what a creator says of a component that fell too often."""
-        fell = ProcessFell(name, "signal 9", -1.0, [])
+        fell = ProcessFell(name, "signal 9", 10.0, [], failing=True)
         self.creator.publish("backbone/creator-local", Conversation.EVENTS, fell)
 
     async def wait(self, condition: Callable[[], Any], within_s: float = 20.0) -> None:
@@ -240,16 +257,22 @@ class FakePlacer:
                 return await self._stop(name)
             case AskPlacement(name=name):
                 if name not in self.placed:
-                    raise NotPlaced(f"{name} was never placed")
-                return Placement(name, self.placed[name].type, "local", "", 0.0, [])
+                    raise NotPlaced(f"{name} is not placed", stopped=name in self.stopped)
+                return self._placement(name)
+            case ListPlacements():
+                return Placements([self._placement(name) for name in sorted(self.placed)])
             case _:
                 raise NotPlaced("not in this fake")
+
+    def _placement(self, name: str) -> Placement:
+        return Placement(name, self.placed[name].type, "local", self.requesters[name], 0.0, [])
 
     async def _stop(self, name: str) -> Ended:
         if name not in self.placed:
             raise NotPlaced(f"{name} was never placed")
         del self.placed[name]
         self.ended.append(name)
+        self.stopped.add(name)
         if name in self.arcs:
             await self.arcs.pop(name).bus.close()
         elif name in self.components:

@@ -46,7 +46,7 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Register, Registered
-from backbone.naming import claim_address, incarnation
+from backbone.naming import claim_address
 from backbone.wire import Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -165,7 +165,10 @@ class Component(Generic[P]):
         return {}
 
     def absences(self) -> list[Absence]:
-        """Return the components this one wants and that are absent; call ``changed`` when the answer changes."""
+        """Return the components this one wants and that are absent.
+
+        When: while it is ready, for each published state. Call ``changed`` when the answer changes.
+        """
         return []
 
     def publish_news(self) -> None:
@@ -251,7 +254,7 @@ class Component(Generic[P]):
             self._since_s,
             self.feedback,
             launch.requester,
-            self.absences(),
+            self.absences() if self._state is LifeState.READY else [],
         )
 
     # ------------------------------------------------------------------ the shell
@@ -388,8 +391,8 @@ class Component(Generic[P]):
                 return self._set_parameter(name, value, user or asked.source)
             case AskStory(subject=subject):
                 return Story(self.story.of(subject))
-            case Stop(incarnation=meant) if meant not in ("", incarnation(self.launch.host, os.getpid())):
-                raise OtherIncarnation(f"{self.address} is {self.launch.host}.{os.getpid()}, not {meant}", meant=meant)
+            case Stop(incarnation=meant) if meant not in ("", self.launch.incarnation):
+                raise OtherIncarnation(f"{self.address} lives as {self.launch.incarnation}, not {meant}", meant=meant)
             case Stop(reason=reason):
                 self.end(reason or f"stopped by {asked.source}")
                 return Stopping()

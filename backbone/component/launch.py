@@ -26,6 +26,8 @@ class Launch(Message, frozen=True):
         run_directory: Folder of the mission's files on this host; gone when the mission has ended.
         process: Name of the process it shares with other components; empty: a process of its own. Without a
             class path this is the launch of the shared process itself, and ``requester`` its creator.
+        incarnation: Name of this one life of the component, ``<host>.<pid of the creator>.<number>``: two lives of one
+            name never have the same, on any hosts.
     """
 
     mission: str
@@ -41,6 +43,7 @@ class Launch(Message, frozen=True):
     requester: str = ""
     run_directory: str = ""
     process: str = ""
+    incarnation: str = ""
 
     @property
     def is_shared_process(self) -> bool:

@@ -157,8 +157,8 @@ class Stop(Message, frozen=True):
 
     Attributes:
         reason: For the record.
-        incarnation: The one life that is meant, ``<host>.<pid>``; empty: the component of this address, whichever
-            it is. Another life of the same address refuses with ``OtherIncarnation``.
+        incarnation: The one life that is meant, see ``Launch.incarnation``; empty: the component of this address.
+            Another life of the same address refuses with ``OtherIncarnation``.
     """
 
     reason: str = ""

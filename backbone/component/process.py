@@ -15,7 +15,9 @@ from typing import Any
 import uvloop
 
 from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Clock
 from backbone.component.component import Component
+from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.errors import BackboneError, Refusal
 
@@ -108,4 +110,18 @@ async def _live(component_class: type[Component[Any]], launch: Launch) -> None:
     loop = asyncio.get_running_loop()
     for number in (signal.SIGTERM, signal.SIGINT):
         loop.add_signal_handler(number, component.end, signal.Signals(number).name)
-    await component.run()
+    await run_with_heartbeat(launch, clock, component.run(), lambda: component.feedback or str(component.state))
+
+
+async def run_with_heartbeat(
+    launch: Launch, clock: Clock, life: Coroutine[Any, Any, None], doing: Callable[[], str] = str
+) -> None:
+    """Live this life while the process's heartbeat shows that its event loop runs."""
+    heartbeat = Heartbeat(launch.run_directory, doing)
+    beating = asyncio.create_task(heartbeat.keep(clock), name="heartbeat")
+    try:
+        await life
+    finally:
+        beating.cancel()
+        await asyncio.gather(beating, return_exceptions=True)
+        heartbeat.close()

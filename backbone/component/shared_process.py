@@ -36,7 +36,7 @@ from backbone.component.membership import (
     ProcessQuestion,
     process_address,
 )
-from backbone.component.process import exit_code_of, load_class, run_to_end
+from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
 from backbone.door import secret_of
 from backbone.wire import Envelope, Message
 
@@ -185,7 +185,7 @@ async def _live(launch: Launch) -> None:
         shared = SharedProcess(launch, session.join, clock, os.getpid())
         for number in (signal.SIGTERM, signal.SIGINT):
             asyncio.get_running_loop().add_signal_handler(number, shared.end)
-        await shared.run()
+        await run_with_heartbeat(launch, clock, shared.run())
     finally:
         await session.close()
 

@@ -10,27 +10,31 @@ from backbone.naming import Subsystem
 from backbone.wire import Message
 
 TYPE = "creator"
+READY_WITHIN_S = 10.0  # chosen: silence, not time: a starting process that imports, renders or waits for others beats
+START_MOST_S = 180.0  # chosen: a start that shows signs of life for so long and is not ready never will be
 
 
 class RestartPolicy(Message, frozen=True):
-    """When a process that ended unexpectedly is started again.
+    """When a process that ended without an order, or hangs, is replaced.
 
     Attributes:
-        restart: False: never.
+        restart: False: never; its owner asks for a new one.
         back_off_s: Pause before the first restart, seconds of the machine; doubles with each one in the window.
-        back_off_most_s: Longest pause.
-        limit: Restarts within the window after which the creator gives up.
+        back_off_most_s: Longest pause while there are fewer restarts than ``limit`` in the window.
+        limit: Restarts within the window from which on the component is failing: it is still restarted, but after
+            pauses of ``failing_pause_s``.
         window_s: Length of the window, seconds of the machine.
-        after_good_end: True: also when it ended in good order (exit code 0) without its creator's order. Right for
-            services that must always be there; wrong for components that may end themselves.
+        failing_pause_s: Pause before each restart of a failing component.
+        hung_after_s: Silence after which a ready process is ended and replaced, seconds of the machine.
     """
 
     restart: bool = True
     back_off_s: float = 0.05
     back_off_most_s: float = 2.0
-    limit: int = 5
-    window_s: float = 30.0
-    after_good_end: bool = False
+    limit: int = 20
+    window_s: float = 60.0
+    failing_pause_s: float = 10.0
+    hung_after_s: float = 3.0
 
 
 class Spawn(Message, frozen=True):
@@ -44,7 +48,7 @@ class Spawn(Message, frozen=True):
         parameters: Values for its ``Parameters``.
         requester: Address of whoever wanted it.
         policy: What to do when it ends unexpectedly.
-        ready_within_s: Seconds of the machine until its liveliness token must stand.
+        ready_within_s: Silence, seconds of the machine, after which a start that is not ready has failed.
         pinned: True if it may run on this host only. Kept here, with the tags, for a placer that lost its memory.
         tags: Tags its host must have.
         process: Name of the process it shares with others on its host; empty: a process of its own.
@@ -57,7 +61,7 @@ class Spawn(Message, frozen=True):
     parameters: dict[str, Any] = {}
     requester: str = ""
     policy: RestartPolicy = RestartPolicy()
-    ready_within_s: float = 20.0
+    ready_within_s: float = READY_WITHIN_S
     pinned: bool = False
     tags: list[str] = []
     process: str = ""
@@ -117,7 +121,6 @@ class ProcessState(Message, frozen=True):
         spawn: The order it was started by.
         pid: Its process now, 0 while it waits for a restart.
         restarts: How often it was restarted.
-        given_up: True if it ended too often and is left down.
         last_end: How it ended last, for people; empty if it never did.
         silent_s: Seconds of the machine since its process last showed that its event loop runs; 0 while it is in time.
         doing: What a component that is not ready yet is doing, for people.
@@ -126,7 +129,6 @@ class ProcessState(Message, frozen=True):
     spawn: Spawn
     pid: int
     restarts: int
-    given_up: bool
     last_end: str
     silent_s: float = 0.0
     doing: str = ""
@@ -166,14 +168,16 @@ class ProcessFell(Message, frozen=True):
     Attributes:
         name: The component.
         how: Exit code or signal, for people.
-        restart_in_s: Pause before it is started again; negative if it is given up.
+        restart_in_s: Pause before it is started again; negative if it is left down.
         last_lines: The end of its log.
+        failing: True if it ended more often than its policy's limit.
     """
 
     name: str
     how: str
     restart_in_s: float
     last_lines: list[str]
+    failing: bool = False
 
 
 class StartFailed(Refusal):

@@ -25,6 +25,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
+from backbone.component.messages import Absence
 from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import (
@@ -54,7 +55,7 @@ SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, o
 ASK_AGAIN_S = 0.1  # chosen: a hub's nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
 DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeated
-POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=20, window_s=60.0, after_good_end=True)
+POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0)
 
 
 class Ending(StrEnum):
@@ -63,7 +64,6 @@ class Ending(StrEnum):
     TOLD = "told to end"
     CUT_OFF = "the link to the mission was lost"
     OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
-    GIVEN_UP = "its creator was given up"
 
 
 @dataclass(frozen=True)
@@ -89,12 +89,16 @@ class KeepsCreator(Protocol):
     """What an offer needs of the one that keeps its creator; see ``KeptCreator``."""
 
     on_fell: Callable[[ProcessFell], None]
+    on_changed: Callable[[], None]
 
     async def start(self, bus: Bus, clock: Clock) -> None:
         """Have the creator running, or raise a ``BackboneError``."""
 
     def processes(self) -> list[ProcessState]:
         """Return the creator's process."""
+
+    def absences(self) -> list[Absence]:
+        """Return the creator while it does not run or respond."""
 
     async def close(self) -> None:
         """Return when nothing runs here any more; right however often called."""
@@ -108,10 +112,12 @@ class KeptCreator:
 
     Attributes:
         on_fell: Called when the creator ended unexpectedly.
+        on_changed: Called when ``absences()`` may have changed.
     """
 
     def __init__(self, launch: Launch, offered: Offered) -> None:
         self.on_fell: Callable[[ProcessFell], None] = lambda _fell: None
+        self.on_changed: Callable[[], None] = lambda: None
         self._launch, self._offered = launch, offered
         self._keeper: ProcessKeeper | None = None
 
@@ -131,12 +137,17 @@ class KeptCreator:
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
         self._keeper = ProcessKeeper(self._zygote, clock)
         self._keeper.on_fell = self.on_fell
+        self._keeper.on_changed = self.on_changed
         self._keeper.use(bus)
         await self._keeper.start(self._creator_launch(types, directory), POLICY, READY_WITHIN_S)
 
     def processes(self) -> list[ProcessState]:
         """Return the creator's process."""
         return self._keeper.processes() if self._keeper is not None else []
+
+    def absences(self) -> list[Absence]:
+        """Return the creator while it does not run or respond."""
+        return self._keeper.absences() if self._keeper is not None else []
 
     async def close(self) -> None:
         """Return when nothing runs here any more; right however often called."""
@@ -166,7 +177,6 @@ class Offer(Component[NoParameters]):
 
     Attributes:
         ending: Why it ended; meaningful after ``run``.
-        fell: How the creator fell, if it was given up.
     """
 
     accepts: ClassVar[Any] = ListProcesses
@@ -176,10 +186,9 @@ class Offer(Component[NoParameters]):
     ) -> None:
         super().__init__(launch, bus, clock)
         self._creator, self._on_ready = creator, on_ready
-        creator.on_fell = self._creator_fell
+        creator.on_fell, creator.on_changed = self._creator_fell, self.changed
         self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
         self.ending = Ending.TOLD
-        self.fell: ProcessFell | None = None
 
     async def connect(self) -> None:
         """Have the creator running, or end meanwhile because the link is lost."""
@@ -196,15 +205,17 @@ class Offer(Component[NoParameters]):
             return Processes(self.launch.host, [], self._creator.processes())
         return await super().answer(asked)
 
+    def absences(self) -> list[Absence]:
+        """Return the creator while it does not run or respond."""
+        return self._creator.absences()
+
     async def drain(self) -> None:
         """End the creator and all it started."""
         await self._creator.close()
 
     def _creator_fell(self, fell: ProcessFell) -> None:
-        self.tell(fell.name, f"fell: {fell.how}")
-        if fell.restart_in_s < 0:
-            self.fell = fell
-            self._end_as(Ending.GIVEN_UP)
+        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
+        self.changed()
 
     async def _watch_link(self) -> None:
         """End this life if the link stays down, or if the mission's time is another one when it is back."""
@@ -256,12 +267,12 @@ class Offering:
     def __init__(self, offered: Offered, say: Callable[[str], None], secret_file: Path | None = None) -> None:
         self._offered, self._say, self._secret_file = offered, say, secret_file
         self._current: Offer | None = None
-        self._lives: asyncio.Task[ProcessFell | None] | None = None
+        self._lives: asyncio.Task[None] | None = None
         self._is_told_to_end = self._was_in_the_mission = False
         self._said = ""
 
-    async def run(self) -> ProcessFell | None:
-        """Offer the machine until the mission or a signal ends it; return how the creator fell, if it was given up.
+    async def run(self) -> None:
+        """Offer the machine until the mission or a signal ends it.
 
         Raises:
             NameTaken: The mission has a creator of this host.
@@ -271,11 +282,10 @@ class Offering:
         for number in (signal.SIGTERM, signal.SIGINT):
             asyncio.get_running_loop().add_signal_handler(number, self.end)
         try:
-            return await self._lives
+            await self._lives
         except asyncio.CancelledError:
             if not self._is_told_to_end:
                 raise
-            return None
 
     def end(self) -> None:
         """Have ``run`` return when nothing runs here any more."""
@@ -285,7 +295,7 @@ class Offering:
         elif self._lives is not None:
             self._lives.cancel()
 
-    async def _live_again_and_again(self) -> ProcessFell | None:
+    async def _live_again_and_again(self) -> None:
         machine, pause_s = MissionClock.started_now(), PAUSE_FIRST_S
         while True:
             try:
@@ -297,12 +307,12 @@ class Offering:
                     raise
                 self._say_once(f"{refusal}; trying again, end with Ctrl-C")
             else:
-                if offer.ending in (Ending.TOLD, Ending.GIVEN_UP):
-                    return offer.fell
+                if offer.ending is Ending.TOLD:
+                    return
                 self._say_once(f"{offer.ending}: all that ran here has ended; trying to reach the mission again")
                 pause_s = PAUSE_FIRST_S
             if self._is_told_to_end:
-                return None
+                return
             await machine.sleep_s(pause_s)
             pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)
 

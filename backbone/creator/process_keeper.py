@@ -20,6 +20,7 @@ import msgspec
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
+from backbone.component.heartbeat import Vitals, forget_heartbeat, read_vitals
 from backbone.component.launch import Launch
 from backbone.component.membership import (
     PROCESSES,
@@ -32,8 +33,22 @@ from backbone.component.membership import (
     process_address,
     read_process_address,
 )
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import Absence, Stop, Stopping
+from backbone.creator.decisions import (
+    AskToStop,
+    Fork,
+    Instruction,
+    ReportEnded,
+    ReportFell,
+    ReportLeft,
+    ReportReady,
+    ReportSilent,
+    ReportStartFailed,
+    Signal,
+    WakeAt,
+)
 from backbone.creator.messages import (
+    READY_WITHIN_S,
     EndProcess,
     NotHere,
     ProcessEnded,
@@ -55,20 +70,8 @@ from backbone.creator.shared_processes import (
     SharedProcesses,
     SignalProcess,
 )
-from backbone.creator.supervision import (
-    AskToStop,
-    Fork,
-    Instruction,
-    Phase,
-    ReportEnded,
-    ReportFell,
-    ReportLeft,
-    ReportReady,
-    ReportStartFailed,
-    Signal,
-    Supervision,
-    WakeAt,
-)
+from backbone.creator.silence import LOOK_EVERY_S, Silence
+from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import NoProcess
 from backbone.creator.zygote_process import log_path
 from backbone.errors import BackboneError, Refusal
@@ -78,7 +81,6 @@ log = logging.getLogger(__name__)
 
 LAST_LINES = 20
 _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
-HUB_READY_S = 20.0  # chosen: like Spawn.ready_within_s
 OVERLAP_S = 0.3  # chosen: ten times what a component that obeys takes; who takes longer holds nobody up
 ADMIT_EACH_S = 1.0  # chosen: a thousand times what an answer takes
 AWAIT_EACH_S = 60.0  # chosen: the question stands until the member ends; renewed in case an answer was lost
@@ -97,8 +99,14 @@ class Forks(Protocol):
     def kill(self, pid: int, number: signal.Signals) -> None:
         """Send the signal to everything that belongs to the component."""
 
+    def keep_running(self) -> str:
+        """Continue the zygote if it was stopped; return what is wrong with it, empty: nothing."""
+
     async def close(self) -> None:
         """End everything it forked, and itself."""
+
+
+ReadVitals = Callable[[str, int], Vitals | None]
 
 
 class ProcessKeeper:
@@ -107,15 +115,18 @@ class ProcessKeeper:
     Args:
         zygote: Forks the processes; the keeper takes over its ``on_exit``, and leaves its closing to the caller.
         clock: For back-off and deadlines, which are in seconds of the machine; None: the machine's own.
+        read_vitals: Looks at a process, given the mission's folder and the pid; see ``heartbeat.read_vitals``.
 
     Attributes:
         on_fell: Called when a process ended unexpectedly.
+        on_silent: Called with name and seconds when a process shows no sign of life, and with 0 when it does again.
         on_changed: Called after every change of ``processes()``.
         on_bug: Called with what must not happen.
     """
 
-    def __init__(self, zygote: Forks, clock: Clock | None = None) -> None:
+    def __init__(self, zygote: Forks, clock: Clock | None = None, read_vitals: ReadVitals = read_vitals) -> None:
         self.on_fell: Callable[[ProcessFell], None] = _ignore
+        self.on_silent: Callable[[str, float], None] = _ignore_silence
         self.on_changed: Callable[[], None] = lambda: None
         self.on_bug: Callable[[BaseException], None] = _report_to_loop
         self._zygote, self._clock = zygote, clock or MissionClock.started_now()
@@ -126,10 +137,16 @@ class ProcessKeeper:
         self._starting: dict[str, list[asyncio.Future[int]]] = {}
         self._ending: dict[str, list[asyncio.Future[ProcessEnded]]] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        self._read_vitals, self._silences = read_vitals, dict[int, Silence]()
+        self._doing: dict[int, str] = {}
+        self._zygote_trouble, self._zygote_trouble_since_s = "", 0.0
+        self._looking: asyncio.Task[None] | None = None
         self._alarm: asyncio.Task[None] | None = None
+        self._alarm_s = math.inf
         self._shared_alarm: asyncio.Task[None] | None = None
         self._talks: dict[int, set[asyncio.Task[None]]] = {}
         self._is_closing = False
+        self._lives = 0
         zygote.on_exit = self._exited
 
     def use(self, bus: Bus) -> None:
@@ -146,7 +163,7 @@ class ProcessKeeper:
 
         Args:
             policy: What to do when it ends unexpectedly later.
-            ready_within_s: Seconds of the machine until its liveliness token must stand, at every start.
+            ready_within_s: Silence, seconds of the machine, after which a start has failed.
             order: What ``processes()`` shows as the order; None: one made of the other arguments.
 
         Raises:
@@ -164,7 +181,7 @@ class ProcessKeeper:
             AlreadyHere: One of this name runs, starts or ends here.
         """
         forked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-        self._begin(launch, _as_spawn(launch, policy, HUB_READY_S), is_hub=True, forked=forked)
+        self._begin(launch, _as_spawn(launch, policy, READY_WITHIN_S), is_hub=True, forked=forked)
         return await forked
 
     async def wait_ready(self, name: str, within_s: float) -> int:
@@ -177,7 +194,7 @@ class ProcessKeeper:
         one = self._supervision.find(name)
         if one is None:
             raise self._failures.get(name) or NotHere(f"no {name} here", name=name)
-        if one.end is not None or one.phase is Phase.GIVEN_UP:
+        if one.end is not None:
             raise self._start_failed(name, f"is {one.phase}; {one.last_end}")
         if one.phase is Phase.READY:
             return one.pid
@@ -240,9 +257,28 @@ class ProcessKeeper:
     def processes(self) -> list[ProcessState]:
         """Return what is kept here, in the order of start."""
         return [
-            ProcessState(self._kept[one.name].order, one.pid, one.restarts, one.phase is Phase.GIVEN_UP, one.last_end)
+            ProcessState(
+                self._kept[one.name].order,
+                one.pid,
+                one.restarts,
+                one.last_end,
+                one.silent_s,
+                "" if one.phase is Phase.READY else self._doing.get(one.pid, ""),
+            )
             for one in self._supervision
         ]
+
+    def absences(self) -> list[Absence]:
+        """Return what is kept here and does not run or respond; times in mission seconds."""
+        rate, now_s = self._clock.rate, self._now_s()
+        absent = [
+            msgspec.structs.replace(absence, since_s=absence.since_s * rate)
+            for absence in self._supervision.absences(now_s)
+        ]
+        if self._zygote_trouble:
+            doing = "it is continued; new processes wait for it"
+            absent.append(Absence("zygote", self._zygote_trouble_since_s * rate, self._zygote_trouble, doing))
+        return absent
 
     # Events
     def _begin(
@@ -260,6 +296,8 @@ class ProcessKeeper:
             name, order.policy, order.ready_within_s, self._now_s(), asked_by_signal=is_hub
         )
         self._kept[name] = _Kept(launch, order)
+        if self._looking is None and launch.run_directory:
+            self._looking = self._task(self._look_for_life(launch.run_directory), "look for signs of life")
         self._failures.pop(name, None)
         self._do(instructions, forked)
 
@@ -283,7 +321,29 @@ class ProcessKeeper:
         if stands and any((k.launch.host, k.launch.process) == (host, process) for k in self._kept.values()):
             self._do_shared(self._shared.serving(process, pid, self._now_s()))
 
+    async def _look_for_life(self, run_directory: str) -> None:
+        while True:
+            await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
+            now_s = self._now_s()
+            for pid in {one.pid for one in self._supervision if one.pid} | self._shared.pids():
+                if (vitals := self._read_vitals(run_directory, pid)) is not None:
+                    self._doing[pid] = vitals.doing
+                    self._observed(pid, self._silences.setdefault(pid, Silence()).look(vitals, now_s), now_s)
+            trouble = self._zygote.keep_running()
+            if trouble != self._zygote_trouble:
+                self._zygote_trouble, self._zygote_trouble_since_s = trouble, now_s
+                self.on_changed()
+
+    def _observed(self, pid: int, silent_s: float, now_s: float) -> None:
+        self._do_shared(self._shared.observed(pid, silent_s, now_s))
+        for name in [one.name for one in self._supervision if one.pid == pid]:
+            self._do(self._supervision.observed(name, silent_s, now_s))
+
     def _exited(self, pid: int, returncode: int) -> None:
+        self._silences.pop(pid, None)
+        self._doing.pop(pid, None)
+        if self._kept:
+            forget_heartbeat(next(iter(self._kept.values())).launch.run_directory, pid)
         if not self._shared.has(pid):
             self._do(self._supervision.exited(pid, returncode, self._now_s()))
             return
@@ -346,7 +406,8 @@ class ProcessKeeper:
         try:
             if self._bus is None:
                 raise NoProcess("there is no bus to ask on")
-            await self._bus.ask(kept.launch.address, Stop(kept.end_reason), Stopping, within_s=within_s)
+            stop = Stop(kept.end_reason, kept.launch.incarnation)
+            await self._bus.ask(kept.launch.address, stop, Stopping, within_s=within_s)
         except BackboneError as error:
             log.info("%s could not be asked to stop: %s", kept.launch.name, error)
             self._do(self._supervision.ask_failed(kept.launch.name, self._now_s()))
@@ -363,10 +424,8 @@ class ProcessKeeper:
     def _do(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
         for instruction in instructions:
             match instruction:
-                case Fork(name=name) if process := self._kept[name].launch.process:
-                    self._do_shared(self._shared.wanted(name, process, self._now_s()))
                 case Fork(name=name):
-                    self._task(self._fork(self._kept[name].launch, forked), f"fork {name}")
+                    self._begin_life(self._kept[name], forked)
                 case AskToStop(name=name, within_s=within_s):
                     self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
                 case Signal(name=name, number=number) if self._kept[name].launch.process:
@@ -387,10 +446,12 @@ class ProcessKeeper:
                 case ReportLeft(name=name):
                     log.info("%s ended by itself in good order", name)
                     _settle(self._starting.pop(name, []), self._start_failed(name, "ended by itself"))
-                case ReportFell(name=name, how=how, restart_in_s=restart_in_s):
+                case ReportFell(name=name, how=how, restart_in_s=restart_in_s, failing=failing):
                     if restart_in_s < 0:
-                        _settle(self._starting.pop(name, []), self._start_failed(name, f"{how}; given up"))
-                    self.on_fell(ProcessFell(name, how, restart_in_s, self._last_lines(name)))
+                        _settle(self._starting.pop(name, []), self._start_failed(name, how))
+                    self.on_fell(ProcessFell(name, how, restart_in_s, self._last_lines(name), failing))
+                case ReportSilent(name=name, silent_s=silent_s):
+                    self.on_silent(name, silent_s)
                 case WakeAt(at_s=at_s):
                     self._set_alarm(at_s)
                 case _:
@@ -398,6 +459,16 @@ class ProcessKeeper:
         if any(not isinstance(each, WakeAt | AskToStop | Signal) for each in instructions):
             self._kept = {one.name: self._kept[one.name] for one in self._supervision}
             self.on_changed()
+
+    def _begin_life(self, kept: _Kept, forked: asyncio.Future[int] | None) -> None:
+        self._lives += 1
+        launch = kept.launch
+        incarnation = f"{launch.host}.{os.getpid()}.{self._lives}"
+        launch = kept.launch = msgspec.structs.replace(launch, incarnation=incarnation)
+        if launch.process:
+            self._do_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))
+        else:
+            self._task(self._fork(launch, forked), f"fork {launch.name}")
 
     def _do_shared(self, instructions: list[ProcessInstruction]) -> None:
         for instruction in instructions:
@@ -440,7 +511,10 @@ class ProcessKeeper:
 
     def _set_alarm(self, at_s: float) -> None:
         if self._alarm is not None and self._alarm is not asyncio.current_task():
+            if self._alarm_s == at_s and not self._alarm.done():
+                return
             self._alarm.cancel()
+        self._alarm_s = at_s
         self._alarm = self._task(self._ring(at_s), "supervision's alarm")
 
     def _task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
@@ -511,6 +585,10 @@ def _settle(waiting: list[asyncio.Future[Any]], outcome: object) -> None:
 
 
 def _ignore(_fell: ProcessFell) -> None:
+    """Tell nobody."""
+
+
+def _ignore_silence(_name: str, _silent_s: float) -> None:
     """Tell nobody."""
 
 

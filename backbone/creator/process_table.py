@@ -72,6 +72,15 @@ def read_line(stat: str) -> Process:
     return Process(int(parent), int(session), title, state in "ZX")
 
 
+def is_stopped(pid: int) -> bool:
+    """Say whether the process was stopped by a signal or a debugger."""
+    try:
+        stat = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return stat.rpartition(")")[2].split()[0] in "Tt"
+
+
 def zygote_title(parent: int) -> str:
     """Return the title of the zygote that serves this process."""
     return f"zygote-{parent}"

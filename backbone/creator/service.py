@@ -16,6 +16,7 @@ import psutil
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import Absence
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
@@ -89,7 +90,8 @@ class Creator(Component[CreatorParameters]):
         self._zygote.on_lost = lambda: self.tell(self.name, "lost its zygote and with it everything it ran")
         self._keeper = ProcessKeeper(self._zygote, self.clock)
         self._keeper.on_fell = self._component_fell
-        self._keeper.on_changed = self._publish_load
+        self._keeper.on_silent = self._component_silent
+        self._keeper.on_changed = self._processes_changed
         self._keeper.on_bug = self.fail
         self._keeper.use(self.bus)
         self._measure()
@@ -123,6 +125,10 @@ class Creator(Component[CreatorParameters]):
         """End all it runs, the last started first, then the zygote."""
         await self._keeper.close()
         await self._zygote.close()
+
+    def absences(self) -> list[Absence]:
+        """Return what the placer ordered here and does not run or respond."""
+        return self._keeper.absences()
 
     def parameters_changed(self) -> None:
         """Tell the placer of new tags at once.
@@ -187,9 +193,17 @@ class Creator(Component[CreatorParameters]):
 
     def _component_fell(self, fell: ProcessFell) -> None:
         self._fell += 1
-        then = f"starts again in {fell.restart_in_s:g} s" if fell.restart_in_s >= 0 else "is given up"
+        then = f"restarts in {fell.restart_in_s:g} s" if fell.restart_in_s >= 0 else "its owner asks for another one"
         self.tell(fell.name, f"fell, {fell.how}; {then}")
         self.bus.publish(self.address, Conversation.EVENTS, fell)
+
+    def _component_silent(self, name: str, silent_s: float) -> None:
+        self.tell(name, f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again")
+        self._processes_changed()
+
+    def _processes_changed(self) -> None:
+        self._publish_load()
+        self.changed()
 
     def _measure(self) -> None:
         self._load = (psutil.cpu_percent() / 100.0, psutil.virtual_memory().percent / 100.0)
@@ -200,4 +214,4 @@ class Creator(Component[CreatorParameters]):
         self.bus.publish(self.address, Conversation.TELEMETRY, load)
 
     def _count(self) -> int:
-        return sum(not process.given_up for process in self._keeper.processes())
+        return len(self._keeper.processes())

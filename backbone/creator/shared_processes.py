@@ -26,8 +26,8 @@ from enum import StrEnum
 
 from backbone.creator.supervision import TERM_S, describe
 
-SERVES_WITHIN_S = 10.0  # chosen: half of what its first member has; opening a session takes 15 ms, or 5 s in vain
-ADMITS_WITHIN_S = 5.0  # chosen: an answer takes a millisecond; whose loop is blocked that long holds nobody's lease
+SERVES_WITHIN_S = 10.0  # chosen: silence; opening a session takes 15 ms, or 5 s in vain
+ADMITS_WITHIN_S = 5.0  # chosen: silence; an answer takes a millisecond
 NEVER_S = math.inf
 
 
@@ -162,6 +162,10 @@ class SharedProcesses:
         """Say whether this is a shared process."""
         return any(process.pid == pid for process in self._all.values())
 
+    def pids(self) -> set[int]:
+        """Return the pids of all shared processes."""
+        return {process.pid for process in self._all.values() if process.pid}
+
     # Orders
     def wanted(self, name: str, process: str, now_s: float) -> list[ProcessInstruction]:
         """Begin to have the component live in this process; it must not be living in any."""
@@ -252,6 +256,18 @@ class SharedProcesses:
             self._all[one.name] = _Process(one.name, members=left)
             told.append(ForkProcess(one.name, next(iter(left))))
         return self._and_wake(told)
+
+    def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
+        """Take note that this process has been silent for that long: what it has to do in time counts from there."""
+        for one in self._all.values():
+            if one.pid != pid:
+                continue
+            if one.phase is _Phase.STARTING:
+                one.deadline_s = now_s - silent_s + SERVES_WITHIN_S
+            for member in one.members.values():
+                if member.place is _Place.ADMITTING:
+                    member.deadline_s = now_s - silent_s + ADMITS_WITHIN_S
+        return self._and_wake([])
 
     def woken(self, now_s: float) -> list[ProcessInstruction]:
         """Do what is due by now."""

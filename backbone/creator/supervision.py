@@ -7,12 +7,16 @@ Rules:
 
 * Of one name there is never more than one process: a name is forked again only after its last process
   was reported as ended. Which of them share one is decided in ``shared_processes``; here each is alone.
-* In no window of a policy are there more restarts than its limit.
+* What is wanted is restarted however it ended, after pauses that grow; only an order to end it ends that. A policy
+  without restart leaves that to the owner. In no window of a policy are there more quick restarts than its limit.
 * A process is dead when the zygote says so, never because its liveliness token fell: when the hub
   dies, all tokens fall and everybody lives. A token that rises means ready, nothing else.
 * Every ordered start is answered by exactly one ``ReportReady`` or ``ReportStartFailed``, every ordered
   end by exactly one ``ReportEnded``, and only when nothing of the process is left.
-* The first start that fails is not repeated: whoever ordered it is told and decides.
+* The first start that fails by itself (an exit code above 0, silence) is not repeated: its owner decides. One that
+  a signal ended from outside is begun again like any other.
+* A ready process that is silent for longer than its policy allows hangs: it is killed, then restarted. So there is
+  never a second copy of a process that was only paused.
 """
 
 from __future__ import annotations
@@ -24,92 +28,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, RestartPolicy
+from backbone.component.messages import Absence
+from backbone.creator.decisions import (
+    AskToStop,
+    Fork,
+    Instruction,
+    ReportEnded,
+    ReportFell,
+    ReportLeft,
+    ReportReady,
+    ReportSilent,
+    ReportStartFailed,
+    Signal,
+    WakeAt,
+)
+from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHere, RestartPolicy
+from backbone.creator.silence import SHOWN_AFTER_S
 
 TERM_S = 0.5  # chosen: like EndProcess.term_s, for processes nobody ordered the end of
 LEAVE_S = 0.15  # chosen: from leaving the bus to the end of a process takes 10 ms, on a busy machine ten times that
 NEVER_S = math.inf
-
-
-@dataclass(frozen=True, slots=True)
-class Fork:
-    """Have it running; report ``forked`` or ``fork_failed``."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class AskToStop:
-    """Ask it to stop; report ``ask_failed`` if it does not say that it will."""
-
-    name: str
-    within_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """Send the signal to everything that belongs to this process."""
-
-    name: str
-    pid: int
-    number: signal.Signals
-
-
-@dataclass(frozen=True, slots=True)
-class ReportReady:
-    """It is ready, for the first time or again."""
-
-    name: str
-    pid: int
-
-
-@dataclass(frozen=True, slots=True)
-class ReportStartFailed:
-    """It never became ready, and will not by this order."""
-
-    name: str
-    how: str
-
-
-@dataclass(frozen=True, slots=True)
-class ReportEnded:
-    """Its end was ordered, and nothing of it is left."""
-
-    name: str
-    by: EndedBy
-    exit_code: int
-
-
-@dataclass(frozen=True, slots=True)
-class ReportLeft:
-    """It ended in good order by itself and is not supervised any more."""
-
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class ReportFell:
-    """It ended unexpectedly.
-
-    Attributes:
-        restart_in_s: Pause until its restart; negative: it is given up.
-    """
-
-    name: str
-    how: str
-    restart_in_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class WakeAt:
-    """Report ``woken`` at this time at the latest; replaces what earlier answers said."""
-
-    at_s: float
-
-
-Instruction = (
-    Fork | AskToStop | Signal | ReportReady | ReportStartFailed | ReportEnded | ReportLeft | ReportFell | WakeAt
-)
 
 
 class Phase(StrEnum):
@@ -120,7 +58,6 @@ class Phase(StrEnum):
     READY = "ready"
     ENDING = "ending"  # asked or signalled
     WAITING = "waiting"  # fell, will be restarted
-    GIVEN_UP = "given up"  # fell too often, left down
 
 
 @dataclass
@@ -147,12 +84,14 @@ class Supervised:
     Attributes:
         name: The component.
         policy: What to do when it ends unexpectedly.
-        ready_within_s: Time it has from the order to readiness, at each start.
+        ready_within_s: Silence after which a start has failed.
         asked_by_signal: True for a hub: asking over the bus it carries would cut the answer off.
         phase: Where it is.
         pid: Its process, 0 while there is none.
         restarts: How often it was restarted.
         last_end: How it ended last, for people; empty if it never did.
+        silent_s: For how long a ready process has shown no sign of life.
+        absent_since_s: When it ended or fell silent; negative while it is ready and responds.
     """
 
     name: str
@@ -164,6 +103,9 @@ class Supervised:
     restarts: int = 0
     last_end: str = ""
     last_code: int = 0
+    silent_s: float = 0.0
+    absent_since_s: float = -1.0
+    began_s: float = 0.0
     deadline_s: float = NEVER_S
     token_rose: bool = False
     start_answered: bool = False
@@ -199,12 +141,11 @@ class Supervision:
         """Begin to supervise a new process.
 
         Raises:
-            AlreadyHere: One of this name is supervised and not given up.
+            AlreadyHere: One of this name is supervised.
         """
         old = self._all.get(name)
-        if old is not None and old.phase is not Phase.GIVEN_UP:
+        if old is not None:
             raise AlreadyHere(f"{name} is {old.phase}, pid {old.pid}", name=name, pid=old.pid)
-        self._all.pop(name, None)  # a new order begins at the end of the line
         one = self._all[name] = Supervised(name, policy, ready_within_s, asked_by_signal)
         return self._and_wake(self._fork(one, now_s))
 
@@ -225,9 +166,10 @@ class Supervision:
             one.deadline_s = min(one.deadline_s, now_s + left_s)
             return self._and_wake([])
         match one.phase:
-            case Phase.WAITING | Phase.GIVEN_UP:
+            case Phase.WAITING:
                 del self._all[name]
-                return self._and_wake([ReportEnded(name, EndedBy.ITSELF, one.last_code)])
+                failed = [] if one.start_answered else [ReportStartFailed(name, one.last_end)]
+                return self._and_wake([*failed, ReportEnded(name, EndedBy.ITSELF, one.last_code)])
             case Phase.FORKING:
                 one.end, one.deadline_s = _End(ask_s, term_s, ordered=True), NEVER_S
                 return self._and_wake([])
@@ -242,7 +184,7 @@ class Supervision:
         one.pid = pid
         if one.end is not None:
             return self._and_wake(_next_stage(one, one.end, now_s))
-        one.phase = Phase.STARTING
+        one.phase, one.deadline_s = Phase.STARTING, now_s + one.ready_within_s
         return self._and_wake(self._become_ready(one) if one.token_rose else [])
 
     def fork_failed(self, name: str, why: str, now_s: float) -> list[Instruction]:
@@ -290,6 +232,32 @@ class Supervision:
         one.end.not_heard, one.deadline_s = True, min(one.deadline_s, now_s + LEAVE_S)
         return self._and_wake([])
 
+    def observed(self, name: str, silent_s: float, now_s: float) -> list[Instruction]:
+        """Take note that its process has been silent for that long; of no meaning for names without a process."""
+        one = self._all.get(name)
+        if one is None or one.end is not None:
+            return []
+        if one.phase is Phase.STARTING:
+            one.deadline_s = min(now_s - silent_s + one.ready_within_s, one.began_s + START_MOST_S)
+            return self._and_wake([])
+        if one.phase is not Phase.READY:
+            return []
+        was_silent, one.silent_s = one.silent_s >= SHOWN_AFTER_S, silent_s
+        is_silent = silent_s >= SHOWN_AFTER_S
+        one.absent_since_s = now_s - silent_s if is_silent else -1.0
+        told: list[Instruction] = (
+            [ReportSilent(name, silent_s if is_silent else 0.0)] if was_silent != is_silent else []
+        )
+        if silent_s >= one.policy.hung_after_s:
+            one.failure = f"hung: no sign of life for {silent_s:.1f} s"
+            one.end = _End(0.0, TERM_S, ordered=False, stage=EndedBy.SIGTERM)
+            told += _next_stage(one, one.end, now_s)
+        return self._and_wake(told)
+
+    def absences(self, now_s: float) -> list[Absence]:
+        """Return what is wanted and does not run or respond; times are seconds of the machine."""
+        return [_absence(one, now_s) for one in self if one.absent_since_s >= 0 and not _is_ended_on_order(one)]
+
     def woken(self, now_s: float) -> list[Instruction]:
         """Do what is due by now."""
         instructions: list[Instruction] = []
@@ -318,32 +286,34 @@ class Supervision:
                 return _next_stage(one, one.end, now_s)
 
     def _fail(self, one: Supervised) -> _End:
-        one.failure = f"was not ready within {one.ready_within_s:g} s"
+        one.failure = f"was not ready and showed no sign of life for {one.ready_within_s:g} s"
         one.deadline_s = NEVER_S
         return _End(0.0, TERM_S, ordered=False)
 
     def _fork(self, one: Supervised, now_s: float) -> list[Instruction]:
         one.phase, one.pid, one.token_rose, one.failure, one.end = Phase.FORKING, 0, False, "", None
-        one.deadline_s = now_s + one.ready_within_s
+        one.began_s, one.deadline_s = now_s, now_s + START_MOST_S
         return [Fork(one.name)]
 
     def _become_ready(self, one: Supervised) -> list[Instruction]:
         one.phase, one.deadline_s, one.start_answered = Phase.READY, NEVER_S, True
+        one.silent_s, one.absent_since_s = 0.0, -1.0
         return [ReportReady(one.name, one.pid)]
 
     def _gone(self, one: Supervised, how: str, returncode: int, now_s: float) -> list[Instruction]:
         """Decide what follows from the end of its process."""
-        one.pid, one.last_end, one.last_code, one.deadline_s = 0, how, returncode, NEVER_S
-        answers: list[Instruction] = []
-        was_answered = one.start_answered
-        if not was_answered:
-            answers.append(ReportStartFailed(one.name, how))
-        if one.end is not None and one.end.ordered:
+        one.pid, one.last_end, one.last_code, one.deadline_s, one.silent_s = 0, how, returncode, NEVER_S, 0.0
+        was_answered, is_ordered = one.start_answered, one.end is not None and one.end.ordered
+        came_from_outside = returncode <= 0 and one.end is None and one.policy.restart and not one.is_abandoned
+        if not was_answered and came_from_outside:
+            return [self._fall(one, how, now_s)]
+        answers: list[Instruction] = [] if was_answered else [ReportStartFailed(one.name, how)]
+        if one.end is not None and is_ordered:
             answers.append(ReportEnded(one.name, _by(one.end, returncode), returncode))
             del self._all[one.name]
         elif not was_answered or one.is_abandoned:
             del self._all[one.name]
-        elif returncode == 0 and one.end is None and not one.policy.after_good_end:
+        elif returncode == 0 and one.end is None and not one.policy.restart:
             answers.append(ReportLeft(one.name))
             del self._all[one.name]
         else:
@@ -355,16 +325,39 @@ class Supervision:
         while past and past[0] <= now_s - policy.window_s:
             past.popleft()
         one.end, one.failure = None, ""
-        if not policy.restart or len(past) >= policy.limit:
-            one.phase = Phase.GIVEN_UP
+        if one.absent_since_s < 0:
+            one.absent_since_s = now_s
+        if not policy.restart:
+            del self._all[one.name]
             return ReportFell(one.name, how, -1.0)
-        pause_s = min(policy.back_off_s * 2.0 ** len(past), policy.back_off_most_s)
+        failing = len(past) >= policy.limit
+        pause_s = (
+            policy.failing_pause_s if failing else min(policy.back_off_s * 2.0 ** len(past), policy.back_off_most_s)
+        )
         one.phase, one.deadline_s = Phase.WAITING, now_s + pause_s
-        return ReportFell(one.name, how, pause_s)
+        return ReportFell(one.name, how, pause_s, failing)
 
     def _and_wake(self, instructions: list[Instruction]) -> list[Instruction]:
         at_s = min((one.deadline_s for one in self), default=NEVER_S)
         return instructions if at_s == NEVER_S else [*instructions, WakeAt(at_s)]
+
+
+def _is_ended_on_order(one: Supervised) -> bool:
+    return one.end is not None and one.end.ordered
+
+
+def _absence(one: Supervised, now_s: float) -> Absence:
+    match one.phase:
+        case Phase.READY:
+            cause = f"hung: no sign of life for {one.silent_s:.1f} s"
+            doing = f"is replaced after {one.policy.hung_after_s:g} s"
+        case Phase.ENDING:
+            cause, doing = one.failure, "is being ended, then restarted"
+        case Phase.WAITING:
+            cause, doing = one.last_end, f"restarts in {max(0.0, one.deadline_s - now_s):.1f} s"
+        case _:
+            cause, doing = one.last_end, f"is restarting, restart {one.restarts}"
+    return Absence(one.name, one.absent_since_s, cause, doing)
 
 
 def _next_stage(one: Supervised, end: _End, now_s: float) -> list[Instruction]:

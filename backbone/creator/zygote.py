@@ -125,6 +125,17 @@ class Zygote:
         """Send the signal to everything that belongs to the component; nothing if it has ended."""
         self._body.send(Kill(pid, number))
 
+    def keep_running(self) -> str:
+        """Continue the zygote if it was stopped, which serves no purpose; return what is wrong, empty: nothing.
+
+        A stopped zygote starts nothing and reports no end, but everything it forked goes on.
+        """
+        if not process_table.is_stopped(self._body.pid):
+            return ""
+        log.warning("zygote %d was stopped and is continued", self._body.pid)
+        process_table.send([self._body.pid], signal.SIGCONT)
+        return "the zygote was stopped"
+
     async def close(self) -> None:
         """End the zygote and everything it forked; when this returns, nothing of it is left. Idempotent."""
         self._is_closing = True

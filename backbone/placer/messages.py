@@ -92,9 +92,16 @@ class ListPlacements(Message, frozen=True):
 
 
 class Placements(Message, frozen=True):
-    """Answer to ``ListPlacements``, sorted by name."""
+    """Answer to ``ListPlacements``.
+
+    Attributes:
+        placements: Sorted by name.
+        stopped: Names that were ordered to stop and not started since, with the reason: their owners must not start
+            them again.
+    """
 
     placements: list[Placement]
+    stopped: dict[str, str] = {}
 
 
 class NoHost(Refusal):
@@ -119,7 +126,7 @@ class StoppedMeanwhile(Refusal):
 
 
 class NotPlaced(Refusal):
-    """The placer never placed a component of this name."""
+    """The placer has no component of this name; fact ``stopped``: whether it was ordered to stop."""
 
     code = "placer.unknown"
     remedy = "See 'scout-backbone status' for the names that are there."

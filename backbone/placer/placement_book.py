@@ -8,9 +8,12 @@ Rules:
   choice of a host counts those that are still starting.
 * Truth lives at the edge: a creator's list of processes settles what runs on its host. The book of a
   restarted placer is rebuilt from these lists.
-* A host whose creator died has lost its components (creators take them along). Those that are
-  restarted by policy are placed again, elsewhere or, if pinned, when that creator is back. Those that
-  are not (ARCs) are forgotten: their owners claim new ones.
+* A record is a wish: it stands until its component is ordered to stop. However the component came to be missing,
+  it is placed again: with its host, or by an end nobody ordered. Only components without restart (ARCs) are
+  forgotten then: their owners claim new ones.
+* A host whose creator died has lost its components (creators take them along). Those that are pinned wait until
+  that creator is back.
+* An order to stop is remembered, so that owners that compare wish and fact do not start the component again.
 * A host that was only cut off comes back with components that were placed elsewhere or stopped
   meanwhile. These are ended there: no name runs twice for long.
 
@@ -24,12 +27,15 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from backbone.component.messages import Absence
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, Spawn
 from backbone.nameserver.messages import NameTaken
-from backbone.naming import address, did_you_mean
+from backbone.naming import Subsystem, address, did_you_mean
 from backbone.placer.messages import NotPlaced, Placement
 from backbone.placer.placement import Choice, HostView, obstacle, place
+
+STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; nobody stops so many in that time
 
 
 class Phase(StrEnum):
@@ -37,8 +43,7 @@ class Phase(StrEnum):
 
     STARTING = "starting"  # somebody waits for it to become ready
     RUNNING = "running"  # its creator has it
-    WAITING = "waiting"  # wanted, but lost its host
-    GIVEN_UP = "given up"  # ended too often; may be started anew under its name
+    WAITING = "waiting"  # wanted, but lost its host or its process
 
 
 @dataclass(slots=True)
@@ -56,6 +61,9 @@ class Record:
         unwanted: True from the moment it is to be stopped.
         suspect: True while its creator must be asked whether it still has it.
         lost: True from the loss of its host until it has another: it may come back with the old one.
+        missing_since_s: Mission time from which on a component that ran is missing; negative: it is not.
+        cause: Why it is missing.
+        doing: What the placer does about it.
     """
 
     spawn: Spawn
@@ -68,6 +76,9 @@ class Record:
     unwanted: bool = False
     suspect: bool = False
     lost: bool = False
+    missing_since_s: float = -1.0
+    cause: str = ""
+    doing: str = ""
 
     @property
     def address(self) -> str:
@@ -78,6 +89,13 @@ class Record:
         """Return the record as others see it."""
         spawn = self.spawn
         return Placement(spawn.name, spawn.type, self.host, spawn.requester, self.since_s, list(self.reasons))
+
+    def misses(self, cause: str, now_s: float) -> None:
+        """Take note that the component ran and is missing now."""
+        self.phase, self.host, self.pid, self.suspect = Phase.WAITING, "", 0, False
+        self.cause, self.doing = cause, "is to be placed again"
+        if self.missing_since_s < 0:
+            self.missing_since_s = now_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +149,7 @@ class PlacementBook:
         self._records: dict[str, Record] = {}
         self._numbers: dict[str, int] = {}
         self._left_behind: set[tuple[str, str]] = set()
+        self._stopped: dict[str, str] = {}
 
     # ------------------------------------------------------------------ looking
     def record(self, name: str) -> Record:
@@ -141,7 +160,9 @@ class PlacementBook:
         """
         found = self._records.get(name)
         if found is None:
-            raise NotPlaced(f"{name!r} was not placed{did_you_mean(name, self._records)}", name=name)
+            stopped = self._stopped.get(name, "")
+            because = f": it was stopped, {stopped}" if stopped else did_you_mean(name, self._records)
+            raise NotPlaced(f"{name!r} was not placed{because}", name=name, stopped=name in self._stopped)
         return found
 
     def find(self, name: str) -> Record | None:
@@ -156,7 +177,7 @@ class PlacementBook:
         """Return every host with its count of components, sorted by name."""
         counts: dict[str, int] = {}
         for record in self._records.values():
-            counts[record.host] = counts.get(record.host, 0) + (record.phase is not Phase.GIVEN_UP)
+            counts[record.host] = counts.get(record.host, 0) + 1
         return [replace(self._hosts[name].view, components=counts.get(name, 0)) for name in sorted(self._hosts)]
 
     def is_alive(self, host: str) -> bool:
@@ -172,6 +193,32 @@ class PlacementBook:
         record = self.record(name)
         revived = [replace(view, alive=True) for view in self.hosts()]
         return not revived or any(not obstacle(view, record.spawn.tags, record.pin) for view in revived)
+
+    def stopped(self) -> dict[str, str]:
+        """Return the names that were ordered to stop and not started since, with the reason."""
+        return dict(self._stopped)
+
+    def owned_by(self, owner: str) -> list[str]:
+        """Return the names that this address asked for."""
+        return [record.spawn.name for record in self.records() if record.spawn.requester == owner]
+
+    def ownerless(self) -> dict[str, list[str]]:
+        """Return the names whose owner is a decision process that is not in the book, by the owner's address."""
+        known = {record.address for record in self._records.values()}
+        found: dict[str, list[str]] = {}
+        for record in self.records():
+            owner = record.spawn.requester
+            if owner.startswith(f"{Subsystem.MISSION_CONTROL}/") and owner not in known:
+                found.setdefault(owner, []).append(record.spawn.name)
+        return found
+
+    def absences(self) -> list[Absence]:
+        """Return what ran, is wanted, and is on no host now; what a creator restarts is that creator's to report."""
+        return [
+            Absence(record.spawn.name, record.missing_since_s, record.cause, record.doing)
+            for record in self.records()
+            if record.missing_since_s >= 0 and not record.unwanted
+        ]
 
     # ------------------------------------------------------------------ starting and stopping
     def number(self, type_name: str) -> str:
@@ -191,7 +238,7 @@ class PlacementBook:
             return
         for record in self.records():
             other = record.spawn
-            if other.type == component_type.name and other.name != name and record.phase is not Phase.GIVEN_UP:
+            if other.type == component_type.name and other.name != name:
                 raise MultiplicityExceeded(
                     f"{name}: only one {other.type} may run, and {other.name} is {record.phase} on "
                     f"{record.host or 'no host yet'}, pid {record.pid}",
@@ -215,6 +262,7 @@ class PlacementBook:
                 pid=taken.pid,
             )
         self._remember_number(spawn)
+        self._stopped.pop(spawn.name, None)
         record = self._records[spawn.name] = Record(spawn, pin, Phase.STARTING, "", now_s)
         return record
 
@@ -235,25 +283,29 @@ class PlacementBook:
         """Take note that it is ready."""
         record = self.record(name)
         record.phase, record.pid, record.since_s, record.suspect = Phase.RUNNING, pid, now_s, False
+        record.missing_since_s, record.cause, record.doing = -1.0, "", ""
 
     def unsure(self, name: str, now_s: float) -> None:
         """Take note that nobody knows whether it runs; its creator's next word settles it."""
         record = self.record(name)
         record.phase, record.since_s, record.suspect = Phase.RUNNING, now_s, True
 
-    def waits(self, name: str) -> None:
+    def waits(self, name: str, why: str = "") -> None:
         """Take note that no host can have it now."""
         record = self.record(name)
-        record.phase, record.host = Phase.WAITING, ""
-
-    def gave_up(self, name: str) -> None:
-        """Take note that it does not run and is not tried again by itself."""
-        record = self.record(name)
-        record.phase, record.pid = Phase.GIVEN_UP, 0
+        record.phase, record.host, record.doing = Phase.WAITING, "", f"waits for a host: {why}"
 
     def forget(self, name: str) -> None:
         """Take the name out of the book; right also if it is not in it."""
         self._records.pop(name, None)
+
+    def stop_ordered(self, name: str, reason: str) -> None:
+        """Take the name out of the book and remember that this was meant."""
+        self.forget(name)
+        self._stopped.pop(name, None)
+        self._stopped[name] = reason
+        while len(self._stopped) > STOPPED_KEPT:
+            del self._stopped[next(iter(self._stopped))]
 
     # ------------------------------------------------------------------ what creators and nameserver tell
     def creator_up(
@@ -262,7 +314,7 @@ class PlacementBook:
         """Take a creator's answer to a question of that mission time, and find hosts for those who wait."""
         told: list[Instruction] = []
         if self.is_alive(host) and not self.knows_creator(host, creator_pid):
-            told += self.creator_down(host)
+            told += self.creator_down(host, asked_s)
         old = self._hosts[host].view if host in self._hosts else HostView(host)
         if not self.is_alive(host):
             told.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
@@ -277,7 +329,7 @@ class PlacementBook:
             if record.phase is Phase.WAITING and not record.unwanted
         ]
 
-    def creator_down(self, host: str) -> list[Instruction]:
+    def creator_down(self, host: str, now_s: float) -> list[Instruction]:
         """Take note that a host's creator died, and with it all it ran."""
         if not self.is_alive(host):
             return []
@@ -292,8 +344,8 @@ class PlacementBook:
             if record.phase is Phase.STARTING:
                 continue  # whoever waits for it finds out and decides
             if record.phase is Phase.RUNNING and record.spawn.policy.restart and not record.unwanted:
-                record.phase, record.host, record.pid = Phase.WAITING, "", 0
-                record.suspect, record.lost = False, True
+                record.misses(f"was lost with the creator of {host}", now_s)
+                record.lost = True
                 told += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
             else:
                 self.forget(name)
@@ -341,14 +393,14 @@ class PlacementBook:
             if record.host != host or record.phase is not Phase.RUNNING or record.since_s > asked_s:
                 continue
             process = listed.get(name)
-            if process is None:
+            if process is not None:
+                record.pid = process.pid or record.pid
+            elif record.unwanted or not record.spawn.policy.restart:
                 self.forget(name)
-                told.append(Note(name, f"ended by itself on {host}"))
-            elif process.given_up:
-                self.gave_up(name)
-                told.append(Note(name, f"was given up on {host}: {process.last_end}"))
-            elif process.pid:
-                record.pid = process.pid
+                told.append(Note(name, f"ended on {host}"))
+            else:
+                record.misses(f"its creator on {host} does not have it", asked_s)
+                told += [Note(name, f"is missing on {host}"), PlaceAgain(name)]
         return told
 
     # ------------------------------------------------------------------
@@ -390,6 +442,6 @@ class PlacementBook:
 
 def _adopt(record: Record, host: str, process: ProcessState, asked_s: float) -> None:
     """Take over what a creator runs as what was wanted."""
-    record.phase = Phase.GIVEN_UP if process.given_up else Phase.RUNNING
+    record.phase, record.missing_since_s = Phase.RUNNING, -1.0
     record.host, record.pid, record.since_s = host, process.pid, asked_s
     record.reasons, record.lost, record.suspect = (f"{host}: its creator has it",), False, False

@@ -14,19 +14,18 @@ from collections.abc import Callable, Coroutine
 from contextlib import AsyncExitStack
 from enum import Enum
 from functools import partial
+from itertools import chain, repeat
 from typing import Any, assert_never
 
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import ComponentState, LifeState
+from backbone.component.messages import Absence, ComponentState, LifeState
 from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
 from backbone.creator.messages import (
-    TYPE as CREATOR,
-)
-from backbone.creator.messages import (
+    START_MOST_S,
     EndedBy,
     EndProcess,
     HostLoad,
@@ -40,6 +39,7 @@ from backbone.creator.messages import (
     Spawned,
     creator_name,
 )
+from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
@@ -80,13 +80,14 @@ from backbone.placer.placement_book import (
 from backbone.wire import Envelope, Message, UnknownMessage
 
 ANSWER_EACH_S, ANSWER_WITHIN_S = 1.0, 5.0  # chosen: a killed core service is back within one second
-SPAWN_MARGIN_S = 5.0  # chosen: a creator answers this long after its own deadline at the latest, even when busy
+SPAWN_WITHIN_S = START_MOST_S + 5.0  # chosen: a creator's own limit and a moment; it judges by silence long before
 END_MARGIN_S = 5.0  # chosen: the same for ends
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
 OLD_LIFE_S = 5.0  # chosen: longer than any lease by which a lost host's components are still seen
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED, LifeState.FAILED)
 SPAWN_TRIES = 3  # chosen: two creators may die of something else; a third dies of the order
-AGAIN_PAUSES_S = (0.0, 0.5, 1.0, 2.0)  # chosen: before each try to start a lost component again
+AGAIN_PAUSES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)  # chosen: before each try to place a missing component again
+COMPARE_EVERY_S = 5.0  # chosen: wishes without an owner are rare: the owner and the placer died at the same time
 
 
 class Fate(Enum):
@@ -107,7 +108,7 @@ class Placer(Component[NoParameters]):
         super().__init__(launch, bus, clock)
         self._book = PlacementBook()
         self._to_do: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
-        self._news = asyncio.Event()
+        self._something_happened = asyncio.Event()
         self._meeting: dict[str, int] = {}
         self._newest: dict[str, int] = {}
         self._inspecting: set[str] = set()
@@ -125,6 +126,7 @@ class Placer(Component[NoParameters]):
 
     async def serve(self) -> None:
         """Begin what events led to."""
+        self.start_task(self._stop_ownerless(), "stop ownerless")
         while True:
             begin = await self._to_do.get()
             begin()
@@ -139,9 +141,13 @@ class Placer(Component[NoParameters]):
             case AskPlacement(name=name):
                 return self._book.record(name).placement()
             case ListPlacements():
-                return Placements([record.placement() for record in self._book.records()])
+                return Placements([record.placement() for record in self._book.records()], self._book.stopped())
             case other:
                 raise UnknownMessage(f"{type(other).__name__} is not answered here")
+
+    def absences(self) -> list[Absence]:
+        """Return the wishes that no host fulfills now."""
+        return self._book.absences()
 
     def statistics(self) -> dict[str, float]:
         """Return how many hosts and placements there are and what happened to them."""
@@ -170,9 +176,6 @@ class Placer(Component[NoParameters]):
             raise
 
     async def _start_as(self, name: str, order: Start, requester: str) -> Started:
-        old = self._book.find(name)
-        if old is not None and old.phase is Phase.GIVEN_UP:
-            await self._stop(name, "is started anew")
         async with AsyncExitStack() as alone:
             await alone.enter_async_context(self._type_locks.setdefault(order.type, asyncio.Lock()))
             component_type = await self._admit(order.type, name)
@@ -217,9 +220,7 @@ class Placer(Component[NoParameters]):
             self.story.note(name, f"goes to {record.host}: {'; '.join(record.reasons)}")
             spawn = record.spawn
             try:
-                spawned = await self.bus.ask(
-                    _creator(record.host), spawn, Spawned, within_s=spawn.ready_within_s + SPAWN_MARGIN_S
-                )
+                spawned = await self.bus.ask(_creator(record.host), spawn, Spawned, within_s=SPAWN_WITHIN_S)
                 pid = spawned.pid
             except LinkError as error:
                 self.story.note(name, f"was ordered on {record.host} without an answer: {error}")
@@ -265,12 +266,12 @@ class Placer(Component[NoParameters]):
 
         A component that still becomes ready is waited for: the answer was lost, not the order.
         """
-        until_s = self.clock.now_s() + record.spawn.ready_within_s * self.clock.rate
+        until_s = self.clock.now_s() + SPAWN_WITHIN_S * self.clock.rate
         while True:
             answered = await self._ask_processes(record.host)
             if answered is None:
                 return (Fate.UNKNOWN if self._book.is_alive(record.host) else Fate.HOST_LOST), 0
-            mine = [one for one in answered.processes if one.spawn.name == record.spawn.name and not one.given_up]
+            mine = [one for one in answered.processes if one.spawn.name == record.spawn.name]
             if not mine:
                 return Fate.NOT_DONE, 0
             if mine[0].pid and await self._is_ready(record.spawn.name):
@@ -315,15 +316,45 @@ class Placer(Component[NoParameters]):
             raise
         if record.phase is Phase.STARTING:
             await self._start_left_off(record)
-        elif self._book.find(name) is record:
-            self._book.forget(name)
+        found = self._book.find(name)
+        if found is None or found is record:
+            self._book.stop_ordered(name, reason)
         self._stops += 1
         self.story.note(name, f"is stopped, by {by}")
+        self._stop_owned(record.address, f"its owner {name} was stopped")
+        self.changed()
         return Ended(name, by)
+
+    def _stop_owned(self, owner: str, reason: str) -> None:
+        """Stop what this owner wanted: with the owner's end its wishes end."""
+        for name in self._book.owned_by(owner):
+            self.start_task(self._stop_quietly(name, reason), f"stop {name}")
+
+    async def _stop_quietly(self, name: str, reason: str) -> None:
+        try:
+            await self._stop(name, reason)
+        except Refusal as refusal:
+            self.story.note(name, f"could not be stopped: {refusal.detail}")
+
+    async def _stop_ownerless(self) -> None:
+        """Stop again and again what decision processes wanted that are wanted by nobody and do not live any more."""
+        suspects: set[str] = set()
+        while True:
+            await self.clock.sleep_s(COMPARE_EVERY_S * self.clock.rate)
+            owners = set(self._book.ownerless())
+            if owners & suspects:
+                try:
+                    there = await self.bus.ask(NAMESERVER, ListComponents(), Components, within_s=ANSWER_EACH_S)
+                except LinkError:
+                    continue
+                owners -= {component.address for component in there.components} if there.complete else owners
+                for owner in owners & suspects:
+                    self._stop_owned(owner, f"its owner {owner} is gone")
+            suspects = owners
 
     async def _start_left_off(self, record: Record) -> None:
         """Return when whoever was starting the component has seen that it is unwanted, and it is out of the book."""
-        until_s = self.clock.now_s() + (record.spawn.ready_within_s + SPAWN_MARGIN_S) * self.clock.rate
+        until_s = self.clock.now_s() + SPAWN_WITHIN_S * self.clock.rate
         while self._book.find(record.spawn.name) is record and self.clock.now_s() < until_s:
             await self._news_or(until_s)
 
@@ -361,7 +392,7 @@ class Placer(Component[NoParameters]):
                 self._tell_news()
             case Disappeared(address=gone) if gone.startswith(_creator("")):
                 host = gone.removeprefix(_creator(""))
-                self._do(lambda: self._carry_out(self._book.creator_down(host)))
+                self._do(lambda: self._carry_out(self._book.creator_down(host, self.clock.now_s())))
             case Disappeared(address=gone):
                 self._do(lambda: self._carry_out(self._book.component_disappeared(gone)))
 
@@ -405,12 +436,13 @@ class Placer(Component[NoParameters]):
                 case _:
                     assert_never(instruction)
         self._tell_news()
+        self.changed()
 
     def _creator_status_heard(self, heard: Envelope[ComponentState]) -> None:
         """Move a creator's components at its first word of leaving; its token still stands while it ends them."""
         creator = heard.body
         if creator.state in LEAVING and self._book.knows_creator(creator.host, creator.pid):
-            self._carry_out(self._book.creator_down(creator.host))
+            self._carry_out(self._book.creator_down(creator.host, self.clock.now_s()))
 
     # ------------------------------------------------------------------ creators
     async def _creators(self) -> Components:
@@ -444,7 +476,7 @@ class Placer(Component[NoParameters]):
         there = {creator.host for creator in found.components}
         for host in self._book.hosts():
             if host.name not in there:
-                self._carry_out(self._book.creator_down(host.name))
+                self._carry_out(self._book.creator_down(host.name, self.clock.now_s()))
 
     def _begin_meeting(self, creator: ComponentState) -> None:
         if self._newest.get(creator.host) != creator.pid or creator.host not in self._meeting:
@@ -503,33 +535,41 @@ class Placer(Component[NoParameters]):
 
     # ------------------------------------------------------------------ after a loss
     async def _place_again(self, name: str) -> None:
-        """Start a component that lost its host somewhere else; if nowhere, it waits for the next creator."""
+        """Start a missing component again until it runs or is unwanted; without a host it waits for a creator."""
         record = self._book.find(name)
         if record is None or record.phase is not Phase.WAITING or record.unwanted:
             return
         record.phase = Phase.STARTING
         await self._old_life_ended(record)
-        for pause_s in AGAIN_PAUSES_S:
-            await self.clock.sleep_s(pause_s * self.clock.rate)
+        for pause_s in chain(AGAIN_PAUSES_S, repeat(AGAIN_PAUSES_S[-1])):
+            await self._pause(record, pause_s)
+            record.doing = "is being placed again"
             try:
                 await self._bring_up(record)
             except NoHost as refusal:
                 self.story.note(name, f"waits for a host: {refusal.detail}")
-                self._book.waits(name)
-                return
+                self._book.waits(name, refusal.detail)
+                break
             except StoppedMeanwhile:
                 self._book.forget(name)
-                self._tell_news()
-                return
+                break
             except Refusal as refusal:
                 self.story.note(name, f"could not be started again: {refusal.detail}")
+                record.cause = f"could not be started again: {refusal.detail}"
                 if record.phase is not Phase.STARTING:  # its creator will tell whether it runs
-                    return
+                    break
+                self.changed()
             else:
                 self._again += 1
-                return
-        self._book.gave_up(name)
-        self.story.note(name, "is given up: it could not be started again")
+                break
+        self._tell_news()
+        self.changed()
+
+    async def _pause(self, record: Record, pause_s: float) -> None:
+        """Return after this many seconds of the machine, at once if the component is unwanted."""
+        until_s = self.clock.now_s() + pause_s * self.clock.rate
+        while self.clock.now_s() < until_s and not record.unwanted:
+            await self._news_or(until_s)
 
     async def _old_life_ended(self, record: Record) -> None:
         """Return when nobody has the name any more: its last holder dies a moment after its creator, or comes back."""
@@ -554,12 +594,12 @@ class Placer(Component[NoParameters]):
 
     # ------------------------------------------------------------------ waiting for what others tell
     def _tell_news(self) -> None:
-        self._news.set()
-        self._news = asyncio.Event()
+        self._something_happened.set()
+        self._something_happened = asyncio.Event()
 
     async def _news_or(self, at_s: float) -> None:
         """Return when something was heard, or at this mission time."""
-        news = asyncio.ensure_future(self._news.wait())
+        news = asyncio.ensure_future(self._something_happened.wait())
         time = asyncio.ensure_future(self.clock.sleep_until_s(at_s))
         try:
             await asyncio.wait({news, time}, return_when=asyncio.FIRST_COMPLETED)

@@ -3,8 +3,8 @@
 Rules of this file:
 
 * All or nothing: if one step of a connection fails, all of it is undone before anybody is told.
-* An RC that does not confirm its disconnection counts as held until its lease is over: a holder may
-  be late, there are never two.
+* An RC that does not confirm its disconnection is asked again and counts as held until it confirms or its lease is
+  over: a holder may be late, there are never two. After a death its successor confirms (decision 0006).
 * An ARC that does not answer delays nobody: its epoch ends with the disconnection of its RCs.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
@@ -37,7 +37,9 @@ from backbone.rc_manager.messages import (
 log = logging.getLogger(__name__)
 
 RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
-ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it answers
+ASK_AGAIN_S = 0.1  # chosen: a killed RC is back after two or three of these; a twentieth of a lease
+ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
+CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; one that hangs must not cost the next its turn
 
 Note = Callable[[str, str], Any]
 
@@ -96,11 +98,9 @@ class ContextSwitch:
             both.create_task(self.disconnect(holds, order.why))
 
     async def disconnect(self, holds: Sequence[tuple[str, str, int]], reason: str) -> None:
-        """Disconnect all at once, given as (RC, ARC, epoch); wait out the lease of those that do not confirm."""
-        asked_s = self._clock.now_s()
-        confirmed = await asyncio.gather(*(self._disconnect(rc, arc, epoch, reason) for rc, arc, epoch in holds))
-        if not all(confirmed):
-            await self._clock.sleep_until_s(asked_s + LEASE_S * self._clock.rate)
+        """Disconnect all at once, given as (RC, ARC, epoch); wait for each until it confirms or its lease is over."""
+        lease_until_s = self._clock.now_s() + LEASE_S * self._clock.rate
+        await asyncio.gather(*(self._disconnect(hold, reason, lease_until_s) for hold in holds))
 
     async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""
@@ -133,19 +133,31 @@ class ContextSwitch:
         return True
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
-        within_s = ARC_REPLY_S + question.deadline_s / self._clock.rate
+        within_s = CLOSE_S + question.deadline_s / self._clock.rate
         try:
             await self._bus.ask(_in_pool(arc), question, GateClosed, within_s=within_s)
         except (Refusal, LinkError) as error:
             self._note(arc, f"did not close its gate: {error}")
 
-    async def _disconnect(self, rc: str, arc: str, epoch: int, reason: str) -> bool:
-        try:
-            await self._bus.ask(_in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=RC_REPLY_S)
-        except (Refusal, LinkError) as error:
-            self._note(rc, f"did not confirm its disconnection from {arc}: {error}")
-            return False
-        return True
+    async def _disconnect(self, hold: tuple[str, str, int], reason: str, lease_until_s: float) -> None:
+        rc, arc, epoch = hold
+        complain = self._note
+        while (left_s := (lease_until_s - self._clock.now_s()) / self._clock.rate) > 0:
+            try:
+                within_s = min(RC_REPLY_S, left_s)
+                await self._bus.ask(_in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=within_s)
+                return
+            except (Refusal, LinkError) as error:
+                complain(rc, f"did not confirm its disconnection from {arc}: {error}")
+                complain = _keep_quiet
+                if isinstance(error, Refusal):  # its hardware does not obey, and comes to rest by itself if at all
+                    await self._clock.sleep_until_s(lease_until_s)
+                    return
+            await self._clock.sleep_s(min(ASK_AGAIN_S, left_s) * self._clock.rate)
+
+
+def _keep_quiet(_subject: str, _what: str) -> None:
+    """Note nothing: it was noted already."""
 
 
 def _holds(arc: str, epochs: Mapping[str, int]) -> list[tuple[str, str, int]]:

@@ -6,19 +6,40 @@ Source: RAM 2002, "Examples of ARCs and RCs".
 from __future__ import annotations
 
 import asyncio
+import types
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import AskRequest, CloseGate, OpenGate, TakePath
+from backbone.wire import Envelope, Message
 from resource_pool.arcs.video_drive import VideoDriveArc
-from resource_pool.messages import Tune
+from resource_pool.messages import Accepted, ArcQuestion, NotFromYou, NothingHeard, Tune
 
 
 class CaptureArc(VideoDriveArc):
     """A robot, its radio and video frequency, and a framegrabber tuned to it; frames go out under its address."""
 
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency", "framegrabber")
+    accepts: ClassVar[types.UnionType | type[Any] | None] = (
+        OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion | NothingHeard
+    )
 
     async def prepare(self, epochs: Mapping[str, int]) -> None:
         """Switch the transmitter on and tune, at the same time."""
         tune = Tune(self.name, epochs[self.rc("framegrabber")], self.rc("video_frequency"), self.rc("scout"))
         await asyncio.gather(super().prepare(epochs), self.tell_rc("framegrabber", tune))
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer also the framegrabber: a transmitter that it does not hear is switched on again."""
+        match asked.body:
+            case NothingHeard(rc=rc, epoch=epoch):
+                grabber = self.rc("framegrabber")
+                if asked.source != address(Subsystem.RESOURCE_POOL, grabber) or rc != grabber:
+                    raise NotFromYou(f"{self.name} hears from {grabber} what is on the air, not from {asked.source}")
+                if self.epochs.get(grabber) == epoch:
+                    self.story.note(self.name, f"{grabber} hears nothing: the transmitter is switched on again")
+                    await super().prepare(self.epochs)
+                return Accepted()
+            case _:
+                return await super().answer(asked)

@@ -29,6 +29,7 @@ from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import RadioDriver
 from resource_pool.holds import Hold
 from resource_pool.messages import (
+    COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
     HardwareFault,
     ImpossibleUse,
@@ -58,6 +59,7 @@ class CommandRadio(ResourceController[RcParameters]):
 
     commands = LoadPacket
     driver_kind = "radio"
+    outlasts_s = COMMAND_TIMEOUT_S  # robots stop and are silent by themselves when they hear nothing for so long
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)

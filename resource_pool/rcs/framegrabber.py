@@ -9,6 +9,8 @@ Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 from __future__ import annotations
 
 import itertools
+import logging
+import math
 from collections import Counter
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
@@ -17,14 +19,19 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.errors import Refusal
+from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import FramegrabberDriver, Picture
 from resource_pool.holds import Hold
-from resource_pool.messages import Applied, Frame, Tune
+from resource_pool.messages import Accepted, Applied, Frame, NothingHeard, Tune
 from resource_pool.resource_controller import RcParameters, ResourceController
+
+log = logging.getLogger(__name__)
+
+SILENT_S = 0.5  # chosen: a packet has its turn on the radio within 0.3 s, and its robot is seen two pictures later
+ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
 
 class FramegrabberParameters(RcParameters, frozen=True, kw_only=True):
@@ -59,6 +66,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._driver: FramegrabberDriver = self.make_driver()
         self._delivered = self._garbled = self._silent = self._foreign = 0
         self._kinds: Counter[str] = Counter()
+        self._silent_since_s = math.inf
 
     async def connect(self) -> None:
         """Open the device, so that the first grant is as quick as the others."""
@@ -86,6 +94,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         def deliver(picture: Picture) -> None:
             self._deliver(hold, order.robot, picture, numbers)
 
+        self._silent_since_s = math.inf
         self._driver.tune(order.frequency, deliver)
         return Applied(self.name, hold.epoch, self.clock.now_s(), "tune")
 
@@ -110,7 +119,9 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             self._kinds[picture.kind] += 1
         if picture.transmitters == 0:
             self._silent += 1
+            self._heard_nothing(hold)
             return
+        self._silent_since_s = math.inf
         if picture.transmitters > 1:
             self._garbled += 1
             return
@@ -130,3 +141,18 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
             pixels=picture.pixels,
         )
         self.bus.publish(address(Subsystem.RESOURCE_POOL, hold.arc), Conversation.FRAMES, frame)
+
+    def _heard_nothing(self, hold: Hold) -> None:
+        """Let the ARC know when its transmitter is silent for long: it was reset, or missed the packet."""
+        now_s = self.clock.now_s()
+        self._silent_since_s = min(self._silent_since_s, now_s)
+        if now_s - self._silent_since_s >= SILENT_S:
+            self._silent_since_s = now_s
+            self.start_task(self._complain(hold), "complain")
+
+    async def _complain(self, hold: Hold) -> None:
+        arc = address(Subsystem.RESOURCE_POOL, hold.arc)
+        try:
+            await self.bus.ask(arc, NothingHeard(self.name, hold.epoch), Accepted, within_s=ARC_REPLY_S)
+        except (Refusal, LinkError) as error:  # still silent after SILENT_S, it is said again
+            log.info("%s does not mend its silence: %s", hold.arc, error)

@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from backbone.bring_up import PortTaken, TraceUnwritable, UpOptions, run_mission
+from backbone.bring_up import run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import app
+from backbone.core_launches import UpOptions
 from backbone.door import SocketPathTooLong
 from backbone.errors import Refusal
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission.reader import read_mission
+from backbone.preconditions import PortTaken, TraceUnwritable
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 FAR = Host(name="far", address="192.0.2.7")

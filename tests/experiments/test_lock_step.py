@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from trace_judge import judge
+from trace_checker import check
 
 from mission_control.experiments.conditions import ALWAYS, EVERYTHING, PAPERS, PUBLISHED, QUARTER, Condition
 from mission_control.experiments.harness import run_all
@@ -59,11 +59,11 @@ def test_a_person_is_seen_on_the_way_there_or_back() -> None:
     ],
     ids=lambda condition: f"{condition.title()}, {condition.policy}",
 )
-def test_the_judge_finds_nothing_wrong_with_a_trial_s_decisions(condition: Condition, tmp_path: Path) -> None:
+def test_the_checker_finds_nothing_wrong_with_a_trial_s_decisions(condition: Condition, tmp_path: Path) -> None:
     file = tmp_path / "trace.jsonl"
     sound(run_trial(condition, 1, 0, to_the_end=True, trace=file))
     lines = [json.loads(line) for line in file.read_text().splitlines()]
-    assert judge().FullChecker().run(lines) == []
+    assert check(lines) == []
 
 
 def test_consoles_that_nobody_drives_leave_the_air_to_others(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from backbone.component.component import Component
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_order
-from backbone.placer.messages import NoHost
+from backbone.placer.messages import Ended, NoHost, StopComponent
 from mission_control.behavior import Behavior, NotAChild
 from mission_control.behavior_tree import Decision
 from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
@@ -340,13 +340,69 @@ def test_a_parent_starts_its_children_with_their_paths_and_ends_them_with_itself
     placer_world(scene)
 
 
-def test_children_end_when_their_parent_was_killed(placer_world: Run) -> None:
+def test_children_go_on_while_their_parent_is_away(placer_world: Run) -> None:
+    """A pause of the parent once ended all its children for good."""
+
     async def scene(placer: FakePlacer) -> None:
         top = node("middle", "parent", 5, children=[node("leaf")])
         await root(placer, node("top", "parent", 5, children=[top]))
         await placer.wait(lambda: "leaf" in placer.components)
+        before = {name: placer.components[name] for name in ("middle", "leaf")}
         await placer.kill("top")
-        await placer.wait(lambda: not placer.components, within_s=3.0)
+        await placer.clock.sleep_s(30.0)
+        assert {name: placer.components[name] for name in ("middle", "leaf")} == before
+        top = await placer.restart("top")
+        await placer.clock.sleep_s(5.0)
+        assert top.children == {"middle": BehaviorStatus.RUNNING}
+        assert placer.components["leaf"] is before["leaf"]
+
+    placer_world(scene)
+
+
+def test_a_child_that_is_missing_is_started_again_however_it_ended(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        await placer.clock.sleep_s(1.0)
+        first = placer.components["leaf"]
+        placer.lose("leaf")
+        first.end("in good order")
+        await placer.wait(lambda: placer.components.get("leaf") not in (None, first), within_s=3.0)
+        await placer.clock.sleep_s(1.0)
+        assert top.component_state().absent == []
+        assert top.children == {"leaf": BehaviorStatus.RUNNING}
+
+    placer_world(scene)
+
+
+def test_a_missing_child_waits_for_a_placer_that_is_away_and_is_started_then(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        await placer.clock.sleep_s(1.0)
+        placer.silence()
+        placer.lose("leaf")
+        await placer.kill("leaf")
+        await placer.clock.sleep_s(20.0)
+        assert "leaf" not in placer.components
+        placer.speak()
+        await placer.wait(lambda: "leaf" in placer.components, within_s=5.0)
+        assert top.children == {"leaf": BehaviorStatus.RUNNING}
+
+    placer_world(scene)
+
+
+def test_a_parents_new_life_ends_the_children_that_it_does_not_start_now(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.NEXT, Decision.NEXT]
+        await root(placer, node("top", "sequence", 5, children=[node("first"), node("second")]))
+        await placer.wait(lambda: "first" in placer.components)
+        placer.components["first"].finish(BehaviorStatus.SUCCESS)
+        await placer.wait(lambda: "second" in placer.components)
+        await placer.kill("top")
+        await placer.restart("top")
+        await placer.wait(lambda: "second" not in placer.components)
+        await placer.wait(lambda: "first" in placer.components)
 
     placer_world(scene)
 
@@ -450,14 +506,14 @@ def test_a_child_that_cannot_be_started_counts_as_failed(placer_world: Run) -> N
     placer_world(scene)
 
 
-def test_a_child_its_creator_gave_up_counts_as_failed(placer_world: Run) -> None:
+def test_a_child_that_falls_too_often_counts_as_failed(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         Parent.decisions = [Decision.ABORT]
         top = await root(placer, node("top", "parent", 5, children=[node("leaf")]))
         await placer.wait(lambda: "leaf" in placer.components)
         await placer.clock.sleep_s(0.1)
         await placer.kill("leaf")
-        placer.give_up("leaf")
+        placer.fall_often("leaf")
         await placer.wait(lambda: top.status is BehaviorStatus.FAILURE)
         assert top.payload["code"] == "child.given_up"
 
@@ -469,11 +525,25 @@ def test_a_child_stopped_by_the_operator_is_left_alone(placer_world: Run) -> Non
         Parent.decisions = [Decision.RETRY]
         top = await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
         await placer.wait(lambda: {"a", "b"} <= set(placer.components))
-        del placer.placed["a"]
-        placer.components["a"].end("the operator wants it so")
+        operator = placer.network.join("ui_console/cli", placer.clock)
+        await operator.ask("backbone/placer", StopComponent("a", "by command"), Ended, within_s=5.0)
+        await operator.close()
         await placer.wait(lambda: "a" not in top.children)
         assert set(placer.components) == {"top", "b"}
         assert top.status is BehaviorStatus.RUNNING
+
+    placer_world(scene)
+
+
+def test_a_child_that_a_parent_goes_on_without_is_reported_with_its_cause(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.NEXT]
+        placer.refusals["capture"] = NoHost("no host has tag gl")
+        top = await root(placer, node("top", "parent", 5, children=[node("leaf", arc=ARC), node("other")]))
+        await placer.wait(lambda: top.component_state().absent)
+        [absence] = top.component_state().absent
+        assert (absence.name, absence.cause, absence.doing) == ("leaf", "no host has tag gl", "")
+        assert "scout-backbone story leaf" in absence.remedy
 
     placer_world(scene)
 

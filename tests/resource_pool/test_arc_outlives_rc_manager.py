@@ -12,6 +12,7 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
+    LEASE_S,
     AskRequest,
     CurrentRequest,
     GateOpens,
@@ -21,7 +22,7 @@ from backbone.rc_manager.messages import (
     OpenGate,
 )
 from resource_pool.arc_client import ArcClient
-from resource_pool.messages import Suspended, SwappedOut
+from resource_pool.messages import COMMAND_TIMEOUT_S, Resumed, Suspended, SwappedOut
 
 ROBOTS = ["scout1", "scout2", "radio"]
 
@@ -168,5 +169,38 @@ def test_a_wish_nobody_answers_is_told_as_unknown_and_kept_for_the_next_rc_manag
             with pytest.raises(Refusal, match="no answer"):
                 await arc.idle()
             assert (await asked_for(pool, arc)).request.idle
+
+    run_virtual(main())
+
+
+def test_a_killed_radio_is_free_when_its_robots_have_fallen_silent_and_no_later(local_mission: Any) -> None:
+    """Its successor cannot stop what its predecessor set in motion, but knows when that stops by itself."""
+
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOTS) as pool:
+            owner, arc = await granted(pool)
+            await pool.kill("radio")
+            killed_s = pool.clock.now_s()
+            await pool.clock.sleep_s(0.1)
+            await pool.rc("radio")
+            while not (isinstance(owner.notices[-1], Resumed) and len(owner.notices) > 1):
+                await pool.clock.sleep_s(0.01)
+            assert 0.1 + COMMAND_TIMEOUT_S <= pool.clock.now_s() - killed_s < LEASE_S / 2
+            assert (await arc.state()).granted
+
+    run_virtual(main())
+
+
+def test_a_killed_robot_rc_is_free_as_soon_as_it_is_back(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ROBOTS) as pool:
+            owner, _ = await granted(pool)
+            await pool.kill("scout1")
+            killed_s = pool.clock.now_s()
+            await pool.clock.sleep_s(0.1)
+            await pool.rc("scout1")
+            while not (isinstance(owner.notices[-1], Resumed) and len(owner.notices) > 1):
+                await pool.clock.sleep_s(0.01)
+            assert pool.clock.now_s() - killed_s < 0.1 + COMMAND_TIMEOUT_S
 
     run_virtual(main())

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from trace_judge import judge
+from trace_checker import check
 
 from backbone.bus.clock import run_virtual
 from backbone.component_database.messages import UnknownType
@@ -46,9 +46,9 @@ def test_the_same_mission_gives_the_same_run_to_the_byte(shipped: MissionDescrip
     assert json.dumps(run_for(shipped, 7.0)) == json.dumps(run_for(shipped, 7.0))
 
 
-def test_its_decisions_stand_before_the_judge(shipped: MissionDescription) -> None:
+def test_the_checker_finds_nothing_wrong_with_its_decisions(shipped: MissionDescription) -> None:
     trace, _ = run_for(shipped, 12.0)
-    assert judge().FullChecker().run(json.loads(json.dumps(trace))) == []
+    assert check(json.loads(json.dumps(trace))) == []
 
 
 def in_running(mission: MissionDescription, work: Callable[[RunningMission], Any]) -> Any:

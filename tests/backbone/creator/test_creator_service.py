@@ -187,9 +187,9 @@ def test_a_fall_is_published_with_what_follows(on_host: Callable) -> None:
             await VirtualClock().sleep_s(0.5)
         assert [(fell.name, fell.how, fell.restart_in_s) for fell in host.fell] == [
             ("scout1", "killed by SIGKILL", 0.1),
-            ("scout1", "killed by SIGKILL", -1.0),
+            ("scout1", "killed by SIGKILL", RestartPolicy().failing_pause_s),
         ]
-        assert (await host.processes()).processes[0].given_up
+        assert host.fell[1].failing
 
     on_host(body)
 

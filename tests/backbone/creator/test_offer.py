@@ -14,7 +14,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock, LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.launch import Launch
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import Absence, AskState, ComponentState, Stop, Stopping
 from backbone.creator import offer as offers
 from backbone.creator.messages import (
     ListProcesses,
@@ -54,6 +54,8 @@ class FakeCreator:
     runs: bool = False
     never_ready: bool = False
     log: list[str] = field(default_factory=list)
+    missing: list[Absence] = field(default_factory=list)
+    on_changed: Callable[[], None] = lambda: None
     began: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def start(self, bus: Bus, clock: Clock) -> None:
@@ -65,7 +67,10 @@ class FakeCreator:
 
     def processes(self) -> list[ProcessState]:
         order = Spawn(Subsystem.BACKBONE, creator_name("far"), "creator", "x:Y", policy=RestartPolicy())
-        return [ProcessState(order, 1, 0, False, "")]
+        return [ProcessState(order, 1, 0)]
+
+    def absences(self) -> list[Absence]:
+        return self.missing
 
     async def close(self) -> None:
         self.runs = False
@@ -171,12 +176,10 @@ async def test_the_launcher_ends_it_and_its_token_falls_when_nothing_runs_here(o
         assert ran_at_the_fall == [False]
 
 
-async def test_a_creator_that_is_given_up_ends_it_and_a_fall_before_does_not(on_a_cable: Callable[..., Any]) -> None:
+async def test_a_creator_that_falls_is_absent_until_it_is_back_and_ends_nothing(on_a_cable: Callable[..., Any]) -> None:
     async with on_a_cable() as scene:
+        scene.creator.missing = [Absence("creator-far", 1.0, "killed by SIGKILL", "restarts in 0.1 s")]
         scene.creator.on_fell(ProcessFell("creator-far", "killed by SIGKILL", 0.1, []))
-        await asyncio.sleep(0)
+        state = await scene.tester.ask("backbone/offer-far", AskState(), ComponentState, within_s=WITHIN_S)
+        assert [absence.name for absence in state.absent] == ["creator-far"]
         assert not scene.life.done()
-        scene.creator.on_fell(ProcessFell("creator-far", "exit code 1", -1.0, []))
-        assert await scene.ends() is Ending.GIVEN_UP
-        assert scene.offer.fell is not None
-        assert scene.offer.fell.how == "exit code 1"

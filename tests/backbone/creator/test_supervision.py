@@ -8,24 +8,21 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, RestartPolicy
-from backbone.creator.supervision import (
-    LEAVE_S,
-    TERM_S,
+from backbone.creator.decisions import (
     AskToStop,
     Fork,
     Instruction,
-    Phase,
     ReportEnded,
     ReportFell,
     ReportLeft,
     ReportReady,
+    ReportSilent,
     ReportStartFailed,
     Signal,
-    Supervision,
     WakeAt,
-    describe,
 )
+from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHere, RestartPolicy
+from backbone.creator.supervision import LEAVE_S, TERM_S, Phase, Supervision, describe
 
 NAMES = ("scout1", "scout2", "radio")
 POLICIES = st.builds(
@@ -35,7 +32,8 @@ POLICIES = st.builds(
     back_off_most_s=st.floats(0.5, 2.0),
     limit=st.integers(0, 3),
     window_s=st.floats(1.0, 20.0),
-    after_good_end=st.booleans(),
+    failing_pause_s=st.floats(2.0, 10.0),
+    hung_after_s=st.floats(0.5, 3.0),
 )
 
 
@@ -49,10 +47,10 @@ class RandomHistories(RuleBasedStateMachine):
         self.live: dict[str, int] = {}
         self.killed: set[int] = set()
         self.policies: dict[str, RestartPolicy] = {}
+        self.failing: dict[str, bool] = {}
         self.restarts: dict[str, list[float]] = {}
         self.starts_open: set[str] = set()
         self.ends_open: set[str] = set()
-        self.given_up: set[str] = set()
 
     def do(self, instructions: list[Instruction], ordered: str = "") -> None:
         for instruction in instructions:
@@ -81,13 +79,15 @@ class RandomHistories(RuleBasedStateMachine):
                     self.ends_open.remove(name)
                 case ReportLeft(name=name):
                     assert name not in self.live
-                    assert not self.policies[name].after_good_end
-                case ReportFell(name=name, restart_in_s=restart_in_s):
+                    assert not self.policies[name].restart, "what is wanted is restarted however it ended"
+                case ReportFell(name=name, restart_in_s=restart_in_s, failing=failing):
+                    policy = self.policies[name]
                     assert name not in self.live
-                    if restart_in_s < 0:
-                        self.given_up.add(name)
-                    else:
-                        assert restart_in_s <= self.policies[name].back_off_most_s
+                    assert (restart_in_s >= 0) == policy.restart, "what is wanted is restarted however it ended"
+                    assert restart_in_s <= (policy.failing_pause_s if failing else policy.back_off_most_s)
+                    self.failing[name] = failing
+                case ReportSilent(name=name):
+                    assert name in self.live
                 case WakeAt(at_s=at_s):
                     self.wake_s = at_s
 
@@ -97,7 +97,8 @@ class RandomHistories(RuleBasedStateMachine):
         times = self.restarts.setdefault(name, [])
         times.append(self.now_s)
         within = [at_s for at_s in times if at_s > self.now_s - policy.window_s]
-        assert len(within) <= policy.limit, f"{len(within)} restarts in {policy.window_s} s"
+        if not self.failing.get(name):
+            assert len(within) <= policy.limit, f"{len(within)} quick restarts in {policy.window_s} s"
 
     @rule(name=st.sampled_from(NAMES), policy=POLICIES, ready_within_s=st.floats(0.1, 5.0))
     def order_start(self, name: str, policy: RestartPolicy, ready_within_s: float) -> None:
@@ -106,10 +107,9 @@ class RandomHistories(RuleBasedStateMachine):
             instructions = self.supervision.start_ordered(name, policy, ready_within_s, self.now_s)
         except AlreadyHere:
             assert known is not None
-            assert known.phase is not Phase.GIVEN_UP
             return
         self.policies[name], self.restarts[name] = policy, []
-        self.given_up.discard(name)
+        self.failing.pop(name, None)
         self.starts_open.add(name)
         self.do(instructions, ordered=name)
 
@@ -150,6 +150,10 @@ class RandomHistories(RuleBasedStateMachine):
         self.do(self.supervision.exited(pid, returncode, self.now_s))
         self.do(self.supervision.exited(pid, returncode, self.now_s))  # told twice: of no effect
 
+    @rule(name=st.sampled_from(NAMES), silent_s=st.sampled_from([0.0, 0.3, 0.8, 2.0, 4.0]))
+    def look(self, name: str, silent_s: float) -> None:
+        self.do(self.supervision.observed(name, silent_s, self.now_s))
+
     @rule(name=st.sampled_from(NAMES))
     def fail_to_ask(self, name: str) -> None:
         self.do(self.supervision.ask_failed(name, self.now_s))
@@ -165,12 +169,12 @@ class RandomHistories(RuleBasedStateMachine):
     @invariant()
     def the_picture_is_true(self) -> None:
         assert {one.name: one.pid for one in self.supervision if one.pid} == self.live
-        for name in self.given_up:
-            one = self.supervision.find(name)
-            assert one is None or one.phase is Phase.GIVEN_UP
+        absent = {each.name for each in self.supervision.absences(self.now_s)}
         for one in self.supervision:
             waits_for_time = one.phase in (Phase.STARTING, Phase.WAITING, Phase.ENDING) and one.pid not in self.killed
             assert one.deadline_s < float("inf") or not waits_for_time, f"{one.name} would be {one.phase} for ever"
+            was_ready_and_is_not = one.start_answered and one.phase is not Phase.READY
+            assert one.name in absent or not was_ready_and_is_not or one.end is not None, "an absence is reported"
         assert self.wake_s <= min((one.deadline_s for one in self.supervision), default=float("inf"))
 
     def teardown(self) -> None:
@@ -252,19 +256,20 @@ def test_what_is_not_ready_is_ended_without_asking() -> None:
     ]
 
 
-def test_back_off_doubles_up_to_its_most_and_the_limit_gives_up() -> None:
+def test_back_off_doubles_up_to_its_most_and_from_the_limit_on_pauses_are_long() -> None:
     policy = RestartPolicy(back_off_s=0.1, back_off_most_s=0.3, limit=3, window_s=60.0)
     supervision, now_s, pauses = running(policy), 1.0, []
     for pid in range(7, 11):
         told = supervision.exited(pid, 1, now_s)
         fell = next(each for each in told if isinstance(each, ReportFell))
         pauses.append(fell.restart_in_s)
-        if fell.restart_in_s >= 0:
+        assert fell.failing == (len(pauses) > policy.limit)
+        if not fell.failing:
             now_s += fell.restart_in_s
             assert supervision.woken(now_s)[0] == Fork("scout1")
             supervision.forked("scout1", pid + 1, now_s)
             supervision.ready("scout1")
-    assert pauses == [0.1, 0.2, 0.3, -1.0]
+    assert pauses == [0.1, 0.2, 0.3, policy.failing_pause_s]
     assert supervision.end_ordered("scout1", 1.0, 1.0, now_s) == [ReportEnded("scout1", EndedBy.ITSELF, 1)]
 
 
@@ -277,14 +282,63 @@ def test_restarts_before_the_window_count_no_longer() -> None:
     assert ReportFell("scout1", "exit code 1", 0.1) in supervision.exited(8, 1, 11.2)
 
 
-def test_who_ends_in_good_order_by_itself_is_let_go() -> None:
-    supervision = running()
+def test_a_component_without_restart_that_ends_in_good_order_is_left_to_its_owner() -> None:
+    supervision = running(RestartPolicy(restart=False))
     assert supervision.exited(7, 0, 1.0) == [ReportLeft("scout1")]
     assert supervision.find("scout1") is None
 
 
-def test_a_service_that_must_always_be_there_is_restarted_after_a_good_end_too() -> None:
-    supervision = running(RestartPolicy(after_good_end=True, back_off_s=0.1))
+@pytest.mark.parametrize("returncode", [0, 1, -9, -15])
+def test_what_is_wanted_is_restarted_however_it_ended(returncode: int) -> None:
+    supervision = running(RestartPolicy(back_off_s=0.1))
+    told = supervision.exited(7, returncode, 1.0)
+    assert told == [ReportFell("scout1", describe(returncode), 0.1), WakeAt(1.1)]
+    assert [(each.name, each.since_s) for each in supervision.absences(1.0)] == [("scout1", 1.0)]
+    supervision.woken(1.1)
+    supervision.forked("scout1", 8, 1.1)
+    assert supervision.absences(1.2)
+    supervision.ready("scout1")
+    assert supervision.absences(1.3) == []
+
+
+def test_a_first_start_that_a_signal_ended_is_begun_again() -> None:
+    supervision = Supervision()
+    supervision.start_ordered("scout1", RestartPolicy(back_off_s=0.1), 5.0, 0.0)
+    supervision.forked("scout1", 7, 0.0)
+    assert supervision.exited(7, -15, 1.0) == [ReportFell("scout1", "killed by SIGTERM", 0.1), WakeAt(1.1)]
+    assert supervision.woken(1.1)[0] == Fork("scout1")
+    supervision.forked("scout1", 8, 1.1)
+    assert supervision.ready("scout1") == [ReportReady("scout1", 8)]
+
+
+def test_a_silent_process_is_shown_then_killed_then_restarted() -> None:
+    supervision = running(RestartPolicy(back_off_s=0.1, hung_after_s=3.0))
+    assert supervision.observed("scout1", 0.5, 9.5) == []
+    assert supervision.observed("scout1", 0.8, 9.8) == [ReportSilent("scout1", 0.8)]
+    assert supervision.absences(10.0)[0].since_s == pytest.approx(9.0)
+    assert supervision.observed("scout1", 2.9, 11.9) == []
+    assert supervision.observed("scout1", 3.0, 12.0) == [Signal("scout1", 7, signal.SIGKILL)]
+    assert supervision.exited(7, -9, 12.1)[0] == ReportFell("scout1", "hung: no sign of life for 3.0 s", 0.1)
+
+
+def test_a_process_that_was_only_paused_for_a_moment_stays() -> None:
+    supervision = running()
+    supervision.observed("scout1", 2.5, 9.5)
+    assert supervision.observed("scout1", 0.0, 9.8) == [ReportSilent("scout1", 0.0)]
+    assert supervision.absences(9.8) == []
+
+
+def test_a_start_that_shows_signs_of_life_is_not_late() -> None:
+    supervision = Supervision()
+    supervision.start_ordered("scout1", RestartPolicy(), 5.0, 0.0)
+    supervision.forked("scout1", 7, 0.0)
+    assert supervision.observed("scout1", 0.0, 4.9) == [WakeAt(9.9)]
+    assert supervision.observed("scout1", 0.0, 60.0) == [WakeAt(65.0)]
+    assert supervision.observed("scout1", 1.0, START_MOST_S) == [WakeAt(START_MOST_S)]
+
+
+def test_the_restart_of_a_service_reports_its_pause() -> None:
+    supervision = running(RestartPolicy(back_off_s=0.1))
     assert supervision.exited(7, 0, 1.0) == [ReportFell("scout1", "exit code 0", 0.1), WakeAt(1.1)]
 
 
@@ -302,15 +356,19 @@ def test_who_is_not_ready_in_time_is_ended_before_the_start_is_answered() -> Non
     supervision.forked("scout1", 7, 0.0)
     assert supervision.woken(5.0) == [Signal("scout1", 7, signal.SIGTERM), WakeAt(5.0 + TERM_S)]
     assert supervision.ready("scout1") == []
-    assert supervision.exited(7, 0, 5.1) == [ReportStartFailed("scout1", "was not ready within 5 s")]
+    assert supervision.exited(7, 0, 5.1) == [
+        ReportStartFailed("scout1", "was not ready and showed no sign of life for 5 s")
+    ]
 
 
 def test_a_zygote_that_hangs_holds_no_order_up() -> None:
     supervision = Supervision()
     supervision.start_ordered("scout1", RestartPolicy(), 5.0, 0.0)
-    assert supervision.woken(5.0) == [ReportStartFailed("scout1", "was not ready within 5 s")]
-    assert supervision.forked("scout1", 7, 6.0)[0] == Signal("scout1", 7, signal.SIGTERM)
-    assert supervision.exited(7, 0, 6.1) == []
+    late_s = START_MOST_S
+    failed = ReportStartFailed("scout1", "was not ready and showed no sign of life for 5 s")
+    assert supervision.woken(late_s) == [failed]
+    assert supervision.forked("scout1", 7, late_s + 1.0)[0] == Signal("scout1", 7, signal.SIGTERM)
+    assert supervision.exited(7, 0, late_s + 1.1) == []
     assert supervision.find("scout1") is None
 
 
@@ -325,10 +383,10 @@ def test_tokens_say_nothing_about_those_that_are_ready() -> None:
     assert running().ready("scout1") == []
 
 
-def test_a_name_given_up_may_be_ordered_anew() -> None:
+def test_a_name_that_is_left_to_its_owner_may_be_ordered_anew() -> None:
     supervision = running(RestartPolicy(restart=False))
     supervision.exited(7, 1, 1.0)
-    assert supervision.start_ordered("scout1", RestartPolicy(), 5.0, 2.0) == [Fork("scout1"), WakeAt(7.0)]
+    assert supervision.start_ordered("scout1", RestartPolicy(), 5.0, 2.0)[0] == Fork("scout1")
 
 
 def test_a_name_in_use_is_refused_with_its_pid() -> None:

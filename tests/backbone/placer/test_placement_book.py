@@ -13,7 +13,16 @@ from backbone.creator.messages import HostLoad, ProcessState, RestartPolicy, Spa
 from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost, NotPlaced
-from backbone.placer.placement_book import EndStray, Inspect, Instruction, Note, Phase, PlaceAgain, PlacementBook
+from backbone.placer.placement_book import (
+    STOPPED_KEPT,
+    EndStray,
+    Inspect,
+    Instruction,
+    Note,
+    Phase,
+    PlaceAgain,
+    PlacementBook,
+)
 
 
 def spawn(name: str, *, restart: bool = True, pinned: bool = False, kind: str = "watcher", shares: str = "") -> Spawn:
@@ -21,8 +30,8 @@ def spawn(name: str, *, restart: bool = True, pinned: bool = False, kind: str = 
     return Spawn(Subsystem.MISSION_CONTROL, name, kind, "x:Y", {"n": 1}, "boss", policy, pinned=pinned, process=shares)
 
 
-def process(order: Spawn, pid: int = 7, *, given_up: bool = False) -> ProcessState:
-    return ProcessState(order, 0 if given_up else pid, 0, given_up, "exit 1" if given_up else "")
+def process(order: Spawn, pid: int = 7) -> ProcessState:
+    return ProcessState(order, pid, 0, "")
 
 
 def book_with(*hosts: str) -> PlacementBook:
@@ -89,7 +98,7 @@ class World:
     def cut(self, host: str) -> None:
         if host in self.connected:
             self.connected.discard(host)
-            self.obey(self.book.creator_down(host))
+            self.obey(self.book.creator_down(host, self.now_s))
 
     def kill(self, host: str) -> None:
         self.running[host] = {}
@@ -189,15 +198,15 @@ def test_a_lost_hosts_components_are_placed_again_and_its_arcs_forgotten() -> No
     book = book_with("a")
     run(book, spawn("w1"))
     run(book, spawn("arc", restart=False))
-    assert without_notes(book.creator_down("a")) == [PlaceAgain("w1")]
+    assert without_notes(book.creator_down("a", 2.0)) == [PlaceAgain("w1")]
     assert book.find("arc") is None
-    assert book.creator_down("a") == []
+    assert book.creator_down("a", 2.0) == []
 
 
 def test_a_pinned_component_waits_for_its_host() -> None:
     book = book_with("a", "b")
     run(book, spawn("rc", pinned=True), pin="a")
-    book.creator_down("a")
+    book.creator_down("a", 2.0)
     with pytest.raises(NoHost):
         book.choose("rc", 2.0)
     assert book.may_find_host("rc")
@@ -220,7 +229,7 @@ def test_the_same_creator_met_again_keeps_what_it_runs() -> None:
 def test_a_component_that_was_stopped_while_its_host_was_cut_off_is_ended_when_it_is_back() -> None:
     book = book_with("a")
     run(book, spawn("w1"))
-    book.creator_down("a")
+    book.creator_down("a", 2.0)
     book.forget("w1")
     assert EndStray("a", "w1") in book.creator_up("a", [], 1, [process(spawn("w1"))], 3.0)
     assert book.find("w1") is None
@@ -244,12 +253,22 @@ def test_an_old_listing_does_not_end_what_started_after_it_was_asked_for() -> No
     assert book.record("w1").phase is Phase.RUNNING
 
 
-def test_a_component_that_was_given_up_counts_no_more_but_is_remembered() -> None:
+def test_a_wanted_component_that_is_missing_is_placed_again_and_reported() -> None:
     book = book_with("a")
     run(book, spawn("w1"))
-    book.inspected("a", [process(spawn("w1"), given_up=True)], 2.0)
-    assert book.record("w1").phase is Phase.GIVEN_UP
-    assert book.hosts()[0].components == 0
+    assert without_notes(book.inspected("a", [], 2.0)) == [PlaceAgain("w1")]
+    assert [(each.name, each.since_s) for each in book.absences()] == [("w1", 2.0)]
+    book.choose("w1", 3.0)
+    book.started("w1", 8, 3.0)
+    assert book.absences() == []
+
+
+def test_only_so_many_orders_to_stop_are_remembered() -> None:
+    book = book_with("a")
+    for number in range(STOPPED_KEPT + 10):
+        book.stop_ordered(f"w{number}", "over")
+    assert len(book.stopped()) == STOPPED_KEPT
+    assert f"w{STOPPED_KEPT + 9}" in book.stopped()
 
 
 def test_a_difference_in_numbers_is_asked_about_once() -> None:
@@ -299,6 +318,6 @@ def test_who_shared_a_process_on_a_lost_host_is_together_again_elsewhere() -> No
     names = ("w1", "w2", "w3")
     for name in names:
         assert run(book, spawn(name, shares="pool")) == "a"
-    again = without_notes(book.creator_down("a"))
+    again = without_notes(book.creator_down("a", 2.0))
     assert again == [PlaceAgain(name) for name in names]
     assert {book.choose(name, 2.0).host for name in names} == {"b"}

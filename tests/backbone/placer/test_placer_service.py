@@ -15,7 +15,7 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import AskStatistics, AskStory, Statistics, Story
+from backbone.component.messages import Absence, AskState, AskStatistics, AskStory, ComponentState, Statistics, Story
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded, UnknownType
 from backbone.component_database.service import ComponentDatabase
 from backbone.creator.messages import (
@@ -27,7 +27,6 @@ from backbone.creator.messages import (
     NotHere,
     ProcessEnded,
     Processes,
-    ProcessFell,
     ProcessState,
     Spawn,
     Spawned,
@@ -53,7 +52,7 @@ from backbone.placer.messages import (
     StopComponent,
     StoppedMeanwhile,
 )
-from backbone.placer.service import Placer
+from backbone.placer.service import COMPARE_EVERY_S, Placer
 from backbone.wire import Envelope, Message
 
 TYPES = [
@@ -81,22 +80,18 @@ class FakeCreator(Component[NoParameters]):
         self.fails: list[str] = []
         self.spawns: list[str] = []
         self.lives: dict[str, tuple[Spawn, Child, asyncio.Task[None]]] = {}
-        self.given_up: dict[str, Spawn] = {}
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         match asked.body:
             case Spawn() as order:
                 return await self.spawn(order)
             case EndProcess(name=name):
-                if self.given_up.pop(name, None) is not None:
-                    return ProcessEnded(name, EndedBy.ITSELF, 1)
                 if name not in self.lives:
                     raise NotHere(f"no {name} here")
                 await self.kill_child(name)
                 return ProcessEnded(name, EndedBy.ASKING, 0)
             case ListProcesses() if self.answers_list:
-                listed = [ProcessState(order, 7, 0, False, "") for order, _, _ in self.lives.values()]
-                listed += [ProcessState(order, 0, 5, True, "exit 1") for order in self.given_up.values()]
+                listed = [ProcessState(order, 7, 0, "") for order, _, _ in self.lives.values()]
                 return Processes(self.launch.host, self.tags, listed)
             case _:
                 await asyncio.Event().wait()
@@ -123,11 +118,6 @@ class FakeCreator(Component[NoParameters]):
         child.end("killed")
         await life
 
-    async def give_child_up(self, name: str) -> None:
-        self.given_up[name] = self.lives[name][0]
-        await self.kill_child(name)
-        self.bus.publish(self.address, Conversation.EVENTS, ProcessFell(name, "exit 1", -1.0, []))
-
     def tell_load(self, cpu: float = 0.0, cores: int = 2) -> None:
         load = HostLoad(self.launch.host, self.tags, cpu, 0.1, cores, len(self.lives))
         self.bus.publish(self.address, Conversation.TELEMETRY, load)
@@ -143,7 +133,7 @@ class Mission:
     def __init__(self) -> None:
         self.network = LocalNetwork()
         self.clock = VirtualClock()
-        self.bus = self.network.join("mission_control/boss", self.clock)
+        self.bus = self.network.join("backbone/boss", self.clock)
         self.creators: dict[str, FakeCreator] = {}
         self._lives: dict[str, tuple[Component[Any], asyncio.Task[None]]] = {}
 
@@ -188,7 +178,7 @@ class Mission:
                 await self.kill(name)
         await self.bus.close()
 
-    async def start(self, kind: str, name: str = "", host: str = "", within_s: float = 60.0, **more: Any) -> Started:
+    async def start(self, kind: str, name: str = "", host: str = "", within_s: float = 600.0, **more: Any) -> Started:
         return await self.bus.ask(ADDRESS, Start(kind, name, host=host, **more), Started, within_s=within_s)
 
     async def stop(self, name: str) -> Ended:
@@ -197,6 +187,9 @@ class Mission:
     async def placements(self) -> dict[str, str]:
         listed = await self.bus.ask(ADDRESS, ListPlacements(), Placements, within_s=1.0)
         return {placement.name: placement.host for placement in listed.placements}
+
+    async def absent(self) -> list[Absence]:
+        return (await self.bus.ask(ADDRESS, AskState(), ComponentState, within_s=1.0)).absent
 
     async def told(self, name: str) -> list[str]:
         return [event.what for event in (await self.bus.ask(ADDRESS, AskStory(name), Story, within_s=1.0)).events]
@@ -254,7 +247,7 @@ async def test_a_loaded_host_gets_fewer(one: Mission) -> None:
 async def test_a_placement_tells_who_wanted_it_and_why_it_is_there(one: Mission) -> None:
     await one.start("scout", "scout1", host="b")
     placed = await one.bus.ask(ADDRESS, AskPlacement("scout1"), Placement, within_s=1.0)
-    assert (placed.host, placed.type, placed.requester) == ("b", "scout", "mission_control/boss")
+    assert (placed.host, placed.type, placed.requester) == ("b", "scout", "backbone/boss")
     assert placed.reasons[0] == "a: not b, which was asked for"
     assert placed.reasons[1].startswith("b: chosen, asked for")
     assert (await one.told("scout1"))[-1] == "is ready on b, pid 7"
@@ -335,22 +328,18 @@ async def test_a_host_that_was_only_cut_off_keeps_what_waited_for_it_and_loses_w
     await one.start("scout", "scout1", host="a")
     await one.start("watcher", "w", host="")
     assert await one.placements() == {"scout1": "a", "w": "b"}
-    await one.start("watcher", "w2", host="")
-    creator, order = one.creators["a"], one.creators["a"].lives["w2"][0]
+    creator = one.creators["a"]
     one.cut_off("a")
-    await creator.kill_child("w2")
     await one.clock.sleep_s(10.0)
-    assert await one.placements() == {"scout1": "", "w": "b", "w2": "b"}
-    creator.given_up["w2"] = order
+    assert await one.placements() == {"scout1": "", "w": "b"}
     one.reconnect("a")
     await one.clock.sleep_s(2.0)
-    assert await one.placements() == {"scout1": "a", "w": "b", "w2": "b"}
-    assert creator.given_up == {}
-    assert creator.spawns == ["scout1", "w2"]
+    assert await one.placements() == {"scout1": "a", "w": "b"}
+    assert creator.spawns == ["scout1"]
 
 
 @on("a")
-async def test_a_component_that_ends_by_itself_is_forgotten(one: Mission) -> None:
+async def test_an_arc_that_ends_by_itself_is_forgotten(one: Mission) -> None:
     await one.start("arc", "arc1")
     await one.creators["a"].kill_child("arc1")
     await one.clock.sleep_s(0.5)
@@ -358,12 +347,62 @@ async def test_a_component_that_ends_by_itself_is_forgotten(one: Mission) -> Non
 
 
 @on("a")
-async def test_a_component_that_was_given_up_may_be_started_anew(one: Mission) -> None:
+async def test_a_wanted_component_that_its_creator_does_not_have_is_placed_again(one: Mission) -> None:
+    """How it ended makes no difference: only an order to stop ends a wish."""
     await one.start("watcher", "w")
-    await one.creators["a"].give_child_up("w")
-    await one.clock.sleep_s(0.5)
-    assert (await one.start("watcher", "w")).host == "a"
-    assert one.creators["a"].given_up == {}
+    await one.creators["a"].kill_child("w")
+    await one.clock.sleep_s(3.0)
+    assert await one.placements() == {"w": "a"}
+    assert one.creators["a"].spawns == ["w", "w"]
+    assert await one.absent() == []
+
+
+@on("a")
+async def test_what_cannot_be_placed_is_reported_as_absent_with_its_cause(one: Mission) -> None:
+    await one.start("watcher", "w")
+    await one.crash("creator-a")
+    await one.clock.sleep_s(8.0)
+    absence = (await one.absent())[0]
+    assert (absence.name, absence.cause) == ("w", "was lost with the creator of a")
+    assert absence.doing.startswith("waits for a host: no host for w")
+    assert one.clock.now_s() - absence.since_s == pytest.approx(8.0, abs=0.5)
+    await one.begin_creator("a")
+    await one.clock.sleep_s(2.0)
+    assert await one.absent() == []
+
+
+@on("a")
+async def test_what_a_component_wanted_ends_with_an_order_to_stop_it(one: Mission) -> None:
+    await one.start("watcher", "parent")
+    child = one.network.join("mission_control/parent", one.clock)
+    await child.ask(ADDRESS, Start("watcher", "child"), Started, within_s=10.0)
+    await one.stop("parent")
+    await one.clock.sleep_s(1.0)
+    assert await one.placements() == {}
+    await child.close()
+
+
+@on("a")
+async def test_what_nobody_wants_any_more_is_ended(one: Mission) -> None:
+    """The owner and the placer died at the same moment, and nobody brought the owner back."""
+    gone = one.network.join("mission_control/gone", one.clock)
+    await gone.ask(ADDRESS, Start("watcher", "child"), Started, within_s=10.0)
+    await gone.close()
+    await one.clock.sleep_s(3 * COMPARE_EVERY_S)
+    assert await one.placements() == {}
+
+
+@on("a")
+async def test_an_order_to_stop_is_remembered_until_the_next_start(one: Mission) -> None:
+    await one.start("watcher", "w")
+    await one.stop("w")
+    with pytest.raises(NotPlaced) as refused:
+        await one.bus.ask(ADDRESS, AskPlacement("w"), Placement, within_s=1.0)
+    assert refused.value.facts["stopped"] is True
+    listed = await one.bus.ask(ADDRESS, ListPlacements(), Placements, within_s=1.0)
+    assert list(listed.stopped) == ["w"]
+    await one.start("watcher", "w")
+    assert (await one.bus.ask(ADDRESS, ListPlacements(), Placements, within_s=1.0)).stopped == {}
 
 
 @pytest.mark.parametrize("how", ["crash", "kill"])
@@ -384,7 +423,7 @@ async def lose_host_a(one: Mission, end: Callable[[str], Awaitable[None]]) -> No
     await one.clock.sleep_s(3.0)
     assert await one.placements() == {"w": "b", "scout1": ""}
     order, _, _ = one.creators["b"].lives["w"]
-    assert (order.parameters, order.requester) == ({"weight": 0.5}, "mission_control/boss")
+    assert (order.parameters, order.requester) == ({"weight": 0.5}, "backbone/boss")
     await one.begin_creator("a", "serial")
     await one.clock.sleep_s(3.0)
     assert await one.placements() == {"w": "b", "scout1": "a"}
@@ -405,7 +444,7 @@ async def test_on_a_single_host_everything_comes_back_with_its_creator(one: Miss
 
 
 @on("a")
-async def test_a_lost_component_that_fails_to_start_is_tried_again_and_then_given_up(one: Mission) -> None:
+async def test_a_lost_component_that_fails_to_start_is_tried_again_until_it_runs(one: Mission) -> None:
     for name in ("w1", "w2"):
         await one.start("watcher", name)
     await one.kill("creator-a")
@@ -413,9 +452,13 @@ async def test_a_lost_component_that_fails_to_start_is_tried_again_and_then_give
     creator.fails = ["w1", *["w2"] * 10]
     await one.clock.sleep_s(20.0)
     assert list(creator.lives) == ["w1"]
-    assert (await one.told("w2"))[-1] == "is given up: it could not be started again"
+    absence = (await one.absent())[0]
+    assert (absence.name, absence.doing) == ("w2", "is being placed again")
+    assert "did not become ready" in absence.cause
     creator.fails = []
-    assert (await one.start("watcher", "w2")).host == "a"
+    await one.clock.sleep_s(10.0)
+    assert sorted(creator.lives) == ["w1", "w2"]
+    assert await one.absent() == []
 
 
 @on("a", "b")
@@ -475,8 +518,10 @@ async def test_the_outcome_is_called_unknown_when_nobody_tells_and_settled_when_
     creator.tell_load()
     await one.clock.sleep_s(20.0)
     creator.tell_load()
-    await one.clock.sleep_s(1.0)
-    assert await one.placements() == {}
+    creator.answers_spawn = True
+    await one.clock.sleep_s(5.0)
+    assert await one.placements() == {"w": "a"}
+    assert creator.spawns == ["w", "w"]
 
 
 @on("a", "b")
@@ -487,7 +532,7 @@ async def test_a_restarted_placer_knows_what_runs_and_for_whom(one: Mission) -> 
     await one.begin(Placer, "placer")
     assert await one.placements() == {"scout1": "b", "watcher-1": "a"}
     placed = await one.bus.ask(ADDRESS, AskPlacement("scout1"), Placement, within_s=1.0)
-    assert (placed.requester, placed.type) == ("mission_control/boss", "scout")
+    assert (placed.requester, placed.type) == ("backbone/boss", "scout")
     assert (await one.start("watcher")).address == "mission_control/watcher-2"
     await one.kill("creator-b")
     await one.clock.sleep_s(10.0)

@@ -46,7 +46,7 @@ def random_mission(
         return bench, []
     happens: list[tuple[float, Event]] = [(_time(rng, 8.0) if rng.random() < 0.5 else 0.0, r) for r in requests]
     whims = [(_time(rng), _whim(rng, rng.choice(requests))) for _ in range(rng.choice([0, 0, 2, 6]))]
-    # A repeated request would make shorter again what was made longer; the judge knows only the last length.
+    # A repeated request would make shorter again what was made longer; the checker knows only the last length.
     changing = {whim.arc for _, whim in whims if isinstance(whim, RuntimeChanged)}
     happens += [
         (time_s, whim) for time_s, whim in whims if not (isinstance(whim, Requested) and whim.request.arc in changing)
@@ -121,7 +121,7 @@ def _stream(rng: Random) -> Usage:
 
 def _whim(rng: Random, of: Requested) -> Event:
     arc = of.request.arc
-    # Only longer ones: the judge measures all waits by the last maximum run time it heard of.
+    # Only longer ones: the checker measures all waits by the last maximum run time it heard of.
     run_s = of.request.maximum_runtime_s + 8.0
     whims: list[Event] = [
         Idled(arc),

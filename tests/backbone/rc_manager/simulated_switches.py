@@ -6,15 +6,12 @@ within their grace, the alarm rings. What comes out is a trace and a table of ru
 
 from __future__ import annotations
 
-import copy
-import functools
 import heapq
 import itertools
 from collections.abc import Callable, Iterable
-from types import ModuleType
 from typing import Any
 
-from trace_judge import judge
+from trace_checker import Violation, check
 
 from backbone.rc_manager.decisions import (
     ConnectArc,
@@ -182,29 +179,6 @@ class Bench:
                 found[-1] = (found[-1][0], line["t"])
         return found
 
-    def verdict(self) -> list[Any]:
-        """Return the violations an independent judge finds in the trace; skip the test where there is none."""
-        events = [*map(dict, self.trace), {"ev": "end", "t": self.now_s}]
-        found: list[Any] = _up_to_date(judge())().run(events)
-        return found
-
-
-@functools.cache
-def _up_to_date(module: ModuleType) -> Any:
-    """Return the judge's checker, made to read a node's new number for ARCs that asked before, too."""
-
-    class UpToDate(module.FullChecker):  # type: ignore[misc, name-defined]
-        def apply(self, event: dict[str, Any]) -> None:
-            super().apply(event)
-            owners = self.__dict__.setdefault("owners", {})
-            if event["ev"] == "request":
-                owners[event["arc"]] = copy.copy(event["owner"])
-            elif event["ev"] == "node":
-                for arc in self.arcs.values():
-                    owner = owners[arc.id]
-                    if isinstance(owner, dict) and event["id"] == f"console {owner['id']}":
-                        owner["ui"] = event["prio"]
-                    arc.path = self.path(owner, arc.id)
-                self._cache.clear()
-
-    return UpToDate
+    def verdict(self) -> list[Violation]:
+        """Return the violations that an independent checker finds in the trace so far."""
+        return check([*self.trace, {"ev": "end", "t": self.now_s}])

@@ -1,4 +1,4 @@
-"""The trace of a dry run is one the independent judge of traces finds nothing wrong with."""
+"""The independent checker of traces finds nothing wrong with the trace of a dry run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from simulated_switches import judge
+from trace_checker import check
 
 from backbone.dry_run import dry_run
 from backbone.mission.reader import read_mission
@@ -16,7 +16,7 @@ MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 
 @pytest.mark.parametrize("lower", [False, True], ids=["equals", "one is lower"])
 @pytest.mark.parametrize("for_s", [0.0, 7.3, 300.0])
-def test_the_judge_finds_nothing_wrong_with_a_dry_run(for_s: float, lower: bool, tmp_path: Path) -> None:
+def test_the_checker_finds_nothing_wrong_with_a_dry_run(for_s: float, lower: bool, tmp_path: Path) -> None:
     text = MISSION_XML.read_text()
     if lower:
         text = text.replace('name="watch-scout2" priority="1"', 'name="watch-scout2" priority="0"')
@@ -24,4 +24,4 @@ def test_the_judge_finds_nothing_wrong_with_a_dry_run(for_s: float, lower: bool,
     file.write_text(text)
     dry_run(read_mission(file), for_s).write_trace(trace)
     lines = [json.loads(line) for line in trace.read_text().splitlines()]
-    assert judge().FullChecker().run(lines) == []
+    assert check(lines) == []

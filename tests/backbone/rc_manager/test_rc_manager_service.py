@@ -118,6 +118,7 @@ class PlainArc(Component[Any]):
         self.rcs: list[str] = []
         self.log: list[tuple[str, str, float]] = []
         self.beats = True
+        self.hangs = False
 
     async def serve(self) -> None:
         while True:
@@ -132,6 +133,8 @@ class PlainArc(Component[Any]):
         return scheduled
 
     async def answer(self, asked: Envelope[Any]) -> Message:
+        if self.hangs:
+            await self.clock.sleep_s(60.0)
         match asked.body:
             case OpenGate(epochs=epochs, settled_s=settled_s):
                 await self.clock.sleep_until_s(settled_s)
@@ -321,11 +324,48 @@ def test_an_rc_that_does_not_confirm_counts_as_held_until_its_lease_is_over(pool
             await here.clock.sleep_s(LEASE_S - 0.1)
             assert not one.is_open
             assert not two.is_open
+            await here.clock.sleep_s(0.2)
             here.rcs["left"].hangs = False
             here.rcs["left"].holders.clear()
             await here.clock.sleep_s(2.0)
             assert two.is_open
             assert two.granted_s >= asked_s + LEASE_S - 1e-6
+
+    run_virtual(main())
+
+
+def test_an_arc_that_hangs_delays_nobody(pool: Any) -> None:
+    """Its epochs are over as soon as its RCs have disconnected."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one, two = await here.arc("one"), await here.arc("two")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            one.hangs = True
+            asked_s = here.clock.now_s()
+            await two.ask_for(request("two", "radio", "left", priority=100))
+            await here.clock.sleep_s(1.5)
+            assert two.is_open
+            assert two.granted_s - asked_s < 0.25  # the grace of 0.2 s, and the time of the messages
+
+    run_virtual(main())
+
+
+def test_an_rc_that_was_away_is_free_as_soon_as_it_says_so_itself(pool: Any) -> None:
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            here.rcs["left"].end("it is killed")
+            await here.clock.sleep_s(0.3)
+            assert not one.is_open
+            came_back_s = here.clock.now_s()
+            await here.rc(HARDWARE[0])
+            await here.clock.sleep_s(LEASE_S)
+            assert one.is_open
+            assert one.granted_s - came_back_s < 0.3  # and not only when the lease of its earlier life is over
 
     run_virtual(main())
 

@@ -1,0 +1,172 @@
+"""A wish: one component that its owner wants to run, kept true through the placer.
+
+``Wish`` is pure: it turns what happened into pauses and into the absence that the owner reports. ``keep_placed`` is
+the loop around it. The owner compares wish and fact again and again: how a component came to be missing (an exit
+code, a signal, a lost host, a placer that lost its memory) makes no difference. Only two things end a wish: its owner
+cancels the loop, or the placer was ordered to stop the component.
+
+Prior art: level-triggered controllers of Kubernetes; permanent children of Erlang supervisors.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.companion import Companion
+from backbone.component.messages import Absence
+from backbone.creator.messages import START_MOST_S
+from backbone.errors import LinkError, Refusal
+from backbone.nameserver.messages import NameTaken
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import AskPlacement, CreatorSilent, NotPlaced, Placement, Start, Started
+
+log = logging.getLogger(__name__)
+
+PAUSE_FIRST_S, PAUSE_MOST_S = 0.2, 5.0  # chosen: a restarted placer is back within the first few; machine seconds
+COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at once; this is for the unknown ones
+REPLY_TIME_S = 1.0  # chosen: the placer answers in milliseconds
+START_WITHIN_S = START_MOST_S + 10.0  # chosen: the placer's own limit and a moment
+
+
+@dataclass
+class Wish:
+    """One wanted component; times are mission seconds.
+
+    Attributes:
+        name: The component.
+        missing_since_s: When it was first found missing; negative: it is placed, or was never started.
+        cause: Why it is missing.
+        started: Whether it ever was placed.
+    """
+
+    name: str
+    missing_since_s: float = -1.0
+    cause: str = ""
+    started: bool = False
+    _pause_s: float = PAUSE_FIRST_S
+
+    def placed(self) -> None:
+        """Take note that the placer has it."""
+        self.missing_since_s, self.cause, self.started, self._pause_s = -1.0, "", True, PAUSE_FIRST_S
+
+    def missing(self, cause: str, now_s: float) -> None:
+        """Take note that the placer does not have it."""
+        self.cause = cause
+        if self.missing_since_s < 0:
+            self.missing_since_s = now_s
+
+    def not_started(self, cause: str, now_s: float) -> float:
+        """Take note that a start failed; return the pause before the next one, seconds of the machine."""
+        if self.started:
+            self.missing(cause, now_s)
+        pause_s, self._pause_s = self._pause_s, min(2 * self._pause_s, PAUSE_MOST_S)
+        return pause_s
+
+    def absence(self) -> Absence | None:
+        """Return what its owner reports about it; None while it is placed."""
+        if self.missing_since_s < 0:
+            return None
+        return Absence(self.name, self.missing_since_s, self.cause, "its owner asks the placer to start it")
+
+
+async def keep_placed(
+    bus: Bus,
+    clock: Clock,
+    wish: Wish,
+    order: Start,
+    address: str,
+    on_placed: Callable[[Placement, bool], None] = lambda _placement, _was_there: None,
+    on_changed: Callable[[], None] = lambda: None,
+) -> str:
+    """Have the component placed, and placed again whenever it is missing; return why it was ordered to stop.
+
+    Args:
+        bus: The owner's.
+        wish: Of this owner, for this component.
+        order: How it is started.
+        address: Of the component.
+        on_placed: Called whenever it was started, with True if it was running from before.
+        on_changed: Called when ``wish.absence()`` may have changed.
+
+    Raises:
+        Refusal: The very first start was refused: that is for the owner to judge.
+    """
+    component, placer = Companion(bus, address), Companion(bus, PLACER)
+    try:
+        while True:
+            placement, was_there = await _start(bus, clock, wish, order, on_changed)
+            wish.placed()
+            on_placed(placement, was_there)
+            on_changed()
+            missing = await _wait_missing(bus, clock, wish.name, component, placer)
+            if missing.facts.get("stopped"):
+                return missing.detail
+            wish.missing("it was missing, and the placer did not have it", clock.now_s())
+            on_changed()
+    finally:
+        component.close()
+        placer.close()
+
+
+async def _start(
+    bus: Bus, clock: Clock, wish: Wish, order: Start, on_changed: Callable[[], None]
+) -> tuple[Placement, bool]:
+    """Return the placement, and whether the component was running from before."""
+    while True:
+        try:
+            started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
+        except NameTaken:
+            try:
+                return await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S), True
+            except (LinkError, NotPlaced) as error:  # its former life is ending
+                cause = str(error)
+        except (LinkError, CreatorSilent) as error:
+            cause = str(error)
+        except Refusal as refusal:
+            if not wish.started:
+                raise
+            cause = refusal.detail
+        else:
+            since_s, requester = clock.now_s(), bus.source
+            return Placement(wish.name, order.type, started.host, requester, since_s, started.reasons), False
+        log.info("%s is not started: %s", wish.name, cause)
+        pause_s = wish.not_started(cause, clock.now_s())
+        on_changed()
+        await clock.sleep_s(pause_s * clock.rate)
+
+
+async def _wait_missing(bus: Bus, clock: Clock, name: str, component: Companion, placer: Companion) -> NotPlaced:
+    """Return the placer's word that it does not have the component."""
+    compared_with = placer.times_risen
+    while True:
+        await _first_of(
+            component.wait_gone(),
+            placer.wait_risen(max(compared_with, 1) + 1),
+            clock.sleep_s(COMPARE_EVERY_S * clock.rate),
+        )
+        await placer.wait_there()
+        compared_with = placer.times_risen
+        try:
+            await bus.ask(PLACER, AskPlacement(name), Placement, within_s=REPLY_TIME_S)
+        except NotPlaced as refusal:
+            return refusal
+        except LinkError as error:
+            log.info("the placer does not answer about %s: %s", name, error)
+            await clock.sleep_s(PAUSE_FIRST_S * clock.rate)
+            continue
+        if not component.is_there:  # its creator or the placer works on it: compare again, not at once
+            await _first_of(component.wait_there(), clock.sleep_s(PAUSE_MOST_S * clock.rate))
+
+
+async def _first_of(*waits: Awaitable[None]) -> None:
+    tasks = [asyncio.ensure_future(wait) for wait in waits]
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)

@@ -1,0 +1,211 @@
+"""The victims of a mission, what can be done to them, and the loop that waits until all is well again."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from recovery_mission import MARK, POLL_S, BenchMission, NotSeen, marked, mission_coming_up
+from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from trace_judge import judge
+
+WATCHERS = frozenset({"watch-scout1-capture", "watch-scout2-capture"})
+HARDWARE = ("radio", "scout1", "scout2", "scout3", "video1")
+ROWS: dict[str, tuple[str, ...]] = {
+    "nameserver": ("nameserver",),
+    "component_database": ("component_database",),
+    "placer": ("placer",),
+    "creator": ("creator-base",),
+    "dependency_database": ("dependency_database",),
+    "rc_manager": ("rc_manager",),
+    "core_zygote": ("nameserver", "component_database", "placer", "creator-base", "dependency_database", "rc_manager"),
+    "zygote": ("grabber", "world", "surveillance", *HARDWARE),
+    "hardware": HARDWARE,
+    "grabber": ("grabber",),
+    "world": ("world",),
+    "arc": ("watch-scout1-capture",),
+    "behavior": ("watch-scout1",),
+    "parent": ("surveillance",),
+    "console": (),
+    "launcher": ("launcher",),
+}
+"""Victims, and the components that live in their process or end with it."""
+SIGNALS = {"SIGKILL": signal.SIGKILL, "SIGTERM": signal.SIGTERM}
+STOPS_S = {f"SIGSTOP {stop:g}": stop for stop in (0.3, 1.0, 5.0, 30.0)}
+FAULTS = (*SIGNALS, *STOPS_S)
+UP_WITHIN_S = 90.0
+CALM_S = 6.0  # chosen: longer than a turn, so that the usual gap of pictures at a switch is seen
+STAYS_S = 2.0  # chosen: twice the time for which a component waits for a companion out of sight
+MENDED_WITHIN_S = 40.0  # chosen: what takes longer is not mended
+DOWN_WITHIN_S = 30.0
+SHOWN = 5  # how many violations are spelt out
+
+
+class Breaker:
+    """Does things to a mission that is up, and says what came of them."""
+
+    def __init__(self, mission: BenchMission, patience_s: float = MENDED_WITHIN_S) -> None:
+        self.mission, self.watch, self.patience_s = mission, mission.watch, patience_s
+
+    def calm(self) -> Expected:
+        """Return how the mission is when nothing is done to it."""
+        look = self.watch.wait(
+            "everything runs", lambda look: look.sight.get("asks", []) >= sorted(WATCHERS) and look.word == "ok", 30.0
+        )
+        time.sleep(CALM_S)
+        look = self.watch.looks[-1]
+        return Expected(look, frozenset(n for n in look.ready() if not n.startswith(("cli-", "console"))), WATCHERS)
+
+    def fault(self, victim: str, name: str) -> Fault:
+        """Return what is to be done to the victim as it is now.
+
+        Raises:
+            NotSeen: There is no such process now.
+        """
+        if victim == "console":
+            return Fault(victim, name, self.mission.attach_console(), ())
+        rows = ROWS[victim]
+        look = self.watch.wait(f"{victim} runs", lambda look: "rows" in look.sight, 20.0)
+        pid = self.mission.processes(look).get(victim if victim.endswith("zygote") else rows[0], 0)
+        if not pid:
+            raise NotSeen(f"{victim} does not run")
+        return Fault(victim, name, pid, rows)
+
+    def strike(self, faults: Sequence[Fault]) -> None:
+        """Do it."""
+        for fault in faults:
+            number = SIGNALS.get(fault.name, signal.SIGSTOP)
+            fault.at_s = time.monotonic()
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(fault.pid, number)
+            if fault.kills:
+                fault.lifted_s = fault.at_s
+            if fault.victim.endswith("zygote") and fault.name == "SIGTERM":
+                time.sleep(POLL_S)
+                if any(process.pid == fault.pid for process in marked_of(self.mission)):
+                    fault.replaced_s = fault.at_s  # zygotes take no notice of it
+
+    def attend(self, fault: Fault) -> None:
+        """Let a stopped process go on when its time has come; see whether what is no component was replaced."""
+        now_s = time.monotonic()
+        if fault.lifted_s == math.inf and now_s >= fault.at_s + STOPS_S[fault.name]:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(fault.pid, signal.SIGCONT)
+            fault.lifted_s = now_s
+        if fault.victim.endswith("zygote") and fault.replaced_s == math.inf and self.watch.looks:
+            look = self.watch.looks[-1]
+            keeper_pid = self.mission.launcher.pid if fault.victim == "core_zygote" else look.pid("creator-base")
+            if "rows" in look.sight and self.mission.zygote_of(keeper_pid, look) not in (0, fault.pid):
+                fault.replaced_s = now_s
+
+    def see_through(self, expected: Expected, faults: Sequence[Fault]) -> dict[str, Any]:
+        """Strike, wait until the mission is whole to stay, and return what was seen."""
+        usual_gap_s = longest_gap_s(self.watch.pictures_s, expected.before.at_s - CALM_S, expected.before.at_s)
+        more = len(marked_of(self.mission))
+        self.strike(faults)
+        judgement = Judgement(expected, faults)
+        while True:
+            time.sleep(POLL_S)
+            for fault in faults:
+                self.attend(fault)
+            judgement.take(self.watch.looks, self.watch.pictures_s)
+            lifted_s, now_s = max(fault.lifted_s for fault in faults), time.monotonic()
+            if now_s > max(lifted_s, judgement.good_since_s) + STAYS_S or now_s > lifted_s + self.patience_s:
+                break
+        began_s, look = faults[0].at_s, self.watch.looks[-1]
+        found: dict[str, Any] = {
+            "noticed_s": rounded(judgement.noticed_after_s()),
+            "healthy_s": rounded(judgement.healthy_after_s()),
+            "unsaid_s": rounded(judgement.unsaid_s),
+            "gap_s": rounded(longest_gap_s(self.watch.pictures_s, began_s, time.monotonic())),
+            "usual_gap_s": rounded(usual_gap_s),
+            "more": len(marked_of(self.mission)) - more,
+        }
+        if judgement.healthy_after_s() is None:
+            found["lacks"] = judgement.lacks(look, self.watch.pictures_s)
+            found["says"] = [look.word, *look.sight["why"]]
+        return found
+
+    def end(self) -> dict[str, Any]:
+        """Take the mission down and return what the trace says and what is left."""
+        self.mission.detach_console()
+        done = self.mission.down()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.mission.launcher.wait(DOWN_WITHIN_S)
+        return {"down": done.returncode, **self.aftermath()}
+
+    def aftermath(self) -> dict[str, Any]:
+        """Return how ``up`` ended, what is left, and what the trace says."""
+        left = self.mission.left()
+        return {
+            "up_exit": self.mission.launcher.poll(),
+            "left": len(left),
+            "folder_left": self.mission.directory.exists(),
+            "violations": len(broken := violations(self.mission.trace)),
+            **({"violated": broken[:SHOWN]} if broken else {}),
+        }
+
+
+def marked_of(mission: BenchMission) -> list[psutil.Process]:
+    """Return the mission's processes, but for its console."""
+    console = mission.console.pid if mission.console is not None else 0
+    return [process for process in marked(mission.environment[MARK]) if process.pid != console]
+
+
+def rounded(seconds: float | None) -> float | None:
+    """Return seconds as people read them."""
+    return None if seconds is None else round(seconds, 2)
+
+
+def violations(trace: Path) -> list[str]:
+    """Return the rules the trace breaks, for people; a text where no judge of traces is at hand.
+
+    Each life of the RC manager is judged by itself: it begins with a ``meta`` line, and with what it adopts.
+    """
+    if not trace.exists():
+        return ["no trace"]
+    try:
+        judging = judge()
+    except pytest.skip.Exception:
+        return ["no judge"]
+    lives: list[list[dict[str, Any]]] = []
+    for line in trace.read_text().splitlines():
+        if line.endswith("}"):  # one that was killed may not have finished its last line
+            event = json.loads(line)
+            if event["ev"] == "meta":
+                lives.append([])
+            lives[-1].append(event)
+    broken = [found for life in lives for found in judging.check(life)]
+    return [f"{found.code} at {found.t} {found.arc}: {found.msg}" for found in broken]
+
+
+@contextlib.contextmanager
+def breaker(patience_s: float = MENDED_WITHIN_S) -> Iterator[Breaker]:
+    """Bring a mission up and yield it when all is ready."""
+    with mission_coming_up() as mission:
+        ends_s = time.monotonic() + UP_WITHIN_S
+        while not any(line.startswith("all ready") for line in list(mission.lines)):
+            if mission.launcher.poll() is not None or time.monotonic() > ends_s:
+                raise NotSeen("\n".join(["the mission did not come up", *mission.lines]))
+            time.sleep(POLL_S)
+        yield Breaker(mission, patience_s)
+
+
+@contextlib.contextmanager
+def breaking_calm() -> Iterator[tuple[Breaker, Expected]]:
+    """Yield a mission that is up, and how it is when nothing is done to it."""
+    with breaker() as breaking:
+        yield breaking, breaking.calm()

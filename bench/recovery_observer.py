@@ -1,0 +1,123 @@
+"""What can be seen of a running mission from outside, as JSON lines: a look every 50 ms and each picture's arrival.
+
+A process of its own, so that looking and measuring do not wait for each other. It speaks on one bus
+connection and is no component. It ends when its standard input closes.
+
+Lines: ``{"began", "t", "sight"}`` for a look (``sight`` is left out where it is the one of the line
+before), ``{"frame"}`` for a picture. Times are this machine's monotonic clock.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import sys
+import time
+from typing import Any
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.messages import Absence
+from backbone.errors import HubUnreachable, LinkError, Refusal
+from backbone.health import Health, health
+from backbone.keys import Conversation
+from backbone.mission_picture import MissionPicture, look
+from backbone.naming import component_of
+from resource_pool.messages import Frame
+
+LOOK_EVERY_S = 0.05
+FOUND_EVERY_S = 0.02  # how often a mission that is only coming up is looked for
+UNREACHABLE = "unreachable"  # what an operator reads where ``status`` ends with exit code 4
+
+
+def health_of(picture: MissionPicture, rate: float) -> Health:
+    """Return what ``status`` says of the mission's health."""
+    missed = [
+        Absence(problem.partition(":")[0], picture.at_s, "did not answer", "asked again", vital=True)
+        for problem in picture.problems
+    ]
+    return health(picture.components, missed, picture.at_s, rate)
+
+
+def sight(picture: MissionPicture, rate: float) -> dict[str, Any]:
+    """Return what matters of a picture, as plain data."""
+    verdict = health_of(picture, rate)
+    schedule = picture.schedule
+    return {
+        "word": str(verdict.word),
+        "absent": [absence.name for absence in verdict.absent],
+        "why": [f"{absence.name}: {absence.cause}; {absence.doing}" for absence in verdict.absent],
+        "rows": {component_of(at): [c.pid, str(c.state)] for at, c in sorted(picture.components.items())},
+        "restarts": {name: process.restarts for name, process in sorted(picture.processes.items())},
+        "given_up": [name for name, process in sorted(picture.processes.items()) if process.given_up],
+        "asks": sorted(request.arc for request in schedule.requests) if schedule else [],
+        "held": sorted({holder.arc for rc in schedule.rcs for holder in rc.holders}) if schedule else [],
+    }
+
+
+def say(**said: Any) -> None:
+    """Write one line."""
+    sys.stdout.write(json.dumps(said) + "\n")
+    sys.stdout.flush()
+
+
+async def found(mission: str) -> run_files.RunFile:
+    """Return how to reach the mission as soon as its launcher says so."""
+    while True:
+        with contextlib.suppress(run_files.MissionNotUp):
+            return run_files.find(mission)
+        await asyncio.sleep(FOUND_EVERY_S)
+
+
+async def open_bus(run_file: run_files.RunFile, clock: MissionClock) -> ZenohBus:
+    """Return a bus as soon as the hub listens."""
+    while True:
+        with contextlib.suppress(HubUnreachable):
+            return await ZenohBus.open_when_up(
+                run_file.mission, "ui_console/recovery", clock, client_config(run_file.endpoint)
+            )
+        await asyncio.sleep(FOUND_EVERY_S)
+
+
+async def watch(bus: Bus, clock: MissionClock) -> None:
+    """Look again and again."""
+    last: dict[str, Any] = {}
+    while True:
+        began = time.monotonic()
+        try:
+            seen = sight(await look(bus, clock.now_s()), clock.rate)
+        except (LinkError, Refusal) as error:
+            seen = {"word": UNREACHABLE, "absent": [], "why": [str(error)]}
+        say(began=began, t=time.monotonic(), **({} if seen == last else {"sight": seen}))
+        last = seen
+        await asyncio.sleep(max(0.0, began + LOOK_EVERY_S - time.monotonic()))
+
+
+async def attend(mission: str) -> None:
+    """Find the mission and watch it."""
+    run_file = await found(mission)
+    clock = MissionClock(run_file.clock_origin_monotonic_s, run_file.clock_rate)
+    bus = await open_bus(run_file, clock)
+    try:
+        bus.subscribe("resource_pool/*", Conversation.FRAMES, Frame, lambda _envelope: say(frame=time.monotonic()))
+        await watch(bus, clock)
+    finally:
+        await bus.close()
+
+
+async def observe(mission: str) -> None:
+    """Attend to the mission until standard input closes."""
+    closed = asyncio.get_running_loop().run_in_executor(None, sys.stdin.buffer.read)
+    attending = asyncio.create_task(attend(mission))
+    await asyncio.wait({closed, attending}, return_when=asyncio.FIRST_COMPLETED)
+    attending.cancel()
+    await asyncio.wait({attending})
+    if not attending.cancelled():
+        attending.result()
+
+
+if __name__ == "__main__":
+    asyncio.run(observe(sys.argv[1]))

@@ -1,0 +1,115 @@
+"""Many faults, one after the other, in one mission: what it is like at the end, and what has grown."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import psutil
+from measuring import report
+from recovery_breaker import FAULTS, HARDWARE, STAYS_S, Breaker, breaking_calm, rounded
+from recovery_mission import POLL_S, BenchMission, Look, NotSeen
+from recovery_verdict import Fault, Judgement, longest_gap_s
+
+PAUSE_S = (5.0, 15.0)
+REMEMBERED_S = 60.0  # chosen: twice the longest pause of a process
+SETTLED_WITHIN_S = 60.0
+GROWTH = 0.1  # the most that a process may have grown
+
+
+def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
+    """Do random things to a mission for so long, and print what it is like afterwards."""
+    rng = random.Random(seed)
+    with breaking_calm() as (breaking, expected):
+        before = usage(breaking.mission, expected.before)
+        ends_s = time.monotonic() + minutes * 60
+        judgement = Judgement(expected, [])
+        faults = []
+        while time.monotonic() < ends_s:
+            fault = drawn(breaking, rng, victims)
+            if fault is not None:
+                faults.append(fault)
+                judgement.faults = [f for f in faults if f.lifted_s > time.monotonic() - REMEMBERED_S]
+                report("recovery_soak", at_s=rounded(fault.at_s - expected.before.at_s), **done_to(fault))
+            wait(breaking, judgement, time.monotonic() + rng.uniform(*PAUSE_S))
+        settle(breaking, judgement)
+        began_s, mission = expected.before.at_s, breaking.mission
+        look = breaking.watch.looks[-1]
+        end = {
+            "word": look.word,
+            "lacks": judgement.lacks(look, breaking.watch.pictures_s),
+            "says": look.sight["why"],
+            "unsaid_s": rounded(judgement.unsaid_s),
+            "gap_s": rounded(longest_gap_s(breaking.watch.pictures_s, began_s, time.monotonic())),
+        }
+        breaking.mission.detach_console()
+        after = usage(mission, look)
+        for name in sorted(before):
+            report("recovery_soak_usage", **compared(name, before[name], after.get(name, {})))
+        report("recovery_soak", faults=len(faults), minutes=minutes, seed=seed, **end, **breaking.end())
+
+
+def drawn(breaking: Breaker, rng: random.Random, victims: Sequence[str]) -> Fault | None:
+    """Do any one thing to any one process; return it, or None where there was no such process."""
+    victim = rng.choice(victims)
+    name = rng.choice([each for each in FAULTS if victim != "launcher" or each.startswith("SIGSTOP")])
+    try:
+        fault = breaking.fault(victim, name)
+    except NotSeen as error:
+        report("recovery_soak", victim=victim, fault=name, skipped=str(error)[:200])
+        return None
+    breaking.strike([fault])
+    return fault
+
+
+def done_to(fault: Fault) -> dict[str, Any]:
+    """Return the fault for a report."""
+    return {"victim": fault.victim, "fault": fault.name, "pid": fault.pid}
+
+
+def wait(breaking: Breaker, judgement: Judgement, until_s: float) -> None:
+    """Let time pass; stopped processes go on when their time has come."""
+    while time.monotonic() < until_s:
+        time.sleep(POLL_S)
+        for fault in judgement.faults:
+            breaking.attend(fault)
+        judgement.take(breaking.watch.looks, breaking.watch.pictures_s)
+
+
+def settle(breaking: Breaker, judgement: Judgement) -> None:
+    """Return when the mission is whole, to stay, or has had its time."""
+    ends_s = time.monotonic() + SETTLED_WITHIN_S
+    while time.monotonic() < ends_s:
+        wait(breaking, judgement, time.monotonic() + STAYS_S / 4)
+        on_the_way = any(fault.lifted_s > time.monotonic() for fault in judgement.faults)
+        if not on_the_way and time.monotonic() > judgement.good_since_s + STAYS_S:
+            return
+
+
+def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
+    """Return what each process uses, and how long its log is, by the name of a component in it."""
+    logs, found, seen = mission.logs(), dict[str, dict[str, float]](), set[int]()
+    for name, pid in mission.processes(look).items():
+        if pid in seen:
+            continue
+        seen.add(pid)
+        with contextlib.suppress(psutil.Error):
+            process = psutil.Process(pid)
+            shared = "hardware" if name in HARDWARE else name
+            found[shared] = {
+                "mb": round(process.memory_full_info().uss / 1e6, 1),
+                "fds": process.num_fds(),
+                "threads": process.num_threads(),
+                "log_kb": round(logs.get(f"{shared}.log", 0) / 1e3, 1),
+            }
+    return found
+
+
+def compared(name: str, before: dict[str, float], after: dict[str, float]) -> dict[str, Any]:
+    """Return what a process used before and after, and what of it has grown by more than ``GROWTH``."""
+    both = {kind: [before[kind], after.get(kind)] for kind in before}
+    grown = [kind for kind, (was, now) in both.items() if now is not None and now > (was or 0.0) * (1 + GROWTH)]
+    return {"process": name, **both, "grown": grown}
