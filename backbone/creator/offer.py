@@ -50,7 +50,7 @@ from backbone.wire import Envelope, Message
 OFFER_TYPE = "offer"
 READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
-CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), and 5 s after it nothing may run here
+CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), a killed hub at once and is back within 3 s
 SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, on a slow link by a tenth of a second
 ASK_AGAIN_S = 0.1  # chosen: a hub's nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s

@@ -21,12 +21,8 @@ from backbone.mission_picture import LAUNCHER
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 
 HEALED_WITHIN_S = 5.0
-FENCE_S = 6.0  # 2 s until a cut shows, 3 s until the offer ends what it runs, 1 s to end it
+FENCE_S = 7.0  # 2 s until a cut shows, 3 s until the offer ends what it runs, 1.5 s to end it, and a moment
 GONE_WITHIN_S = 5.0
-ENDS_CHILDREN = pytest.mark.xfail(
-    reason="children end when their parent's token was away for a second, and the parent does not start them again",
-    strict=False,  # it depends on the hosts that parent and children were placed on
-)
 
 
 def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_leaves_nothing(tmp_path: Path) -> None:
@@ -49,10 +45,10 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         mission.type_what_up_prints("near")
         mission.wait("near is there", lambda: any("✓ host near" in line for line in mission.up.lines), 30.0)
         state = asyncio.run(state_of_the_launcher(mission))
-        assert [(absent.name, absent.doing, absent.vital) for absent in state.absent] == [
-            ("far", "waits for its creator", False)
-        ]
-        assert "scout-backbone creator --host far --connect tcp/" in state.absent[0].remedy
+        [far] = [absent for absent in state.absent if absent.name == "far"]
+        assert (far.doing, far.vital) == ("waits for its creator", False)
+        assert "scout-backbone creator --host far --connect tcp/" in far.remedy
+        assert "near" not in {absent.name for absent in state.absent}
         launcher = mission.components()["launcher"]
         assert launcher["feedback"] == "waits for host far", mission.story()
         assert mission.up.process.poll() is None
@@ -139,7 +135,8 @@ async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
     "cut_s",
     [
         0.5,
-        pytest.param(2.5, marks=ENDS_CHILDREN),
+        2.5,
+        4.0,
         5.0,
         pytest.param(30.0, marks=pytest.mark.slow),
         pytest.param(60.0, marks=pytest.mark.slow),

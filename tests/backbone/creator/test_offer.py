@@ -67,7 +67,7 @@ class FakeCreator:
 
     def processes(self) -> list[ProcessState]:
         order = Spawn(Subsystem.BACKBONE, creator_name("far"), "creator", "x:Y", policy=RestartPolicy())
-        return [ProcessState(order, 1, 0)]
+        return [ProcessState(order, 1, 0, "")]
 
     def absences(self) -> list[Absence]:
         return self.missing
