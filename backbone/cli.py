@@ -411,7 +411,8 @@ def creator(
     """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
 
     async def work() -> int:
-        from backbone.creator.offer import Offered, Offering
+        from backbone.creator.kept_creator import Offered
+        from backbone.creator.offer import Offering
 
         offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
         is_file = secret_file is not None and str(secret_file) != "-"

@@ -11,51 +11,37 @@ import asyncio
 import os
 import signal
 import socket
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
-import msgspec
-
-from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
-from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
-from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
+from backbone.creator.kept_creator import KeepsCreator, KeptCreator, Offered
 from backbone.creator.messages import (
-    TYPE,
     ListProcesses,
     Processes,
     ProcessFell,
-    ProcessState,
-    RestartPolicy,
-    creator_name,
     offer_name,
 )
-from backbone.creator.preload import arc_modules
-from backbone.creator.process_keeper import ProcessKeeper
-from backbone.creator.zygote import Zygote
-from backbone.door import keep_secret, read_secret_file
+from backbone.door import read_secret_file
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.naming import Subsystem, legal
 from backbone.visit import clock_elsewhere, mission_clock
 from backbone.wire import Envelope, Message
 
 OFFER_TYPE = "offer"
-READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
-REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), a killed hub at once and is back within 3 s
 SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, on a slow link by a tenth of a second
 ASK_AGAIN_S = 0.1  # chosen: a hub's nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
 DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeated
-POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0)
 
 
 class Ending(StrEnum):
@@ -64,112 +50,6 @@ class Ending(StrEnum):
     TOLD = "told to end"
     CUT_OFF = "the link to the mission was lost"
     OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
-
-
-@dataclass(frozen=True)
-class Offered:
-    """This machine, and the mission it is offered to.
-
-    Attributes:
-        mission: Name of the mission.
-        endpoint: Where its hub listens.
-        host: Name of this machine in the mission.
-        tags: What this machine has.
-        secret: What the hub asks its clients for; empty: nothing.
-    """
-
-    mission: str
-    endpoint: str
-    host: str
-    tags: tuple[str, ...] = ()
-    secret: str = ""
-
-
-class KeepsCreator(Protocol):
-    """What an offer needs of the one that keeps its creator; see ``KeptCreator``."""
-
-    on_fell: Callable[[ProcessFell], None]
-    on_changed: Callable[[], None]
-
-    async def start(self, bus: Bus, clock: Clock) -> None:
-        """Have the creator running, or raise a ``BackboneError``."""
-
-    def processes(self) -> list[ProcessState]:
-        """Return the creator's process."""
-
-    def absences(self) -> list[Absence]:
-        """Return the creator while it does not run or respond."""
-
-    async def close(self) -> None:
-        """Return when nothing runs here any more; right however often called."""
-
-
-class KeptCreator:
-    """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
-
-    Args:
-        launch: Of the offer.
-
-    Attributes:
-        on_fell: Called when the creator ended unexpectedly.
-        on_changed: Called when ``absences()`` may have changed.
-    """
-
-    def __init__(self, launch: Launch, offered: Offered) -> None:
-        self.on_fell: Callable[[ProcessFell], None] = lambda _fell: None
-        self.on_changed: Callable[[], None] = lambda: None
-        self._launch, self._offered = launch, offered
-        self._keeper: ProcessKeeper | None = None
-
-    async def start(self, bus: Bus, clock: Clock) -> None:
-        """Have the creator running.
-
-        Raises:
-            LinkError: The mission's component database did not answer.
-            StartFailed: The creator did not become ready; the end of its log is in the detail.
-            NameTaken: The mission has a creator of this host.
-        """
-        answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
-        types = [counted.component_type for counted in answered.types]
-        directory = run_files.make_directory(f"{self._launch.mission}-{self._launch.host}")
-        if self._offered.secret:
-            keep_secret(directory, self._offered.secret)
-        self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))
-        self._keeper = ProcessKeeper(self._zygote, clock)
-        self._keeper.on_fell = self.on_fell
-        self._keeper.on_changed = self.on_changed
-        self._keeper.use(bus)
-        await self._keeper.start(self._creator_launch(types, directory), POLICY, READY_WITHIN_S)
-
-    def processes(self) -> list[ProcessState]:
-        """Return the creator's process."""
-        return self._keeper.processes() if self._keeper is not None else []
-
-    def absences(self) -> list[Absence]:
-        """Return the creator while it does not run or respond."""
-        return self._keeper.absences() if self._keeper is not None else []
-
-    async def close(self) -> None:
-        """Return when nothing runs here any more; right however often called."""
-        keeper, self._keeper = self._keeper, None
-        if keeper is not None:
-            await keeper.close()
-            await self._zygote.close()
-
-    def _creator_launch(self, types: list[ComponentType], directory: Path) -> Launch:
-        return msgspec.structs.replace(
-            self._launch,
-            name=creator_name(self._launch.host),
-            type=TYPE,
-            class_path=_creator_class(types),
-            parameters={
-                "tags": list(self._offered.tags),
-                "preload": arc_modules(types),
-                "types": [msgspec.to_builtins(one) for one in types],
-            },
-            requester=self._launch.address,
-            run_directory=str(directory),
-        )
 
 
 class Offer(Component[NoParameters]):
@@ -389,15 +269,3 @@ def _launch(offered: Offered, name: str, clock: MissionClock) -> Launch:
         clock_origin_monotonic_s=clock.origin_monotonic_s,
         clock_rate=clock.rate,
     )
-
-
-def _creator_class(types: Iterable[ComponentType]) -> str:
-    """Return the class of creators in this mission.
-
-    Raises:
-        UnknownType: The mission has no type ``creator``.
-    """
-    found = [component_type.class_path for component_type in types if component_type.name == TYPE]
-    if not found:
-        raise UnknownType(f"the mission has no component type {TYPE!r}")
-    return found[0]
