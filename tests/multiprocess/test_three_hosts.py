@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import signal
 import subprocess
 import time
 from pathlib import Path
 
 import pytest
+from namespaces import hosts_on_a_switch
 from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hosts
 
 from backbone.bus.clock import MissionClock
@@ -118,6 +120,19 @@ def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_b
         for host in ("near", "far"):  # the offers go on: a copy of the new run's secret is all they need
             mission.copy_the_secret_to(host)
         mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 60.0)
+
+
+def test_two_copies_on_two_machines_are_seen(tmp_path: Path) -> None:
+    """The watch over copies, which finds none elsewhere, finds those that are there."""
+    with hosts_on_a_switch(tmp_path, "near", "far") as hosts:
+        copy = tmp_path / "watcher"
+        shutil.copy(shutil.which("sleep") or "", copy)
+        with Copies(hosts) as copies:
+            sleeping = [host.start([str(copy), "1"], dict(os.environ)) for host in hosts.values()]
+            for process in sleeping:
+                process.wait()
+        assert set(copies.longest_s) == {"watcher"}
+        assert 0.5 < copies.longest_s["watcher"] < 2.0
 
 
 async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
