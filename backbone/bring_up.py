@@ -105,8 +105,8 @@ class Observer(Protocol):
     def done(self, step: str, took_s: float) -> None:
         """Take note that this step is done after these seconds of the machine."""
 
-    def told(self, line: str) -> None:
-        """Take note of what a person should know or do now."""
+    def announce(self, line: str) -> None:
+        """Show a person what to know or do now."""
 
     def connected(self, bus: Bus) -> None:
         """Listen to what the mission says; the hub is up, nothing else is."""
@@ -215,11 +215,11 @@ class Launcher(Component[NoParameters]):
     async def _wait_for_other_hosts(self) -> None:
         """Return as soon as every declared machine has its creator in the mission."""
         if self._others.missing:
-            self._observer.told(
+            self._observer.announce(
                 f"the mission's secret, for its other hosts: {Path(self.launch.run_directory) / SECRET_NAME}"
             )
         for host in self._others.missing:
-            self._observer.told(
+            self._observer.announce(
                 f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
             )
         while self._others.missing:
@@ -338,7 +338,7 @@ class Launcher(Component[NoParameters]):
                     self._others_changed.clear()
                     await self._others_changed.wait()
         for offer in self._others.offering:
-            self._observer.told(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
+            self._observer.announce(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
 
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:

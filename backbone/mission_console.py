@@ -50,7 +50,7 @@ class ConsoleObserver:
         """Print the step with its time."""
         self.tell(f"  ✓ {step:<42} {took_s * 1000:7.0f} ms")
 
-    def told(self, line: str) -> None:
+    def announce(self, line: str) -> None:
         """Print the line."""
         self.tell(f"  {line}")
 

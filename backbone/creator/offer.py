@@ -1,4 +1,4 @@
-"""Offer this machine to a mission elsewhere: keep the mission's creator here until told to stop.
+"""Offer this machine to a mission elsewhere: keep the mission's creator here until it is ordered to stop.
 
 The offer outlives the link. If the link to the hub is down for ``CUT_OFF_S``, the creator and all it started end;
 then the offer tries to reach the hub again, and begins a new creator with the mission's clock asked anew. It ends
@@ -47,7 +47,7 @@ DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeate
 class Ending(StrEnum):
     """Why an offer's life ended."""
 
-    TOLD = "told to end"
+    ORDERED = "ordered to end"
     CUT_OFF = "the link to the mission was lost"
     OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
 
@@ -68,7 +68,7 @@ class Offer(Component[NoParameters]):
         self._creator, self._on_ready = creator, on_ready
         creator.on_fell, creator.on_changed = self._creator_fell, self.changed
         self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
-        self.ending = Ending.TOLD
+        self.ending = Ending.ORDERED
 
     async def connect(self) -> None:
         """Have the creator running, or end meanwhile because the link is lost."""
@@ -148,7 +148,7 @@ class Offering:
         self._offered, self._say, self._secret_file = offered, say, secret_file
         self._current: Offer | None = None
         self._lives: asyncio.Task[None] | None = None
-        self._is_told_to_end = self._was_in_the_mission = False
+        self._is_ordered_to_end = self._was_in_the_mission = False
         self._said = ""
 
     async def run(self) -> None:
@@ -164,12 +164,12 @@ class Offering:
         try:
             await self._lives
         except asyncio.CancelledError:
-            if not self._is_told_to_end:
+            if not self._is_ordered_to_end:
                 raise
 
     def end(self) -> None:
         """Have ``run`` return when nothing runs here any more."""
-        self._is_told_to_end = True
+        self._is_ordered_to_end = True
         if self._current is not None:
             self._current.end("by a signal")
         elif self._lives is not None:
@@ -187,11 +187,11 @@ class Offering:
                     raise
                 self._say_once(f"{refusal}; trying again, end with Ctrl-C")
             else:
-                if offer.ending is Ending.TOLD:
+                if offer.ending is Ending.ORDERED:
                     return
                 self._say_once(f"{offer.ending}: all that ran here has ended; trying to reach the mission again")
                 pause_s = PAUSE_FIRST_S
-            if self._is_told_to_end:
+            if self._is_ordered_to_end:
                 return
             await machine.sleep_s(pause_s)
             pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)

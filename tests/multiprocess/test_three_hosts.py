@@ -184,3 +184,15 @@ def test_a_host_that_dies_and_is_back_gets_its_components_again(tmp_path: Path, 
         print(f"dead for {away_s} s: whole {took_s:.1f} s after it is back, copies {dict(copies.longest_s)}")
         assert took_s < HEALED_WITHIN_S, mission.story()
         assert mission.components()["scout2"]["host"] == "far"
+
+
+def test_a_detached_up_waits_too_and_returns_when_all_is_ready(tmp_path: Path) -> None:
+    with machines(tmp_path, "--detach") as mission:
+        for host in ("near", "far"):
+            assert mission.up.process.poll() is None
+            mission.type_what_up_prints(host)
+        assert mission.up.process.wait(60) == 0, mission.story()
+        mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 5.0)
+        assert mission.type_on_base("scout-backbone", "down", "--mission", NAME).returncode == 0, mission.story()
+        assert [offer.process.wait(10) for offer in mission.offers.values()] == [0, 0]
+        mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)

@@ -219,13 +219,13 @@ def mission_text(hosts: dict[str, NetworkHost]) -> str:
 
 
 @contextlib.contextmanager
-def machines(folder: Path) -> Iterator[ThreeHosts]:
-    """Give three machines, with ``up`` typed on base; nothing of them is left afterwards."""
+def machines(folder: Path, *options: str) -> Iterator[ThreeHosts]:
+    """Give three machines, with ``up`` and these options typed on base; nothing of them is left afterwards."""
     with hosts_on_a_switch(folder, "base", "near", "far") as hosts:
         file = hosts["base"].folder / "mission.xml"
         file.write_text(mission_text(hosts))
         mission = ThreeHosts(hosts, {**os.environ, MARK: uuid.uuid4().hex}, file)
-        mission.type_up()
+        mission.type_up(*options)
         try:
             yield mission
         finally:

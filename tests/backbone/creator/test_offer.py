@@ -171,7 +171,7 @@ async def test_the_launcher_ends_it_and_its_token_falls_when_nothing_runs_here(o
         listed = await scene.tester.ask("backbone/offer-far", ListProcesses(), Processes, within_s=WITHIN_S)
         assert [process.spawn.name for process in listed.processes] == ["creator-far"]
         await scene.tester.ask("backbone/offer-far", Stop("the mission ends"), Stopping, within_s=WITHIN_S)
-        assert await scene.ends() is Ending.TOLD
+        assert await scene.ends() is Ending.ORDERED
         await asyncio.wait_for(fallen.wait(), WITHIN_S)
         assert ran_at_the_fall == [False]
 
