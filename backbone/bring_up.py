@@ -26,6 +26,7 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.companion import Companion
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, Stop, Stopping
@@ -44,6 +45,7 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.door import SECRET_NAME, secret_of
 from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.health_watch import HealthWatch
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
 from backbone.mission_picture import LAUNCHER
@@ -55,7 +57,7 @@ from backbone.other_hosts import OtherHosts, door_for_others
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.preconditions import make_door, refuse_if_up, refuse_trace
+from backbone.preconditions import make_door, refuse_if_up
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -136,6 +138,8 @@ class Launcher(Component[NoParameters]):
         self._keeper, self._description, self._options, self._observer = keeper, description, options, observer
         self._began_s = began_s
         self._wishes: list[Wish] = []
+        self._awaited: set[str] = set()
+        self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
         self.outcome = Outcome()
         self._others = OtherHosts(description, clock.now_s())
         self._others_changed = asyncio.Event()
@@ -151,7 +155,8 @@ class Launcher(Component[NoParameters]):
         self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
 
     async def serve(self) -> None:
-        """Start the mission through the placer, then let it run."""
+        """Start the mission through the placer, then let it run; publish its health meanwhile."""
+        self.start_task(self._health_watch.run(), "health")
         try:
             await self._start_mission()
         except BackboneError as error:
@@ -185,13 +190,22 @@ class Launcher(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return core services, components and machines of the mission file that are wanted and missing."""
+        """Return what is missing of the mission file: core services, components, machines; and what its look missed."""
+        return [*self._own_absences(), *self._health_watch.absences()]
+
+    def _own_absences(self) -> list[Absence]:
         core = [msgspec.structs.replace(absence, vital=True) for absence in self._keeper.absences()]
         mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
         if self.outcome.ready_after_s is None:
-            name = self._description.name
-            mission.append(Absence(name, 0.0, "the mission is coming up", "its components are being started"))
+            mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
         return [*core, *mission, *self._others.absences()]
+
+    def _being_started(self) -> str:
+        """Return which components the start waits for, and what they say they are doing."""
+        processes = self._health_watch.picture.processes
+        doing = {name: processes[name].doing for name in self._awaited if name in processes}
+        starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._awaited)]
+        return f"starts {', '.join(starts)}" if starts else "starts its services"
 
     async def drain(self) -> None:
         """Stop the mission in reverse order of its start, then the core services but the nameserver."""
@@ -256,24 +270,33 @@ class Launcher(Component[NoParameters]):
         await asyncio.gather(*placed)
 
     async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
-        """Fulfill one wish of the mission file until the component is ordered to stop."""
+        """Fulfill one wish of the mission file; an order to stop suspends it until the component is started again."""
 
         def now_placed(_placement: Placement, _was_there: bool) -> None:
+            self._awaited.discard(order.name)
             if not placed.done():
                 placed.set_result(None)
 
-        wish = Wish(order.name)
-        self._wishes.append(wish)
+        self._awaited.add(order.name)
         subsystem = next(each.subsystem for each in self._description.types if each.name == order.type)
-        try:
-            stopped = await self._keep_placed(wish, order, address(subsystem, order.name), now_placed)
-        except Refusal as refusal:
-            placed.set_exception(refusal)
-            return
-        finally:
-            placed.cancel()
-        self._wishes.remove(wish)
-        self.tell(order.name, f"is not wanted any more: {stopped}")
+        component = address(subsystem, order.name)
+        while True:
+            wish = Wish(order.name, started=placed.done())
+            self._wishes.append(wish)
+            try:
+                stopped = await self._keep_placed(wish, order, component, now_placed)
+            except Refusal as refusal:
+                placed.set_exception(refusal)
+                return
+            finally:
+                placed.cancel()
+                self._wishes.remove(wish)
+            self.tell(order.name, f"is not wanted any more: {stopped}")
+            again = Companion(self.bus, component)
+            try:
+                await again.wait_there()
+            finally:
+                again.close()
 
     async def _keep_placed(
         self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
@@ -361,12 +384,15 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
 
     Raises:
         MissionAlreadyUp: A mission of this name runs on this machine.
+        RunFolderUnusable: Its files cannot be written.
+        TraceUnwritable: Its trace cannot be written.
         BackboneError: The nameserver could not be started.
     """
     began_s = time.monotonic()
     refuse_if_up(description.name)
-    refuse_trace(options.trace)
-    directory = run_files.make_directory(description.name)
+    if options.trace is not None:
+        run_files.require_writable(options.trace)
+    directory = run_files.prepare(description.name)
     try:
         endpoint = make_door(description, directory)
         clock = MissionClock(began_s, options.speed)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import sys
-from collections.abc import Awaitable, Callable
-from contextlib import AbstractAsyncContextManager
+from collections.abc import Awaitable, Callable, Iterable
+from contextlib import AbstractAsyncContextManager, suppress
 from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import Annotated, Any
 import typer
 
 from backbone.errors import BackboneError, LinkError, Refusal, code_of
+from backbone.printable import printable_lines
 
 
 class ExitCode(IntEnum):
@@ -46,6 +48,10 @@ app = typer.Typer(
 
 EXPERIMENTS = "mission_control.experiments.cli"
 SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
+LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to work out
+LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer one is a slip of the hand
+MOST_SEEDS = 1_000_000  # chosen: a day of work
+LARGEST_SEED = 2**32 - 1  # as numpy has it
 PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
 
 MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
@@ -61,7 +67,17 @@ SecretFile = Annotated[
         help="File with the mission's secret, with --connect; '-' reads it from standard input.",
     ),
 ]
+NameOrCause = Annotated[
+    str, typer.Argument(help="A name, an address, or a cause as stories show it: backbone/rc_manager#112.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse what is no number, which no range refuses; for options with a range."""
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
+    return value
 
 
 def main() -> None:
@@ -73,8 +89,26 @@ def main() -> None:
 
 
 def say(line: str) -> None:
-    """Talk to the person."""
-    print(line, file=sys.stderr, flush=True)
+    """Talk to the person, printable; the command goes on also if that cannot be written."""
+    with suppress(OSError):
+        print(printable_lines(line), file=sys.stderr, flush=True)
+
+
+def show(lines: Iterable[str]) -> None:
+    """Print data on stdout, printable and whole."""
+    for line in lines:
+        print(printable_lines(line, most=sys.maxsize), flush=True)
+
+
+def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
+    """Return what a person reads of an error that ended a command, and the command's exit code."""
+    match error:
+        case Refusal():
+            code = ExitCode.NO_BACKBONE if code_of(error).startswith("run.") else ExitCode.REFUSED
+            return f"refused [{code_of(error)}]: {error}", code
+        case LinkError():
+            return f"no answer: {error} (is the mission up? see 'scout-backbone status')", ExitCode.NO_BACKBONE
+    return str(error), ExitCode.UNEXPECTED
 
 
 def run(work: Callable[[], Awaitable[int]]) -> None:
@@ -87,15 +121,9 @@ def run(work: Callable[[], Awaitable[int]]) -> None:
     try:
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             code = runner.run(guarded())
-    except Refusal as refusal:
-        say(f"refused [{code_of(refusal)}]: {refusal}")
-        code = ExitCode.NO_BACKBONE if code_of(refusal).startswith("run.") else ExitCode.REFUSED
-    except LinkError as error:
-        say(f"no answer: {error} (is the mission up? see 'scout-backbone status')")
-        code = ExitCode.NO_BACKBONE
     except BackboneError as error:
-        say(str(error))
-        code = ExitCode.UNEXPECTED
+        line, code = complaint_of(error)
+        say(line)
     raise typer.Exit(int(code))
 
 
@@ -146,7 +174,10 @@ def check(
         bool, typer.Option("--dry-run", help="Also work out placement and the first minute of the schedule.")
     ] = False,
     for_s: Annotated[
-        float | None, typer.Option("--for", min=0.1, help="Mission seconds of the dry run; default: 60.")
+        float | None,
+        typer.Option(
+            "--for", min=0.1, max=LONGEST_DRY_RUN_S, callback=finite, help="Mission seconds of the dry run; or 60."
+        ),
     ] = None,
     trace: Annotated[
         Path | None, typer.Option("--trace", help="Write the dry run's scheduling decisions, JSON lines.")
@@ -172,7 +203,7 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
     from backbone.dry_run_screen import screen
 
     dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
-    Console(width=None if sys.stdout.isatty() else PIPE_WIDTH).print(screen(dry))
+    Console(width=_width(), markup=False, emoji=False).print(screen(dry))
     if trace is not None:
         try:
             dry.write_trace(trace)
@@ -198,9 +229,14 @@ def up(
     mission_file: MissionFile,
     headless: Annotated[bool, typer.Option("--headless", help="No live picture; one line a step.")] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Return when all is ready; the mission goes on.")] = False,
-    speed: Annotated[float, typer.Option("--speed", min=0.01, max=100.0, help="Mission seconds a second.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option("--speed", min=0.01, max=100.0, callback=finite, help="Mission seconds a second.")
+    ] = 1.0,
     trace: Annotated[Path | None, typer.Option("--trace", help="Write every scheduling decision, JSON lines.")] = None,
-    for_s: Annotated[float | None, typer.Option("--for", min=0.0, help="End after these mission seconds.")] = None,
+    for_s: Annotated[
+        float | None,
+        typer.Option("--for", min=0.0, max=LONGEST_MISSION_S, callback=finite, help="End after these mission seconds."),
+    ] = None,
     tell_fd: Annotated[int | None, typer.Option("--tell-fd", hidden=True)] = None,
 ) -> None:
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
@@ -211,10 +247,11 @@ def up(
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
     from backbone.core_launches import UpOptions
     from backbone.mission_console import bring_up_on_console
+    from backbone.verdict import VerdictPipe
 
     options = UpOptions(speed=speed, trace=trace, for_s=for_s)
-    ready_to = os.fdopen(tell_fd, "w", encoding="utf-8") if tell_fd is not None else None
-    run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), ready_to=ready_to))
+    verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
+    run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), verdict=verdict))
 
 
 @app.command()
@@ -225,37 +262,23 @@ def status(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Show components by subsystem, who holds which resource, and the schedule."""
+    """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
 
     async def work() -> int:
-        from rich.console import Console
-        from rich.live import Live
+        from backbone.status import Shown, show_status
 
-        from backbone.mission_picture import look
-        from backbone.mission_screen import live_screen, screen
-
-        async with visiting(mission, connect, secret_file) as (bus, clock):
-            if as_json:
-                print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
-                while watch:
-                    await clock.sleep_s(clock.rate)
-                    print(json.dumps((await look(bus, clock.now_s())).to_json()), flush=True)
-                return ExitCode.DONE
-            console = Console(width=None if sys.stdout.isatty() else PIPE_WIDTH)
-            if not watch:
-                console.print(screen(await look(bus, clock.now_s())))
-                return ExitCode.DONE
-            with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
-                while True:
-                    live.update(live_screen(await look(bus, clock.now_s()), None, console.height), refresh=True)
-                    await clock.sleep_s(0.5 * clock.rate)
+        if connect is not None and mission is None:
+            raise typer.BadParameter("--connect needs --mission NAME")
+        source = f"ui_console/cli-{os.getpid()}"
+        secret = read_secret_option(secret_file) if connect is not None else ""
+        return await show_status(mission, connect, source, Shown(as_json=as_json, watch=watch, width=_width()), secret)
 
     run(work)
 
 
 @app.command()
 def why(
-    name: str,
+    name: NameOrCause,
     as_json: AsJson = False,
     mission: MissionName = None,
     connect: Endpoint = None,
@@ -267,11 +290,8 @@ def why(
         from backbone.reasons import reasons_for
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
-            reasons = await reasons_for(bus, name)
-            if as_json:
-                print(json.dumps(reasons.to_json()))
-            else:
-                print("\n".join(reasons.lines(clock.now_s())))
+            reasons = await reasons_for(bus, name, clock)
+            show([json.dumps(reasons.to_json())] if as_json else reasons.lines(clock.now_s()))
         return ExitCode.DONE
 
     run(work)
@@ -279,7 +299,7 @@ def why(
 
 @app.command()
 def story(
-    name: str,
+    name: NameOrCause,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
@@ -289,10 +309,17 @@ def story(
     async def work() -> int:
         from backbone.reasons import story_of
 
-        async with visiting(mission, connect, secret_file) as (bus, _clock):
-            for event in await story_of(bus, name):
-                cause = f"   because of {event.cause}" if event.cause else ""
-                print(f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}")
+        async with visiting(mission, connect, secret_file) as (bus, clock):
+            told = await story_of(bus, name, clock)
+        for event in told.events:
+            cause = f"   because of {event.cause}" if event.cause else ""
+            show([f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}"])
+        if not told.events:
+            say(f"no component has an event about {name}")
+        if told.missing:
+            say(f"incomplete: {len(told.missing)} did not tell their part")
+            for missing in told.missing:
+                say(f"  {missing}")
         return ExitCode.DONE
 
     run(work)
@@ -317,11 +344,16 @@ def start(
         from backbone.naming import component_of
         from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Start, Started
+        from backbone.placer.wishes import START_WITHIN_S
+        from backbone.start_by_hand import completed
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
-            started = await bus.ask(ADDRESS, Start(type_, name, parameters, host), Started, within_s=60.0)
+            order, remark = await completed(bus, Start(type_, name, parameters, host))
+            started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
+            if remark:
+                say(remark)
             tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
-            print(f"{started.address} on {started.host}, process {started.pid}")
+            show([f"{started.address} on {started.host}, process {started.pid}"])
             for reason in started.reasons:
                 say(reason)
         return ExitCode.DONE
@@ -345,7 +377,7 @@ def stop(
         async with visiting(mission, connect, secret_file) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
             tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
-            print(f"{name} ended by {ended.by}")
+            show([f"{name} ended by {ended.by}"])
         return ExitCode.DONE
 
     run(work)
@@ -382,7 +414,7 @@ def set_(
                     lines = [json.dumps(shown.to_json())]
                 else:
                     lines = shown.lines() if parameter is None else shown.of(parameter)
-            print("\n".join(lines))
+            show(lines)
         return ExitCode.DONE
 
     run(work)
@@ -425,8 +457,8 @@ def creator(
 
 @app.command()
 def simulate(
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="How many missions.")] = 100,
-    first: Annotated[int, typer.Option("--first", min=0, help="Seed of the first.")] = 0,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, max=MOST_SEEDS, help="How many missions.")] = 100,
+    first: Annotated[int, typer.Option("--first", min=0, max=LARGEST_SEED, help="Seed of the first.")] = 0,
     chaos: Annotated[
         bool, typer.Option("--chaos", help="Lose, delay and double messages, cut off and kill components.")
     ] = False,
@@ -446,6 +478,11 @@ def simulate(
 def experiment(context: typer.Context) -> None:
     """Run the papers' experiments on simulated robots: 'surveillance', 'load'; see 'experiment --help'."""
     import_module(EXPERIMENTS).run(context.args)
+
+
+def _width() -> int | None:
+    """Return how wide tables are; None: as the terminal."""
+    return None if sys.stdout.isatty() else PIPE_WIDTH
 
 
 def _parameter(given: str) -> tuple[str, Any]:

@@ -18,12 +18,16 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.cli import ExitCode, say
 from backbone.errors import LinkError
 from backbone.operators import OperatorAction, tell_acted
+from backbone.verdict import await_verdict
 
 ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
 
 
 def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
-    """Start a launcher in a session of its own; return 0 when all is ready, else how it ended."""
+    """Start a launcher in a session of its own; return 0 when all is ready, else how its mission failed.
+
+    The launcher's verdict alone decides: that its process still lives proves nothing, because it cleans up.
+    """
     told, telling = os.pipe()
     command = [sys.executable, "-m", "backbone.cli", "up", str(mission_file.absolute()), "--headless"]
     command += ["--tell-fd", str(telling), "--speed", str(speed)]
@@ -38,13 +42,29 @@ def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path |
         pass_fds=[telling],
     )
     os.close(telling)
-    with os.fdopen(told, encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            say(line.rstrip())
-    if launcher.poll() is None:
+    try:
+        with os.fdopen(told, encoding="utf-8", errors="replace") as lines:
+            exit_code = await_verdict(lines, say)
+    except KeyboardInterrupt:
+        launcher.send_signal(signal.SIGTERM)  # it cleans up by itself
+        raise
+    if exit_code is None:
+        return _died(launcher)
+    if exit_code == ExitCode.DONE:
         say(f"mission {mission} goes on as process {launcher.pid}; end it: scout-backbone down --mission {mission}")
-        return ExitCode.DONE
-    return launcher.wait()
+    return exit_code
+
+
+def _died(launcher: subprocess.Popen[bytes]) -> int:
+    """Return the exit code for a launcher whose pipe ended without a verdict."""
+    try:
+        ended = launcher.wait(KILL_S)
+    except subprocess.TimeoutExpired:
+        say(f"the launcher, process {launcher.pid}, gave no verdict and does not end")
+        return ExitCode.MISSION_FAILED
+    how = signal.Signals(-ended).name if ended < 0 else f"exit code {ended}"
+    say(f"the launcher ended without a verdict: {how}")
+    return ended if ended > 0 else ExitCode.MISSION_FAILED
 
 
 async def take_down(mission: str | None) -> int:
@@ -52,6 +72,9 @@ async def take_down(mission: str | None) -> int:
     found = run_files.find(mission)
     launcher = psutil.Process(found.launcher_pid)
     waiting = os.pidfd_open(launcher.pid)
+    if launcher.status() == psutil.STATUS_STOPPED:
+        say(f"the launcher, process {launcher.pid}, was stopped; it is continued so that it can end its mission")
+        launcher.send_signal(signal.SIGCONT)
     try:
         for what, seconds, act in (
             ("asking", ASKED_S, None),

@@ -14,12 +14,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
 from backbone.component.messages import Absence, ComponentState
+from backbone.ranges import MANY
+from backbone.wire import Message
 
+LOOK_EVERY_S = 0.5  # chosen: an absence is shown within two looks; machine seconds
+SAY_EVERY_S = 1.0  # chosen: one small message a second from one process; machine seconds
+SILENT_AFTER_S = 2.0  # chosen: two messages of the launcher were missed; machine seconds
 FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery that is an aim (a killed creator, 5 s)
 
 
@@ -29,6 +34,18 @@ class HealthWord(StrEnum):
     OK = "ok"
     DEGRADED = "degraded"
     FAILED = "failed"
+
+
+class MissionHealth(Message, frozen=True):
+    """Published by the launcher on every change, and every ``SAY_EVERY_S`` so that its silence is noticed.
+
+    Attributes:
+        word: The verdict.
+        absent: What is wanted and absent: vital components first, then by name.
+    """
+
+    word: HealthWord
+    absent: Annotated[list[Absence], MANY] = []
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +63,10 @@ class Health:
     def lines(self, now_s: float) -> list[str]:
         """Return one line for each absent component, for people."""
         return [line(absence, now_s) for absence in self.absent]
+
+    def to_message(self) -> MissionHealth:
+        """Return the message that says so."""
+        return MissionHealth(self.word, list(self.absent))
 
     def to_json(self) -> dict[str, Any]:
         """Return ``health`` and ``absent`` as plain data."""

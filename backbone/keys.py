@@ -30,6 +30,7 @@ class Conversation(StrEnum):
     SCHEDULE = "schedule"  # the RC manager's decisions and leases
     LEASES = "leases"  # the RC manager's renewals of what is held
     BEAT = "beat"  # heartbeats of ARCs: their loop runs, and their owner's
+    HEALTH = "health"  # the launcher's verdict on the whole mission
     CLOCK = "clock"
     LOG = "log"
 

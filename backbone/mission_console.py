@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
 from collections import deque
-from typing import Any, TextIO
+from typing import IO, Any
 
 from rich.console import Console
 from rich.live import Live
+from rich.text import Text
 
 from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
-from backbone.cli import ExitCode
+from backbone.cli import ExitCode, complaint_of
 from backbone.component.messages import StoryEvent
 from backbone.core_launches import UpOptions
 from backbone.errors import BackboneError, LinkError, Refusal
+from backbone.health import HealthWord, MissionHealth, line
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
-from backbone.mission_picture import holders_line, look
+from backbone.mission_picture import LAUNCHER, MissionPicture, holders_line, look
 from backbone.mission_screen import live_screen
 from backbone.operators import OperatorActed
+from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
+from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows
+PROGRESS_EVERY_S = 2.0  # chosen: an ordinary start is over by then
 REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds; more costs a core that the mission needs
 
 
@@ -35,13 +41,14 @@ class ConsoleObserver:
     Args:
         console: Where to.
         live: True: a picture that is redrawn; False: lines.
-        ready_to: Told the same lines until all is ready, then closed: the one who waits for that.
+        verdict: Pipe to the command that waits until all is ready; None: no command waits.
     """
 
-    def __init__(self, console: Console, *, live: bool, ready_to: TextIO | None = None) -> None:
-        self._console, self._live, self._ready_to = console, live, ready_to
+    def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
+        self._console, self._live, self._verdict = console, live, verdict
         self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
-        self._told = ""
+        self._told = self._health_told = ""
+        self._is_up, self._last_progress_s = False, 0.0
 
     def began(self, step: str) -> None:
         """Say nothing yet: a step that hangs is named by ``Outcome.failure``."""
@@ -55,25 +62,30 @@ class ConsoleObserver:
         self.tell(f"  {line}")
 
     def connected(self, bus: Bus) -> None:
-        """Listen to what components tell people."""
+        """Listen to what components tell people, and to the mission's health."""
+        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
 
     def tell(self, line: str) -> None:
-        """Print one line, also to whoever waits for readiness."""
+        """Print one line, also for the command that waits until all is ready."""
         self._print(line)
-        if self._ready_to is not None:
-            print(line, file=self._ready_to, flush=True)
+        if self._verdict is not None:
+            self._verdict.talk(line)
+
+    def decide(self, exit_code: int) -> None:
+        """Give the command that waits its exit code, unless it has one."""
+        if self._verdict is not None:
+            self._verdict.decide(exit_code)
 
     def _print(self, line: str) -> None:
-        self._console.print(line, highlight=False, markup=False, soft_wrap=True)
+        _tell_if_possible(printable_lines(line), self._console.file)
 
     async def up(self, bus: Bus, clock: Clock) -> None:
         """Show the mission until cancelled."""
         self.tell("all ready; end with Ctrl-C or 'scout-backbone down'")
-        if self._ready_to is not None:
-            self._ready_to.close()
-            self._ready_to = None
+        self.decide(ExitCode.DONE)
+        self._is_up = True
         if self._live:
             await self._show_live(bus, clock)
         else:
@@ -82,21 +94,45 @@ class ConsoleObserver:
 
     async def _show_live(self, bus: Bus, clock: Clock) -> None:
         console = self._console
+        picture: MissionPicture | None = None
         with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
             while True:
                 try:
-                    picture = await look(bus, clock.now_s())
+                    picture = await look(bus, clock.now_s(), before=picture, rate=clock.rate)
                     live.update(live_screen(picture, self._events, console.height), refresh=True)
                 except LinkError as error:
-                    live.update(f"the nameserver does not answer: {error}", refresh=True)
+                    live.update(Text(f"the nameserver does not answer: {error}"), refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
+    def _heard_health(self, envelope: Envelope[Any]) -> None:
+        heard: MissionHealth = printable_all(envelope.body)
+        if not self._is_up:
+            self._heard_while_coming_up(heard, envelope.stamp_s)
+            return
+        told = f"health {heard.word}"
+        names = ", ".join(absence.name for absence in heard.absent)
+        if (told := f"{told}: {names}" if names else told) == self._health_told or self._live:
+            return
+        is_first, self._health_told = not self._health_told, told
+        if is_first and heard.word is HealthWord.OK:
+            return
+        self._print(f"{envelope.stamp_s:9.2f} s  health {heard.word}")
+        for absence in heard.absent:
+            self._print(f"{'':9}    {line(absence, envelope.stamp_s)}")
+
+    def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
+        """Say every now and then what a start that takes long waits for."""
+        if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
+            self._last_progress_s = at_s
+            for absence in heard.absent:
+                self.tell(f"  … {line(absence, at_s)}")
+
     def _heard_act(self, envelope: Envelope[Any]) -> None:
-        act: OperatorActed = envelope.body
+        act: OperatorActed = printable_all(envelope.body)
         self._show_event(StoryEvent(act.at_s, envelope.source, act.sentence, act.subject, envelope.cause))
 
     def _heard_event(self, envelope: Envelope[Any]) -> None:
-        self._show_event(envelope.body)
+        self._show_event(printable_all(envelope.body))
 
     def _show_event(self, event: StoryEvent) -> None:
         self._events.append(event)
@@ -113,23 +149,32 @@ class ConsoleObserver:
             self._print(f"{schedule.at_s:9.2f} s  {line}")
 
 
+def _tell_if_possible(line: str, file: IO[str]) -> None:
+    """Print the line; a mission goes on also when its disk is full or nobody reads any longer."""
+    with contextlib.suppress(OSError):
+        print(line, file=file, flush=True)
+
+
 async def bring_up_on_console(
-    description: MissionDescription, options: UpOptions, *, live: bool, ready_to: TextIO | None = None
+    description: MissionDescription, options: UpOptions, *, live: bool, verdict: VerdictPipe | None = None
 ) -> int:
     """Run the mission, tell a person about it, and return the exit code."""
-    console = Console(file=sys.stdout if live else sys.stderr)
-    observer = ConsoleObserver(console, live=live, ready_to=ready_to)
+    console = Console(file=sys.stdout if live else sys.stderr, markup=False, emoji=False)
+    observer = ConsoleObserver(console, live=live, verdict=verdict)
     observer.tell(f"mission {description.name} comes up")
     try:
         outcome = await run_mission(description, options, observer)
     except (Refusal, LinkError) as error:
         observer.tell(f"could not be started: {error}")
+        observer.decide(complaint_of(error)[1])
         raise
     except BackboneError as error:
         outcome = Outcome(failure=error)
-    for line in last_lines(outcome):
-        observer.tell(line)
-    return ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
+    for last in last_lines(outcome):
+        observer.tell(last)
+    code = ExitCode.DONE if outcome.went_well else ExitCode.MISSION_FAILED
+    observer.decide(code)
+    return code
 
 
 def last_lines(outcome: Outcome) -> list[str]:

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.health import HealthWord
 from backbone.mission_picture import MissionPicture
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.messages import RcView, RequestState, RequestView, Schedule
@@ -27,6 +28,8 @@ _STATE_STYLE = {
 }
 
 
+_HEALTH_STYLE = {HealthWord.OK: "bold green", HealthWord.DEGRADED: "bold yellow", HealthWord.FAILED: "bold red"}
+_TROUBLES_SHARE = 4  # chosen: a quarter of the terminal; the rest still shows components and events
 _FRAME_LINES = 2  # a panel's upper and lower edge
 _EVENTS_MOST = 12  # chosen: more than a glance takes in would push components off the picture
 _EVENTS_LEAST = 3
@@ -43,9 +46,11 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, he
         events: Newest last; as many of the newest are shown as there is room for. None: nobody listens to them.
         height: Lines of the terminal.
     """
-    head = Text(f"mission {picture.mission}  {picture.at_s:8.1f} s", style="bold", no_wrap=True)
+    head = _head(picture)
     head.append(f"   {_how_many(picture)}", style="not bold")
-    problems = [Text(problem, style="red", no_wrap=True, overflow="ellipsis") for problem in picture.problems]
+    problems = _troubles(picture)
+    if len(problems) > (most := max(1, height // _TROUBLES_SHARE)):
+        problems = [*problems[: most - 1], Text(f"… and {len(problems) - most + 1} more: see status", style="red")]
     components = _component_lines(picture)
     right: list[RenderableType] = []
     right_lines = 0
@@ -67,6 +72,26 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, he
     body.add_column(ratio=1)
     body.add_row(_panel("components", components), Group(*right))
     return Group(head, *problems, body, *foot)
+
+
+def _head(picture: MissionPicture) -> Text:
+    word = picture.health.word
+    head = Text(f"mission {picture.mission}  {picture.at_s:8.1f} s   ", style="bold", no_wrap=True)
+    head.append(f"health {word}", style=_HEALTH_STYLE[word])
+    if picture.stale_since_s is not None:
+        head.append(f"   OLD PICTURE, of {picture.stale_since_s:.1f} s", style="bold red")
+    return head
+
+
+def _troubles(picture: MissionPicture) -> list[Text]:
+    """Return what is absent, which stops are in force, and what the picture lacks, one line each."""
+    style = _HEALTH_STYLE[picture.health.word]
+    lines = [Text(line, style=style) for line in picture.health.lines(picture.at_s)]
+    lines += [Text(line, style="bold red") for line in picture.stop_lines()]
+    lines += [Text(line, style="red") for line in picture.remarks()]
+    for line in lines:
+        line.no_wrap, line.overflow = True, "ellipsis"
+    return lines
 
 
 def _how_many(picture: MissionPicture) -> str:
@@ -143,17 +168,18 @@ def _event_line(event: StoryEvent) -> Text:
 
 
 def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> RenderableType:
-    """Return the whole picture: components, holders, schedule, newest events, problems."""
-    parts: list[RenderableType] = [
-        Text(f"mission {picture.mission}   {picture.at_s:8.1f} s", style="bold"),
-        components_table(picture),
-    ]
+    """Return the whole picture: health and what is absent first, then components, holders, schedule, newest events."""
+    troubles = _troubles(picture)
+    for line in troubles:
+        line.no_wrap = False
+    parts: list[RenderableType] = [_head(picture), *troubles]
+    if picture.components:
+        parts.append(components_table(picture))
     if picture.schedule is not None:
         parts += [rcs_table(picture.schedule), requests_table(picture.schedule, picture.at_s)]
     newest = list(events)
     if newest:
         parts.append(events_table(newest))
-    parts += [Text(problem, style="red") for problem in picture.problems]
     return Group(*parts)
 
 

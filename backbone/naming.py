@@ -15,6 +15,7 @@ from enum import StrEnum
 from backbone.errors import Refusal
 
 MAX_NAME_LENGTH = 63  # chosen: the longest label of a host name (RFC 1035), names may become host labels
+MAX_PID_DIGITS = 7  # Linux: PID_MAX_LIMIT is 4194304
 _LEGAL = re.compile(rf"[a-z][a-z0-9_-]{{0,{MAX_NAME_LENGTH - 1}}}")
 
 
@@ -65,6 +66,17 @@ def address(subsystem: Subsystem, component: str) -> str:
     return f"{subsystem}/{legal(component)}"
 
 
+def is_component(component_address: str) -> bool:
+    """Say whether a component can have this address.
+
+    Example:
+        >>> is_component("resource_pool/scout1"), is_component("anywhere/scout1"), is_component("backbone/No One")
+        (True, False, False)
+    """
+    subsystem, _, name = component_address.partition("/")
+    return subsystem in list(Subsystem) and is_legal(name)
+
+
 def component_of(component_address: str) -> str:
     """Return the component's name, the last segment of its address."""
     return component_address.rpartition("/")[2]
@@ -92,7 +104,7 @@ def read_claim(claim: str) -> tuple[str, str, int]:
     """
     component_address, _, process = claim.rpartition("/")
     host, _, pid = process.rpartition(".")
-    if not (component_address and host and pid.isdecimal()):
+    if not (is_component(component_address) and host and pid.isdecimal() and len(pid) <= MAX_PID_DIGITS):
         raise IllegalName(f"{claim!r} is not the address of a claim")
     return component_address, host, int(pid)
 

@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from backbone.bus.interface import Bus, Clock
 from backbone.keys import Conversation
+from backbone.ranges import Instant, Mention, Text
 from backbone.wire import Message
 
 
@@ -69,11 +70,11 @@ class OperatorActed(Message, frozen=True):
         at_s: Mission time.
     """
 
-    user: str
+    user: Mention
     action: OperatorAction
-    subject: str
-    detail: str
-    at_s: float
+    subject: Mention
+    detail: Text
+    at_s: Instant
 
     @property
     def sentence(self) -> str:

@@ -25,13 +25,6 @@ class PortTaken(Refusal):
     remedy = "State another port or address at the mission's first host, or stop what listens there."
 
 
-class TraceUnwritable(Refusal):
-    """The file of the schedule trace cannot be opened for writing."""
-
-    code = "run.trace"
-    remedy = "Name a file in a folder that exists and that you may write into."
-
-
 def refuse_if_up(mission: str) -> None:
     """Return if no mission of this name runs on this machine.
 
@@ -45,20 +38,6 @@ def refuse_if_up(mission: str) -> None:
     raise MissionAlreadyUp(
         f"mission {mission} is up since before, launcher process {running.launcher_pid}", pid=running.launcher_pid
     )
-
-
-def refuse_trace(trace: Path | None) -> None:
-    """Return if the trace can be written, or none is wanted.
-
-    Raises:
-        TraceUnwritable: It cannot.
-    """
-    if trace is None:
-        return
-    try:
-        trace.open("a").close()
-    except OSError as error:
-        raise TraceUnwritable(f"{trace}: {error.strerror or error}", file=str(trace)) from error
 
 
 def make_door(description: MissionDescription, directory: Path) -> str:

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from backbone.bus.interface import Bus
-from backbone.component.messages import AskStory, ComponentState, Story, StoryEvent
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import Absence, AskStory, ComponentState, Story, StoryEvent
 from backbone.errors import LinkError, Refusal
+from backbone.health import line
+from backbone.mission_picture import MissionPicture, look, stop_line
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.naming import component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
+from backbone.printable import printable_all
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy, RequestState, UnknownRequest, Why
+from backbone.wire import Message
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
 
@@ -40,16 +46,27 @@ class Reasons:
         why: The RC manager's answer, if it knows the name.
         placement: The placer's answer, if it placed it.
         component: What the component says of itself, if there is one.
+        absence: That it is wanted and absent, if it is.
+        led_to: If the name is a message's: the events that the message led to.
     """
 
     name: str
     why: Why | None
     placement: Placement | None
     component: ComponentState | None
+    absence: Absence | None = None
+    led_to: Sequence[StoryEvent] = ()
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is anything to tell."""
+        return any((self.why, self.placement, self.component, self.absence, self.led_to))
 
     def lines(self, now_s: float) -> list[str]:
         """Return the reasons for people."""
-        lines: list[str] = []
+        lines = [] if self.absence is None else [line(self.absence, now_s)]
+        if self.component is not None and self.component.stop is not None:
+            lines.append(stop_line(self.name, self.component.stop, now_s))
         if self.why is not None:
             lines += [f"{self.name}: {self.why.state}", *(f"  {line}" for line in self.why.lines)]
             if self.why.expected_start_s >= 0:
@@ -67,57 +84,140 @@ class Reasons:
             )
             lines.append(f"{self.name} {where}, wanted by {self.placement.requester}")
             lines += [f"  {reason}" for reason in self.placement.reasons]
+        if self.led_to:
+            lines.append("this message led to:")
+            lines += [f"  {event.at_s:.3f} s  {event.where}  {event.subject}: {event.what}" for event in self.led_to]
         return lines
 
     def to_json(self) -> dict[str, Any]:
         """Return the reasons as plain data."""
-        why, placement = self.why, self.placement
         return {
             "name": self.name,
-            "why": {name: getattr(why, name) for name in why.__struct_fields__} if why else None,
-            "placement": {name: getattr(placement, name) for name in placement.__struct_fields__}
-            if placement
-            else None,
+            "why": _fields(self.why),
+            "placement": _fields(self.placement),
+            "stop": _fields(self.component.stop) if self.component else None,
+            "absent": _fields(self.absence),
         }
 
 
-async def reasons_for(bus: Bus, name: str) -> Reasons:
-    """Ask RC manager, placer and nameserver about the name.
+@dataclass(frozen=True)
+class Asked:
+    """What a name that a person types means.
+
+    Attributes:
+        name: Name of the component, request or resource.
+        message: The message meant, ``<address>#<number>``; empty: none.
+    """
+
+    name: str
+    message: str = ""
+
+    @classmethod
+    def of(cls, text: str) -> Asked:
+        """Return what is meant by a name, an address, or the id of a message as causes show it.
+
+        Example:
+            >>> Asked.of("rc_manager").name, Asked.of("backbone/rc_manager").name
+            ('rc_manager', 'rc_manager')
+            >>> Asked.of("backbone/rc_manager#112")
+            Asked(name='rc_manager', message='backbone/rc_manager#112')
+        """
+        address, number, _ = text.partition("#")
+        return cls(component_of(address), text if number else "")
+
+
+async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
+    """Ask RC manager, placer and nameserver about a name, an address or a message.
 
     Raises:
         UnknownName: None of them knows it.
         LinkError: None of them answered.
     """
-    why, placement, resolved = await asyncio.gather(
+    asked = Asked.of(text)
+    name = asked.name
+    why, placement, resolved, picture, told = await asyncio.gather(
         _or_error(bus, RC_MANAGER, AskWhy(name), Why),
         _or_error(bus, PLACER, AskPlacement(name), Placement),
         _or_error(bus, NAMESERVER, Resolve(name), Resolved),
+        _look_or_none(bus, clock),
+        story_of(bus, text, clock) if asked.message else _nothing_told(),
     )
+    absent = picture.health.absent if picture is not None else ()
     reasons = Reasons(
         name,
         why if isinstance(why, Why) else None,
         placement if isinstance(placement, Placement) else None,
         resolved.component if isinstance(resolved, Resolved) else None,
+        next((absence for absence in absent if absence.name == name), None),
+        told.events,
     )
-    if reasons.why is None and reasons.placement is None and reasons.component is None:
+    if not reasons.is_known:
         errors = (why, placement, resolved)
         raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), resolved)
-    return reasons
+    return printable_all(reasons)
 
 
-async def story_of(bus: Bus, name: str) -> list[StoryEvent]:
-    """Ask every component for the events about the name; return them in the order of their times."""
+@dataclass(frozen=True)
+class Told:
+    """What the components of a mission tell.
+
+    Attributes:
+        events: In the order of their times.
+        missing: Components that did not tell, and why: the events are not all there are.
+    """
+
+    events: Sequence[StoryEvent]
+    missing: Sequence[str] = ()
+
+
+async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
+    """Ask every component for the events about a name, an address or a message.
+
+    Raises:
+        LinkError: The nameserver did not answer: nobody is known who could be asked.
+    """
+    asked = Asked.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    stories = await asyncio.gather(
-        *(_or_error(bus, c.address, _question(c.address, name), Story) for c in listing.components)
+    picture, *stories = await asyncio.gather(
+        _look_or_none(bus, clock),
+        *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
     )
     events = [event for story in stories if isinstance(story, Story) for event in story.events]
-    return sorted(events, key=lambda event: event.at_s)
+    missing = [
+        f"{component.address}: {story}"
+        for component, story in zip(listing.components, stories, strict=True)
+        if not isinstance(story, Story)
+    ]
+    missing += [f"{address}: it did not say yet who it is" for address in listing.unknown]
+    named = {component_of(missed.partition(": ")[0]) for missed in missing}
+    absent = picture.health.absent if picture is not None else ()
+    missing += [f"{each.name}: it is absent, {each.cause}" for each in absent if each.name not in named]
+    if not listing.complete:
+        missing.append("the nameserver began a moment ago: components may be missing in its list")
+    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing))
 
 
-def _question(address: str, name: str) -> AskStory:
-    """Ask the component itself for all it knows, the others for what is about it."""
-    return AskStory() if address.endswith(f"/{name}") else AskStory(name)
+async def _nothing_told() -> Told:
+    return Told(())
+
+
+async def _look_or_none(bus: Bus, clock: Clock) -> MissionPicture | None:
+    """Return how the mission is; None if the nameserver does not answer, which the other questions tell of."""
+    try:
+        return await look(bus, clock.now_s(), rate=clock.rate, schedule=False)
+    except (Refusal, LinkError):
+        return None
+
+
+def _question(address: str, asked: Asked) -> AskStory:
+    """Ask the component itself for all it knows, the others for what is about it; of a message all for its effects."""
+    if asked.message:
+        return AskStory(asked.message)
+    return AskStory() if component_of(address) == asked.name else AskStory(asked.name)
+
+
+def _fields(message: Message | None) -> dict[str, Any] | None:
+    return {name: getattr(message, name) for name in message.__struct_fields__} if message is not None else None
 
 
 async def _or_error(bus: Bus, address: str, question: Any, reply: type[Any]) -> Any:

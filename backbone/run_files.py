@@ -15,12 +15,14 @@ from pathlib import Path
 import msgspec
 import psutil
 
+from backbone.atomic_file import replace_file
 from backbone.door import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 
 FILE_NAME = "run.json"
 ENDED = ".ended-"  # a folder whose mission ends is hidden as .<mission>.ended-<pid of the zygote that removes it>
+TRIAL_BYTES = 1 << 16  # chosen: room for what a mission writes until all is ready, logs included
 START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports a process's start in hundredths, corrected by clock steps
 
 
@@ -69,28 +71,65 @@ class UnsafeDirectory(Refusal):
     remedy = "Set XDG_RUNTIME_DIR to a folder of your own with mode 0700."
 
 
+class RunFolderUnusable(Refusal):
+    """The system does not let the files of a mission be written."""
+
+    code = "run.folder"
+    remedy = "Free the disk, or set XDG_RUNTIME_DIR to a folder of your own that can be written into."
+
+
+class TraceUnwritable(Refusal):
+    """The system does not let the trace be written."""
+
+    code = "run.trace"
+    remedy = "Name a file in a folder that can be written into, on a disk that is not full."
+
+
 def run_directory(mission: str) -> Path:
     """Return the folder of a mission's files; the folder around it exists afterwards, for this user alone.
 
     Raises:
         IllegalName: The mission's name is no legal name.
         UnsafeDirectory: Somebody else could put files there.
+        RunFolderUnusable: The system refused.
     """
     return _directory() / legal(mission)
 
 
-def make_directory(mission: str) -> Path:
-    """Return the folder of a mission's files, which only this user can enter; nothing of a dead run is beside it.
+def prepare(mission: str) -> Path:
+    """Make the folder of a mission's files, find out that it can be written into, and return it.
 
     Raises:
-        IllegalName: The mission's name is no legal name.
         UnsafeDirectory: Somebody else could put files there.
+        RunFolderUnusable: The system refused; the folder is away.
     """
     directory = run_directory(mission)
     _remove_what_dead_zygotes_left(directory)
-    (directory / "log").mkdir(mode=0o700, parents=True, exist_ok=True)
-    directory.chmod(0o700)  # its parents' mode follows the umask
+    try:
+        (directory / "log").mkdir(mode=0o700, parents=True, exist_ok=True)
+        directory.chmod(0o700)
+        trial = directory / ".trial"
+        try:
+            replace_file(trial, bytes(TRIAL_BYTES), is_lasting=False)
+        finally:
+            trial.unlink(missing_ok=True)
+    except OSError as error:
+        shutil.rmtree(directory, ignore_errors=True)
+        raise _unusable(directory, error) from error
     return directory
+
+
+def require_writable(trace: Path) -> None:
+    """Return if the trace can be appended to; what it holds stays, an empty file may be new.
+
+    Raises:
+        TraceUnwritable: It cannot.
+    """
+    try:
+        with trace.open("ab"):
+            return
+    except OSError as error:
+        raise TraceUnwritable(f"{trace}: {error.strerror}", trace=str(trace)) from error
 
 
 def write(run_file: RunFile) -> Path:
@@ -98,13 +137,18 @@ def write(run_file: RunFile) -> Path:
 
     Raises:
         UnsafeDirectory: Somebody else could put files there.
+        RunFolderUnusable: The system refused.
     """
-    directory = make_directory(run_file.mission)
+    directory = run_directory(run_file.mission)
     started_s = psutil.Process(run_file.launcher_pid).create_time()
     content = msgspec.json.encode(msgspec.structs.replace(run_file, launcher_started_s=started_s))
-    path, part = directory / FILE_NAME, directory / f".{FILE_NAME}.{os.getpid()}"
-    part.write_bytes(content)
-    part.replace(path)
+    path = directory / FILE_NAME
+    try:
+        directory.mkdir(mode=0o700, exist_ok=True)
+        directory.chmod(0o700)
+        replace_file(path, content, is_lasting=False)
+    except OSError as error:
+        raise _unusable(directory, error) from error
     return path
 
 
@@ -160,13 +204,20 @@ def _directory() -> Path:
     """Return the folder all run files of this user lie in, made and checked."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{_user()}"
-    if not runtime:
-        base.mkdir(mode=0o700, exist_ok=True)
-        _check_private(base)
     directory = base / "scout-backbone"
-    directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-    _check_private(directory)
+    try:
+        if not runtime:
+            base.mkdir(mode=0o700, exist_ok=True)
+            _check_private(base)
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
+        _check_private(directory)
+    except OSError as error:
+        raise _unusable(directory, error) from error
     return directory
+
+
+def _unusable(directory: Path, error: OSError) -> RunFolderUnusable:
+    return RunFolderUnusable(f"{directory}: {error.strerror or error}", directory=str(directory))
 
 
 def _check_private(directory: Path) -> None:

@@ -9,19 +9,23 @@ Rules of this file:
 * A message that cannot be read is refused with a class that says which of the four ways it is bad:
   too big, not readable, of a schema nobody here knows, or of another version of a known one.
 * Reading never half succeeds: either the whole typed message, or a refusal.
+* Each field has its range (``ranges``); what is beyond is malformed.
 
 A change of a struct that old readers cannot read gets a new version: ``class Drive(Message, tag="Drive/2")``.
 """
 
 from __future__ import annotations
 
+import functools
 import types
 import typing
+from collections.abc import Hashable
 from typing import Any, Generic, TypeVar, cast
 
 import msgspec
 
 from backbone.errors import Fact, Refusal, code_of, revive
+from backbone.ranges import LONGEST_TEXT, MOST_FEW, Count, Facts, Instant, Mention, Source, Text, Version, wildness
 
 WIRE_VERSION = 1
 MAX_MESSAGE_BYTES = 8 * 1024 * 1024  # chosen: a 1080p colour frame (6.2 MB) fits, a runaway list does not
@@ -52,11 +56,11 @@ class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forb
         body: The message.
     """
 
-    wire: int
-    source: str
-    sequence: int
-    stamp_s: float
-    cause: str
+    wire: Version
+    source: Source
+    sequence: Count
+    stamp_s: Instant
+    cause: Mention
     body: Body
 
     @property
@@ -68,15 +72,16 @@ class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forb
 class Refused(Message, frozen=True):
     """How a refusal travels."""
 
-    code: str
-    detail: str
-    remedy: str
-    facts: dict[str, Fact] = {}
+    code: Mention
+    detail: Text
+    remedy: Text
+    facts: Facts = {}
 
     @classmethod
     def of(cls, refusal: Refusal) -> Refused:
         """Return the message that carries this refusal."""
-        return cls(code_of(refusal), refusal.detail, refusal.remedy, dict(refusal.facts))
+        facts = {name: _bounded(fact) for name, fact in list(refusal.facts.items())[:MOST_FEW]}
+        return cls(code_of(refusal), refusal.detail[:LONGEST_TEXT], refusal.remedy[:LONGEST_TEXT], facts)
 
     def revive(self) -> Refusal:
         """Return the refusal that was sent, ready to be raised."""
@@ -111,6 +116,13 @@ class WrongVersion(Refusal):
     remedy = "Run the same release of scout-backbone on every host."
 
 
+def _bounded(fact: Fact) -> Fact:
+    """Return the fact as it may travel: a refusal must arrive whatever it is about."""
+    if isinstance(fact, str):
+        return fact[:LONGEST_TEXT]
+    return fact if not wildness(fact) else str(fact)
+
+
 _encoder = msgspec.msgpack.Encoder()
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # all that msgspec raises on bad bytes
 
@@ -137,6 +149,24 @@ def kinds_of(accepts: type[Any] | types.UnionType) -> tuple[type[Any], ...]:
     return typing.get_args(accepts) or (accepts,)
 
 
+def refuse_oversized(length: int) -> None:
+    """Return if a message of so many bytes may be read: asked before they are copied out of the bus.
+
+    Raises:
+        OversizedMessage: It may not.
+    """
+    if length > MAX_MESSAGE_BYTES:
+        raise OversizedMessage(f"message of {length} bytes", bytes=length)
+
+
+@functools.cache
+def holds_values_of_any_kind(kind: Any) -> bool:
+    """Say whether a value of this type, or one inside it, may be of any kind, so that types alone do not hold it."""
+    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+        return any(map(holds_values_of_any_kind, typing.get_type_hints(kind).values()))
+    return kind is Any or any(map(holds_values_of_any_kind, typing.get_args(kind)))
+
+
 class Reader(Generic[Body]):
     """Reads the messages of one conversation.
 
@@ -147,6 +177,9 @@ class Reader(Generic[Body]):
     def __init__(self, accepts: type[Body] | types.UnionType) -> None:
         self._accepted = tuple(sorted(schema_of(kind) for kind in kinds_of(accepts)))
         self._decoder = msgspec.msgpack.Decoder(Envelope[accepts])  # type: ignore[valid-type]
+        self._of_any_kind = frozenset(
+            kind for kind in kinds_of(accepts) if holds_values_of_any_kind(cast("Hashable", kind))
+        )
 
     def read(self, raw: bytes) -> Envelope[Body]:
         """Return the envelope these bytes hold.
@@ -157,14 +190,16 @@ class Reader(Generic[Body]):
             UnknownMessage: A message, but none that is accepted here.
             MalformedMessage: Anything else that does not fit, with the place where it does not.
         """
-        if len(raw) > MAX_MESSAGE_BYTES:
-            raise OversizedMessage(f"message of {len(raw)} bytes", bytes=len(raw))
+        refuse_oversized(len(raw))
         try:
             envelope = self._decoder.decode(raw)
         except _UNREADABLE as error:
             raise self._diagnose(raw, str(error)) from None
         if envelope.wire != WIRE_VERSION:
             raise WrongVersion(f"envelope version {envelope.wire}, this is {WIRE_VERSION}", got=envelope.wire)
+        if type(envelope.body) in self._of_any_kind and (wild := wildness(envelope.body)):
+            schema = schema_of(type(envelope.body))
+            raise MalformedMessage(f"{schema}: {wild}", schema=schema)
         return cast("Envelope[Body]", envelope)
 
     def _diagnose(self, raw: bytes, complaint: str) -> Refusal:

@@ -20,9 +20,7 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.messages import Absence
 from backbone.errors import HubUnreachable, LinkError, Refusal
-from backbone.health import Health, health
 from backbone.keys import Conversation
 from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
@@ -33,18 +31,9 @@ FOUND_EVERY_S = 0.02  # how often a mission that is only coming up is looked for
 UNREACHABLE = "unreachable"  # what an operator reads where ``status`` ends with exit code 4
 
 
-def health_of(picture: MissionPicture, rate: float) -> Health:
-    """Return what ``status`` says of the mission's health."""
-    missed = [
-        Absence(problem.partition(":")[0], picture.at_s, "did not answer", "asked again", vital=True)
-        for problem in picture.problems
-    ]
-    return health(picture.components, missed, picture.at_s, rate)
-
-
-def sight(picture: MissionPicture, rate: float) -> dict[str, Any]:
+def sight(picture: MissionPicture) -> dict[str, Any]:
     """Return what matters of a picture, as plain data."""
-    verdict = health_of(picture, rate)
+    verdict = picture.health
     schedule = picture.schedule
     return {
         "word": str(verdict.word),
@@ -52,7 +41,6 @@ def sight(picture: MissionPicture, rate: float) -> dict[str, Any]:
         "why": [f"{absence.name}: {absence.cause}; {absence.doing}" for absence in verdict.absent],
         "rows": {component_of(at): [c.pid, str(c.state)] for at, c in sorted(picture.components.items())},
         "restarts": {name: process.restarts for name, process in sorted(picture.processes.items())},
-        "given_up": [name for name, process in sorted(picture.processes.items()) if process.given_up],
         "asks": sorted(request.arc for request in schedule.requests) if schedule else [],
         "held": sorted({holder.arc for rc in schedule.rcs for holder in rc.holders}) if schedule else [],
     }
@@ -88,7 +76,7 @@ async def watch(bus: Bus, clock: MissionClock) -> None:
     while True:
         began = time.monotonic()
         try:
-            seen = sight(await look(bus, clock.now_s()), clock.rate)
+            seen = sight(await look(bus, clock.now_s(), rate=clock.rate))
         except (LinkError, Refusal) as error:
             seen = {"word": UNREACHABLE, "absent": [], "why": [str(error)]}
         say(began=began, t=time.monotonic(), **({} if seen == last else {"sight": seen}))

@@ -284,13 +284,16 @@ class Behavior(Component[B], Generic[B]):
                 raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     async def drain(self) -> None:
-        """End the children and give the ARC back."""
-        stops = [i.name for i in self._children.end() if isinstance(i, StopChild)]
+        """Give the ARC back.
+
+        The children go on: only an order to stop this behavior ends them, and that the placer sees to. A signal from
+        outside is no such order: the next life of this behavior adopts them.
+        """
         try:
             async with asyncio.timeout(DRAIN_TIME_S):
-                await asyncio.gather(self._release(), *(self._stop_child(name) for name in stops))
-        except TimeoutError:  # the placer stops what a stopped behavior owned
-            log.warning("%s leaves before its ARC or children have ended", self.name)
+                await self._release()
+        except TimeoutError:  # the ARC watches its owner's token and ends with it
+            log.warning("%s leaves before its ARC has ended", self.name)
 
     def absences(self) -> list[Absence]:
         """Return children and ARC that are wanted and missing, and children it goes on without."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
+from typing import Annotated
 
+from backbone.ranges import MANY, Count, Instant, Mention, PixelCount, PixelPlace, Text, Values
 from backbone.wire import Message
 
 
@@ -30,9 +31,9 @@ class Report(Message, frozen=True):
         payload: What the parent may need to decide: plain values only.
     """
 
-    child: str
+    child: Mention
     status: BehaviorStatus
-    payload: dict[str, Any] = {}
+    payload: Values = {}
 
 
 class ReportNoted(Message, frozen=True):
@@ -55,21 +56,21 @@ class BehaviorState(Message, frozen=True):
         tree: Its branch of the behavior tree as text, one line a node.
     """
 
-    name: str
+    name: Mention
     status: BehaviorStatus
-    payload: dict[str, Any]
-    holds: dict[str, str]
-    suspended_because: str
-    tree: str
+    payload: Values
+    holds: Annotated[dict[Mention, Mention], MANY]
+    suspended_because: Text
+    tree: Text
 
 
 class Region(Message, frozen=True):
     """A rectangle in a picture, in pixels from its upper left corner."""
 
-    x_px: int
-    y_px: int
-    width_px: int
-    height_px: int
+    x_px: PixelPlace
+    y_px: PixelPlace
+    width_px: PixelCount
+    height_px: PixelCount
 
 
 class MotionSeen(Message, frozen=True):
@@ -81,8 +82,8 @@ class MotionSeen(Message, frozen=True):
         region: Where in its picture.
     """
 
-    at_s: float
-    robot: str
+    at_s: Instant
+    robot: Mention
     region: Region
 
 
@@ -96,7 +97,7 @@ class WaypointReached(Message, frozen=True):
         waypoint: Which one, from 0, in the order of the patrol's parameter.
     """
 
-    at_s: float
-    robot: str
-    number: int
-    waypoint: int
+    at_s: Instant
+    robot: Mention
+    number: Count
+    waypoint: Count

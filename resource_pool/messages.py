@@ -10,7 +10,33 @@ Commands to RCs are questions: each is answered with what was applied, or refuse
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from backbone.errors import Refusal
+from backbone.ranges import (
+    FEW,
+    MANY,
+    Count,
+    Document,
+    Duration,
+    Epoch,
+    Instant,
+    Line,
+    Measure,
+    Mention,
+    Meters,
+    Number,
+    Payload,
+    PixelCount,
+    Pixels,
+    Radians,
+    Rate,
+    RunTime,
+    Share,
+    StateVector,
+    Text,
+    WheelSpeed,
+)
 from backbone.rc_manager.messages import Usage
 from backbone.wire import Message
 from scout_model.description import AirDescription
@@ -25,8 +51,8 @@ class Drive(Message, frozen=True):
         right_rad_s: Right wheel.
     """
 
-    left_rad_s: float
-    right_rad_s: float
+    left_rad_s: WheelSpeed
+    right_rad_s: WheelSpeed
 
 
 class Halt(Message, frozen=True):
@@ -46,20 +72,20 @@ class WantIdle(Message, frozen=True):
 class WantRuntime(Message, frozen=True):
     """Other run times from the next slice on."""
 
-    minimum_runtime_s: float
-    maximum_runtime_s: float = 0.0
+    minimum_runtime_s: RunTime
+    maximum_runtime_s: RunTime = 0.0
 
 
 class WantLonger(Message, frozen=True):
     """Let the running slice last until this mission time."""
 
-    until_s: float
+    until_s: Instant
 
 
 class Release(Message, frozen=True):
     """Done with this ARC: it withdraws, frees its RCs and ends."""
 
-    reason: str = ""
+    reason: Text = ""
 
 
 class AskArc(Message, frozen=True):
@@ -81,15 +107,15 @@ class ArcState(Message, frozen=True):
         expected_start_s: Next expected slot, mission time; negative: unknown.
     """
 
-    arc: str
-    kind: str
-    owner: str
-    rcs: dict[str, str]
+    arc: Mention
+    kind: Mention
+    owner: Mention
+    rcs: Annotated[dict[Mention, Mention], FEW]
     granted: bool
-    epochs: dict[str, int]
-    reason: str
-    by: str
-    expected_start_s: float
+    epochs: Annotated[dict[Mention, Epoch], FEW]
+    reason: Text
+    by: Mention
+    expected_start_s: Instant
 
 
 class Accepted(Message, frozen=True):
@@ -107,11 +133,11 @@ class Applied(Message, frozen=True):
         values: Values after clipping to the hardware's limits, units in the names.
     """
 
-    rc: str
-    epoch: int
-    at_s: float
-    command: str
-    values: dict[str, float] = {}
+    rc: Mention
+    epoch: Epoch
+    at_s: Instant
+    command: Mention
+    values: Annotated[dict[Mention, Measure], FEW] = {}
 
 
 ArcQuestion = Drive | Halt | Jump | WantIdle | WantRuntime | WantLonger | Release | AskArc
@@ -128,10 +154,10 @@ class Resumed(Message, frozen=True):
         until_s: The slice lasts at least until this mission time.
     """
 
-    arc: str
-    rcs: dict[str, str]
-    epochs: dict[str, int]
-    until_s: float
+    arc: Mention
+    rcs: Annotated[dict[Mention, Mention], FEW]
+    epochs: Annotated[dict[Mention, Epoch], FEW]
+    until_s: Instant
 
 
 class SliceEnds(Message, frozen=True):
@@ -143,27 +169,27 @@ class SliceEnds(Message, frozen=True):
         most_s: Mission time until which it can be made longer.
     """
 
-    arc: str
-    until_s: float
-    most_s: float
+    arc: Mention
+    until_s: Instant
+    most_s: Instant
 
 
 class Suspending(Message, frozen=True):
     """The slice ends: stop cleanly; answering means you have."""
 
-    arc: str
-    reason: str
-    by: str
-    deadline_s: float
+    arc: Mention
+    reason: Text
+    by: Mention
+    deadline_s: Instant
 
 
 class Suspended(Message, frozen=True):
     """The RCs are gone: commands are refused until the next ``Resumed``."""
 
-    arc: str
-    reason: str
-    by: str
-    expected_start_s: float
+    arc: Mention
+    reason: Text
+    by: Mention
+    expected_start_s: Instant
 
 
 class AskBeat(Message, frozen=True):
@@ -183,7 +209,7 @@ class Noted(Message, frozen=True):
         wanted_s: To ``SliceEnds``: seconds still needed beyond that end ("not now"), an estimate; 0: none.
     """
 
-    wanted_s: float = 0.0
+    wanted_s: Duration = 0.0
 
 
 ArcNotice = Resumed | SliceEnds | Suspending | Suspended | AskBeat
@@ -199,8 +225,8 @@ class CommandScout(Message, frozen=True):
         command: What to do.
     """
 
-    arc: str
-    epoch: int
+    arc: Mention
+    epoch: Epoch
     command: Drive | Halt | Jump | SwitchTransmitter
 
 
@@ -213,7 +239,7 @@ class SwitchTransmitter(Message, frozen=True):
     """
 
     on: bool
-    frequency: str = ""
+    frequency: Mention = ""
 
 
 class LoadPacket(Message, frozen=True):
@@ -234,16 +260,16 @@ class LoadPacket(Message, frozen=True):
         kind: Which of the ARC's streams on the radio it is sent in; if it has none of that kind: its first.
     """
 
-    arc: str
-    epoch: int
-    network_id: int
-    payload: bytes
-    safe_payload: bytes
-    robot_epoch: int
+    arc: Mention
+    epoch: Epoch
+    network_id: Count
+    payload: Payload
+    safe_payload: Payload
+    robot_epoch: Epoch
     at_once: bool = False
-    afterwards: bytes = b""
-    lasts_s: float = 0.0
-    kind: str = "drive"
+    afterwards: Payload = b""
+    lasts_s: Duration = 0.0
+    kind: Mention = "drive"
 
 
 class PacketLoaded(Message, frozen=True):
@@ -260,10 +286,10 @@ class Tune(Message, frozen=True):
         robot: The one whose transmitter the ARC holds; pictures of another are not delivered. Empty: any.
     """
 
-    arc: str
-    epoch: int
-    frequency: str
-    robot: str = ""
+    arc: Mention
+    epoch: Epoch
+    frequency: Mention
+    robot: Mention = ""
 
 
 class NothingHeard(Message, frozen=True):
@@ -274,8 +300,8 @@ class NothingHeard(Message, frozen=True):
         epoch: Of its connection.
     """
 
-    rc: str
-    epoch: int
+    rc: Mention
+    epoch: Epoch
 
 
 class Frame(Message, frozen=True):
@@ -290,18 +316,22 @@ class Frame(Message, frozen=True):
         captured_s: Mission time at which it was taken.
         width_px: Columns.
         height_px: Rows.
-        pixels: Grey levels, row by row from the top.
+        pixels: Grey levels, row by row from the top; as many as rows and columns have.
     """
 
-    rc: str
-    arc: str
-    epoch: int
-    robot: str
-    number: int
-    captured_s: float
-    width_px: int
-    height_px: int
-    pixels: memoryview
+    rc: Mention
+    arc: Mention
+    epoch: Epoch
+    robot: Mention
+    number: Count
+    captured_s: Instant
+    width_px: PixelCount
+    height_px: PixelCount
+    pixels: Pixels
+
+    def __post_init__(self) -> None:
+        if self.width_px * self.height_px != len(self.pixels):  # the decoder refuses it as malformed
+            raise ValueError(f"{len(self.pixels)} pixels for {self.width_px} x {self.height_px}")
 
 
 # ---------------------------------------------------------------------- operator → robot RC: needs no grant
@@ -313,8 +343,8 @@ class EmergencyStop(Message, frozen=True):
         user: Who wants it, for people; empty: the console that asks.
     """
 
-    reason: str = ""
-    user: str = ""
+    reason: Line = ""
+    user: Mention = ""
 
 
 class LiftStop(Message, frozen=True):
@@ -325,8 +355,8 @@ class LiftStop(Message, frozen=True):
         user: Who wants it, for people; empty: the console that asks.
     """
 
-    number: int
-    user: str = ""
+    number: Count
+    user: Mention = ""
 
 
 class AskStop(Message, frozen=True):
@@ -347,12 +377,12 @@ class StopState(Message, frozen=True):
             the robot, and what moves it now ends by itself within ``COMMAND_TIMEOUT_S``.
     """
 
-    rc: str
+    rc: Mention
     is_stopped: bool
-    number: int
-    by: str
-    reason: str
-    at_s: float
+    number: Count
+    by: Mention
+    reason: Text
+    at_s: Instant
     is_confirmed: bool = True
 
 
@@ -373,13 +403,13 @@ class RadioPacket(Message, frozen=True):
         air_time_s: How long its bits take.
     """
 
-    radio: str
-    network_id: int
-    payload: bytes
-    arc: str = ""
-    epoch: int = 0
-    number: int = 0
-    air_time_s: float = 0.0
+    radio: Mention
+    network_id: Count
+    payload: Payload
+    arc: Mention = ""
+    epoch: Epoch = 0
+    number: Count = 0
+    air_time_s: Duration = 0.0
 
 
 class AskWorld(Message, frozen=True):
@@ -397,27 +427,27 @@ class WorldModel(Message, frozen=True):
         antenna_m: Where the base's antenna stands: x, y, z.
     """
 
-    mjcf: str
-    robots: dict[str, int]
-    seed: int = 0
+    mjcf: Document
+    robots: Annotated[dict[Mention, Count], MANY]
+    seed: Number = 0
     air: AirDescription = AirDescription()
-    antenna_m: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    antenna_m: tuple[Meters, Meters, Meters] = (0.0, 0.0, 1.0)
 
 
 class AskPose(Message, frozen=True):
     """Where is this body? Asked of the simulated world or of a camera above the room; robots themselves cannot tell."""
 
-    body: str
+    body: Mention
 
 
 class Pose(Message, frozen=True):
     """Answer to ``AskPose``: metres and radians in the room's frame, origin in a corner of the floor."""
 
-    body: str
-    at_s: float
-    x_m: float
-    y_m: float
-    heading_rad: float
+    body: Mention
+    at_s: Instant
+    x_m: Meters
+    y_m: Meters
+    heading_rad: Radians
 
 
 class WorldState(Message, frozen=True):
@@ -432,20 +462,20 @@ class WorldState(Message, frozen=True):
         motors: Robot that transmits → how fast its wheels turn, 0 to 1 of their limit; one that is missing stands.
     """
 
-    frame: int
-    at_s: float
-    state: bytes
-    transmitting: dict[str, str]
-    on_since: dict[str, int] = {}
-    motors: dict[str, float] = {}
+    frame: Count
+    at_s: Instant
+    state: StateVector
+    transmitting: Annotated[dict[Mention, Mention], MANY]
+    on_since: Annotated[dict[Mention, Count], MANY] = {}
+    motors: Annotated[dict[Mention, Share], MANY] = {}
 
 
 class ClockTick(Message, frozen=True):
     """Published by the world once a frame: the mission's time, for hosts that do not share a monotonic clock."""
 
-    frame: int
-    at_s: float
-    rate: float
+    frame: Count
+    at_s: Instant
+    rate: Rate
 
 
 # ---------------------------------------------------------------------- refusals
@@ -495,7 +525,7 @@ class ImpossibleUse(Refusal):
     """An RC cannot be held like that."""
 
     code = "rc.impossible_use"
-    remedy = "Connect with a lease and with periods that are finite and above 0."
+    remedy = "Connect with the next epoch, a lease of at most an hour, and periods that are finite and above 0."
 
 
 class EmergencyStopped(Refusal):

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import math
 import types
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar
@@ -24,8 +23,10 @@ from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.ranges import LONGEST_LEASE_S
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
+    EPOCHS_PER_S,
     AskRc,
     Connect,
     Connected,
@@ -36,6 +37,7 @@ from backbone.rc_manager.messages import (
     Leases,
     RcState,
     StaleEpoch,
+    most_epoch,
 )
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver
@@ -44,7 +46,6 @@ from resource_pool.messages import HardwareFault, ImpossibleUse, NeedsRestart, N
 
 log = logging.getLogger(__name__)
 
-EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
 SAFE_WITHIN_S = 0.4  # chosen: less than the RC manager waits for a disconnection, so that it hears why; machine seconds
 
 
@@ -210,6 +211,8 @@ class ResourceController(Component[R], Generic[R]):
         match asked.body:
             case Connect() | Disconnect() if asked.source != RC_MANAGER:
                 raise self._stranger(asked.source, f"{type(asked.body).__name__} {asked.body.arc}")
+            case Connect(epoch=epoch) | Disconnect(epoch=epoch) if epoch > most_epoch(self.clock.now_s()):
+                raise ImpossibleUse(f"{self.name}: nobody can have given epoch {epoch} until now")
             case Connect() as order:
                 return await self._connect(order, asked.stamp_s)
             case Disconnect(arc=arc, epoch=epoch, reason=reason):
@@ -283,12 +286,12 @@ class ResourceController(Component[R], Generic[R]):
         return NotFromYou(f"{self.name} does not take {what} from {source}", source=source)
 
     async def _connect(self, order: Connect, given_s: float) -> Connected:
-        if not 0 < order.lease_s < math.inf:
+        if not 0 < order.lease_s <= LONGEST_LEASE_S:
             raise ImpossibleUse(f"{self.name}: a lease of {order.lease_s} s for {order.arc}")
         async with self._changing:
             # From the order's own time: the RC manager counts on the end, however long the order took.
-            lease_until_s = given_s + order.lease_s
             since_s = self.clock.now_s()
+            lease_until_s = min(given_s, since_s) + order.lease_s
             hold = Hold(order.arc, order.epoch, since_s, lease_until_s, order.use, order.companions, order.rank)
             former = self.holds.check(hold)
             if former is not None:
@@ -344,9 +347,10 @@ class ResourceController(Component[R], Generic[R]):
 
     def _heard_leases(self, envelope: Envelope[Any]) -> None:
         leases: Leases = envelope.body
+        until_s = min(envelope.stamp_s, self.clock.now_s()) + leases.lease_s
         for lease in leases.leases:
             if lease.rc == self.name:
-                self.holds.renew(lease.arc, lease.epoch, envelope.stamp_s + leases.lease_s, lease.rank)
+                self.holds.renew(lease.arc, lease.epoch, until_s, lease.rank)
                 self.ranked(lease.arc, lease.epoch)
         if self.name in leases.missing or any(self._has_lost(lease) for lease in leases.leases):
             self.changed()  # the RC manager's picture is wrong, and it hears what is published

@@ -8,6 +8,7 @@ import of mujoco in it.
 from __future__ import annotations
 
 import fcntl
+import logging
 import os
 import subprocess
 import sys
@@ -18,6 +19,8 @@ from typing import Literal
 import msgspec
 
 from scout_model.errors import RenderingUnavailable
+
+log = logging.getLogger(__name__)
 
 Backend = Literal["egl", "osmesa", "none"]
 
@@ -69,22 +72,29 @@ def probe(trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
 def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
     """Return what ``probe`` finds out; of all processes that ask with this folder one does, the others wait for it.
 
+    A folder that cannot be written into makes it only slower: every process finds out for itself.
+
     Args:
         folder: Lives as long as the answer is to be believed: until the machine or its drivers may be others.
         trial_time_s: As for ``probe``.
-
-    Raises:
-        OSError: The folder cannot be written into.
     """
-    with (folder / FOUND_FILE).open("a+b") as file:
+    try:
+        file = (folder / FOUND_FILE).open("a+b", buffering=0)
+    except OSError as error:
+        log.warning("what can draw here is not kept for others: %s", error)
+        return probe(trial_time_s)
+    with file:
         fcntl.flock(file, fcntl.LOCK_EX)  # let go with the file, also by a process that dies
         file.seek(0)
         try:
             return msgspec.json.decode(file.read(), type=GlSupport)
-        except msgspec.DecodeError:  # nobody has asked yet, or died while writing
+        except msgspec.DecodeError:  # nobody has asked yet, or died while writing, or the disk was full
             file.truncate(0)
         support = probe(trial_time_s)
-        file.write(msgspec.json.encode(support))
+        try:
+            file.write(msgspec.json.encode(support))
+        except OSError as error:
+            log.warning("what can draw here is not kept for others: %s", error)
         return support
 
 

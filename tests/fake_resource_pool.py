@@ -278,4 +278,8 @@ class FakePlacer:
         elif name in self.components:
             self.components[name].end("the placer ends it")
             await asyncio.wait({self._lives[name]})
+        owner = address(Subsystem.MISSION_CONTROL, name)
+        for owned in [each for each, requester in self.requesters.items() if requester == owner]:
+            if owned in self.placed:
+                await self._stop(owned)
         return Ended(name, EndedBy.ASKING)

@@ -90,7 +90,7 @@ def hostile_messages(seed: int = 0) -> Iterator[Hostile]:
     yield Hostile("a stop of another version", enveloped(["Stop/2", "now"]), WrongVersion)
     yield Hostile("a schema without a version", enveloped(["Stop"]), WrongVersion)
     yield Hostile("a field of the wrong type", enveloped(["Stop/1", 5]), MalformedMessage)
-    yield Hostile("a field too many", enveloped(["Stop/1", "now", "and again"]), MalformedMessage)
+    yield Hostile("a field too many", enveloped(["Stop/1", "now", "", "and again"]), MalformedMessage)
     yield Hostile("a field missing", enveloped(["SetParameter/1"]), MalformedMessage)
     yield Hostile("text that is no UTF-8", before_body + b"\x92\xa6Stop/1\xa2\xff\xfe", MalformedMessage)
     yield Hostile("a schema that is no UTF-8", before_body + b"\x91\xa2\xff\xfe", MalformedMessage)

@@ -19,6 +19,7 @@ ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the re
 SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.STOPPED: Severity.ALARM,
     AlarmKind.LOST: Severity.ALARM,
+    AlarmKind.ABSENT: Severity.ALARM,
     AlarmKind.UNSAFE: Severity.ALARM,
     AlarmKind.RC_DOWN: Severity.ALARM,
     AlarmKind.LINK: Severity.ALARM,
@@ -29,6 +30,7 @@ SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.TAKEN: Severity.NOTICE,
     AlarmKind.REFUSED: Severity.NOTICE,
     AlarmKind.NO_ANSWER: Severity.WARNING,
+    AlarmKind.NOT_RECORDED: Severity.WARNING,
     AlarmKind.VISITOR: Severity.WARNING,
 }
 _WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}

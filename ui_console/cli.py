@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import ExitCode, SecretFile, read_secret_option, run, say
+from backbone.cli import ExitCode, SecretFile, finite, read_secret_option, run, say
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -33,6 +33,9 @@ others; a script needs no picture, so it waits for none to settle and leaves the
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104  only compared with what the operator said
 WEB_PORT = 8420  # chosen: free on most machines
+LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
+LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
+SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
@@ -113,15 +116,39 @@ class _Site:
 @app.command()
 def attach(
     robot: Annotated[str, typer.Argument(help="Robot to take over; none: any free one with a camera.")] = "",
-    priority: Annotated[int, typer.Option(help="Beside the mission's own; larger is higher.")] = 100,
+    priority: Annotated[
+        int, typer.Option(min=LEAST_PRIORITY, max=MOST_PRIORITY, help="Beside the mission's own; larger is higher.")
+    ] = 100,
     profile: Annotated[Profile, typer.Option(help="How the console looks.")] = Profile.TERMINAL,
     script: Annotated[str, typer.Option(help="Drive by the JSON lines of this file, '-' for standard input.")] = "",
     as_json: Annotated[bool, typer.Option("--json", help="JSON lines, no screen; implies --script -.")] = False,
-    within: Annotated[float, typer.Option(help="Mission seconds a script waits for the grant; 0: for ever.")] = 0.0,
-    minimum_runtime: Annotated[float, typer.Option(help="Shortest useful time beside equals, seconds.")] = 5.0,
+    within: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=LONGEST_WAIT_S,
+            callback=finite,
+            help="Mission seconds a script waits for the grant; 0: for ever.",
+        ),
+    ] = 0.0,
+    minimum_runtime: Annotated[
+        float,
+        typer.Option(
+            min=SHORTEST_RUNTIME_S,
+            max=LONGEST_WAIT_S,
+            callback=finite,
+            help="Shortest useful time beside equals, seconds.",
+        ),
+    ] = 5.0,
     kind: Annotated[str, typer.Option(help="Kind of ARC; default: what the console shows needs.")] = "",
     away_after: Annotated[
-        float, typer.Option(help="Give the robot back when no key was pressed for so many seconds; 0: never.")
+        float,
+        typer.Option(
+            min=0.0,
+            max=LONGEST_WAIT_S,
+            callback=finite,
+            help="Give the robot back when no key was pressed for so many seconds; 0: never.",
+        ),
     ] = AWAY_AFTER_S,
     video_only: Annotated[bool, typer.Option("--video-only", help="Begin with the picture alone.")] = False,
     gamepad: Annotated[bool, typer.Option("--gamepad", help="Drive by the gamepad of this machine, too.")] = False,
@@ -172,7 +199,14 @@ def serve(
         str, typer.Option(help="Address to listen at; beyond this machine only if you say so, 0.0.0.0 is all.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0: any that is free.")] = WEB_PORT,
-    priority: Annotated[int, typer.Option(help="The most an operator may ask for, beside the mission's own.")] = 100,
+    priority: Annotated[
+        int,
+        typer.Option(
+            min=LEAST_PRIORITY,
+            max=MOST_PRIORITY,
+            help="The most an operator may ask for, beside the mission's own.",
+        ),
+    ] = 100,
     operator: Annotated[
         list[str] | None,
         typer.Option(help="NAME=PRIORITY: a token for this operator alone; again for each. Default: one for all."),
@@ -188,7 +222,13 @@ def serve(
     ] = "",
     kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim.")] = KINDS["terminal"],
     away_after: Annotated[
-        float, typer.Option(help="Give a robot back when its operator touched nothing for so many seconds; 0: never.")
+        float,
+        typer.Option(
+            min=0.0,
+            max=LONGEST_WAIT_S,
+            callback=finite,
+            help="Give a robot back when its operator touched nothing for so many seconds; 0: never.",
+        ),
     ] = AWAY_AFTER_S,
     mission: Mission = None,
     connect: Connect = None,

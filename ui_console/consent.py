@@ -17,6 +17,7 @@ from typing import Annotated
 import msgspec
 
 from backbone.errors import Refusal
+from backbone.ranges import Line, Mention
 from backbone.wire import Message
 
 CONSENT_WITHIN_S = 8.0  # chosen: to look up from driving, read a line and press a key; a turn is shorter or as long
@@ -33,8 +34,8 @@ class AskConsent(Message, frozen=True):
         why: For people.
     """
 
-    robot: str
-    user: str
+    robot: Mention
+    user: Mention
     why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)]
 
 
@@ -48,8 +49,8 @@ class Consent(Message, frozen=True):
     """
 
     is_given: bool
-    user: str
-    reason: str
+    user: Mention
+    reason: Line
 
 
 class AskedAlready(Refusal):

@@ -13,6 +13,7 @@ import msgspec
 
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.health import MissionHealth
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import Leases, Schedule, Why
 from resource_pool.arc_client import StopState
@@ -334,6 +335,21 @@ class LinkHeard:
 
 
 @dataclass(frozen=True, slots=True)
+class HealthHeard:
+    """The launcher said how the mission is.
+
+    Attributes:
+        at_s: When.
+        health: What it said; None: it is listened to from now on.
+        until_s: The launcher is silent if it said nothing more by then.
+    """
+
+    at_s: float
+    health: MissionHealth | None
+    until_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class ParametersHeard:
     """A component told its parameters.
 
@@ -381,6 +397,7 @@ TeamEvent = (
     | StopHeard
     | RadioCounted
     | LinkHeard
+    | HealthHeard
     | ParametersHeard
 )
 ConsoleEvent = OwnEvent | TeamEvent
@@ -411,6 +428,7 @@ _WORDS: dict[type[Any], str] = {
     StopHeard: "stop",
     RadioCounted: "radio",
     LinkHeard: "link",
+    HealthHeard: "health",
     ParametersHeard: "parameters",
 }
 

@@ -127,6 +127,7 @@ class ConsoleModel:
             parameters=team.parameters(),
             components=team.components(),
             log=self.log(),
+            health=team.health(now_s),
         )
 
     def own(self, now_s: float) -> OwnView:

@@ -29,7 +29,9 @@ from backbone.component.messages import (
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
+from backbone.health import SILENT_AFTER_S, MissionHealth
 from backbone.keys import Conversation
+from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import (
     Appeared,
@@ -52,6 +54,7 @@ from ui_console.console_events import (
     ComponentGone,
     ComponentHeard,
     ComponentsListed,
+    HealthHeard,
     LeasesHeard,
     LinkHeard,
     LinkTrouble,
@@ -103,6 +106,8 @@ class ConsoleFeed:
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
         bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard_status, latest=True)
         bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_life)
+        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
+        self._show_health(None)
         watch_stops(bus, lambda stop: self._show(StopHeard(self._clock.now_s(), stop)))
         bus.watch_link(self._heard_link)
 
@@ -149,7 +154,7 @@ class ConsoleFeed:
     async def why(self, name: str) -> list[str]:
         """Return for people why this robot, ARC, behavior, console or component is as it is."""
         try:
-            return (await reasons_for(self._bus, name)).lines(self._clock.now_s())
+            return (await reasons_for(self._bus, name, self._clock)).lines(self._clock.now_s())
         except Refusal as refusal:
             return [refusal.detail, refusal.remedy]
         except LinkError as error:
@@ -317,6 +322,13 @@ class ConsoleFeed:
 
     def _heard_fall(self, envelope: Envelope[Any]) -> None:
         self._show(ProcessFallen(self._clock.now_s(), envelope.body))
+
+    def _heard_health(self, envelope: Envelope[Any]) -> None:
+        self._show_health(envelope.body)
+
+    def _show_health(self, health: MissionHealth | None) -> None:
+        now_s = self._clock.now_s()
+        self._show(HealthHeard(now_s, health, now_s + SILENT_AFTER_S * self._clock.rate))
 
     def _heard_link(self, is_up: bool) -> None:
         came_back, self._is_up = is_up and not self._is_up, is_up

@@ -13,6 +13,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
+from backbone.printable import printable_all
 from resource_pool.arc_client import StopState
 from ui_console.console_events import ConsoleEvent, ScheduleHeard
 from ui_console.feed import ConsoleFeed, FeedEvent
@@ -42,7 +43,9 @@ class Observer(Component[P], Generic[P]):
         user: str = "",
     ) -> None:
         super().__init__(launch, bus, clock)
-        self.show, self._watches, self._signs_in = show, watches, signs_in
+        self.show: Callable[[ConsoleEvent], None] = lambda event: show(printable_all(event))
+        """Show an event; whatever it quotes of the bus is printable text from here on."""
+        self._watches, self._signs_in = watches, signs_in
         self.user = user or launch.name
         self.feed = ConsoleFeed(bus, clock, self._heard)
         """What it listens by, and the verbs that need no grant."""

@@ -26,6 +26,7 @@ from ui_console.console_events import (
     ComponentGone,
     ComponentHeard,
     ComponentsListed,
+    HealthHeard,
     LeasesHeard,
     LinkHeard,
     LoadHeard,
@@ -37,11 +38,13 @@ from ui_console.console_events import (
     StoryHeard,
     TeamEvent,
 )
+from ui_console.health_board import HealthBoard
 from ui_console.timeline import Timeline
 from ui_console.views import (
     NONE_S,
     AlarmKind,
     ComponentRow,
+    HealthView,
     HostView,
     LinkView,
     LogRow,
@@ -82,6 +85,7 @@ class TeamModel:
         self.schedule: Schedule | None = None
         """As last heard."""
         self.alarms = AlarmBook()
+        self._health = HealthBoard(self.alarms)
         self._timeline = Timeline()
         self._components: dict[str, ComponentState] = {}
         self._lost: dict[str, float] = {}
@@ -134,6 +138,8 @@ class TeamModel:
                     event = LinkHeard(at_s, True, self._link.latency_s)
                 self._link = event
                 self._so(not is_up, AlarmKind.LINK, "hub", "no link to the hub: what is shown is old", at_s)
+            case HealthHeard():
+                self._health.take(event)
             case ParametersHeard():
                 self._take_parameters(event)
             case _:
@@ -141,6 +147,7 @@ class TeamModel:
 
     def look(self, now_s: float) -> None:
         """Find out what only time can tell."""
+        self._health.look(now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
             starves = request.state is RequestState.WAITING and request.expected_start_s < 0 and waits_s >= STARVING_S
@@ -204,6 +211,10 @@ class TeamModel:
     def timeline(self, now_s: float, past_s: float = PAST_S, next_s: float = NEXT_S) -> TimelineView:
         """Return who had which resource in the past seconds, who has it, and who gets it in the next."""
         return self._timeline.view(now_s, past_s, next_s)
+
+    def health(self, now_s: float) -> HealthView | None:
+        """Return how the mission is; None: not known yet."""
+        return self._health.view(now_s)
 
     def hosts(self, now_s: float) -> list[HostView]:
         """Return the machines, sorted by name."""
@@ -338,6 +349,8 @@ class TeamModel:
         self.alarms.end(AlarmKind.LOST, name, at_s)
         is_rc = _is_in(Subsystem.RESOURCE_POOL, component.address)
         self._so("not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s)
+        has_no_trace = "the trace of the schedule stopped" in component.feedback
+        self._so(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
 
     def _take_list(self, listed: Mapping[str, ComponentState], at_s: float, is_complete: bool) -> None:
         for component in listed.values():

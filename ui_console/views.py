@@ -27,6 +27,7 @@ class AlarmKind(StrEnum):
 
     STOPPED = "stopped"  # an operator stopped a robot
     LOST = "lost"  # a component is gone that nobody ended
+    ABSENT = "absent"  # a component is wanted and absent
     UNSAFE = "unsafe"  # an RC did not reach its safe state
     RC_DOWN = "rc_down"  # the RC manager cannot reach an RC
     LINK = "link"  # this console has no link to the hub
@@ -37,6 +38,7 @@ class AlarmKind(StrEnum):
     TAKEN = "taken"  # this console's robot went to somebody else
     REFUSED = "refused"  # somebody said no to this console
     NO_ANSWER = "no_answer"  # somebody did not answer this console
+    NOT_RECORDED = "not_recorded"  # the trace of the schedule cannot be written any more
     VISITOR = "visitor"  # somebody who was not let in, or misbehaves, at the web console
 
 
@@ -428,6 +430,18 @@ class OwnView(msgspec.Struct, frozen=True):
     asked: str = ""
 
 
+class HealthView(msgspec.Struct, frozen=True):
+    """How the mission is.
+
+    Attributes:
+        word: ``ok``, ``degraded`` or ``failed``.
+        lines: What is wanted and absent, since when, why, and what is done about it; one line each.
+    """
+
+    word: str
+    lines: list[str]
+
+
 class ConsoleView(msgspec.Struct, frozen=True):
     """All that a console shows at one moment."""
 
@@ -445,6 +459,7 @@ class ConsoleView(msgspec.Struct, frozen=True):
     parameters: list[ParameterView]
     components: list[ComponentRow]
     log: list[LogRow]
+    health: HealthView | None = None
 
 
 _encoder = msgspec.json.Encoder()

@@ -16,6 +16,7 @@ from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
 
 from backbone.keys import Conversation
+from backbone.ranges import Count
 from backbone.wire import Envelope, Message
 
 Reply = TypeVar("Reply", bound=Message)
@@ -147,9 +148,9 @@ class BusStatistics(Message, frozen=True):
         unreadable: Messages that could not be read, in either direction.
     """
 
-    asked: int
-    answered: int
-    published: int
-    heard: int
-    refused: int
-    unreadable: int
+    asked: Count
+    answered: Count
+    published: Count
+    heard: Count
+    refused: Count
+    unreadable: Count

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections import deque
+from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, cast
@@ -35,7 +35,16 @@ from backbone.bus.speaker import Speaker, settle
 from backbone.door import USER
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
-from backbone.wire import Envelope, MalformedMessage, Message, OversizedMessage, Reader, Refused, write
+from backbone.wire import (
+    Envelope,
+    MalformedMessage,
+    Message,
+    OversizedMessage,
+    Reader,
+    Refused,
+    refuse_oversized,
+    write,
+)
 
 log = logging.getLogger(__name__)
 
@@ -49,6 +58,7 @@ _TIMEOUT_PAYLOAD = b"Timeout"
 # of a burst of 1000 up to 360 were dropped; with batching none was, at a thirtieth of the cost for the sender.
 _URGENT = (zenoh.Priority.REAL_TIME, zenoh.CongestionControl.BLOCK)
 _SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
+MOST_PUBLISHERS = 64  # chosen: of a component's own far fewer; a framegrabber has one for each ARC it had
 _REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
 _BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
 _QUALITY = {
@@ -170,7 +180,7 @@ class ZenohBus(Speaker):
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()
-        self._publishers: dict[tuple[str, Conversation], zenoh.Publisher] = {}
+        self._publishers: OrderedDict[tuple[str, Conversation], zenoh.Publisher] = OrderedDict()
 
     @classmethod
     def open(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
@@ -262,7 +272,7 @@ class ZenohBus(Speaker):
 
     async def _answer(self, reader: Reader[Any], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
-            question = reader.read(query.payload.to_bytes() if query.payload is not None else b"")
+            question = reader.read(_bytes_of(query.payload))
             envelope = await self.reply_to(question, answer)
             if envelope is not None:
                 query.reply(own, self._write_reply(envelope), express=True)
@@ -291,6 +301,7 @@ class ZenohBus(Speaker):
     def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
         """Publish over the session and return what was said, in its envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
+        self._publishers.move_to_end((address, conversation))
         self.published += 1
         envelope = self.envelope(message)
         publisher.put(write(envelope))
@@ -304,6 +315,9 @@ class ZenohBus(Speaker):
             congestion_control=congestion_control,
             allowed_destination=zenoh.Locality.REMOTE if self._shared else zenoh.Locality.ANY,
         )
+        while len(self._publishers) > MOST_PUBLISHERS:
+            _, longest_silent = self._publishers.popitem(last=False)
+            longest_silent.undeclare()  # type: ignore[no-untyped-call]
         return publisher
 
     def subscribe(
@@ -472,7 +486,7 @@ class _Each:
 
     def hand_over(self, sample: zenoh.Sample) -> None:
         try:
-            envelope = self._reader.read(sample.payload.to_bytes())
+            envelope = self._reader.read(_bytes_of(sample.payload))
         except Refusal as unreadable:
             self._bus.unreadable += 1
             log.warning("unreadable publication on %s: %s", sample.key_expr, unreadable.detail)
@@ -503,6 +517,18 @@ class _Latest(_Each):
         taken = [self._newest.popitem()[1] for _ in range(len(self._newest))]
         for sample in reversed(taken):
             self.hand_over(sample)
+
+
+def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
+    """Return what was sent; what is too long for a message is not even copied.
+
+    Raises:
+        OversizedMessage: It is.
+    """
+    if payload is None:
+        return b""
+    refuse_oversized(len(payload))
+    return payload.to_bytes()
 
 
 _readers: dict[Any, Reader[Any]] = {}

@@ -35,6 +35,7 @@ from backbone.component.messages import (
     MissionTime,
     Parameters,
     SetParameter,
+    StandingStop,
     Statistics,
     Stop,
     Stopping,
@@ -171,6 +172,10 @@ class Component(Generic[P]):
         """
         return []
 
+    def standing_stop(self) -> StandingStop | None:
+        """Return the emergency stop in force on this component; call ``changed`` when the answer changes."""
+        return None
+
     def publish_news(self) -> None:
         """Publish what spectators should know now.
 
@@ -255,6 +260,7 @@ class Component(Generic[P]):
             self.feedback,
             launch.requester,
             self.absences() if self._state is LifeState.READY else [],
+            self.standing_stop(),
         )
 
     # ------------------------------------------------------------------ the shell

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from backbone.naming import Subsystem, address
+from backbone.ranges import Line, MachineTime, Mention, Name, NameOrNone, Rate, Values
 from backbone.wire import Message
 
 
@@ -30,20 +29,20 @@ class Launch(Message, frozen=True):
             name never have the same, on any hosts.
     """
 
-    mission: str
+    mission: Name
     subsystem: Subsystem
-    name: str
-    type: str
-    class_path: str
-    host: str
-    endpoint: str
-    clock_origin_monotonic_s: float
-    clock_rate: float
-    parameters: dict[str, Any] = {}
-    requester: str = ""
-    run_directory: str = ""
-    process: str = ""
-    incarnation: str = ""
+    name: Name
+    type: Mention
+    class_path: Line
+    host: Mention
+    endpoint: Line
+    clock_origin_monotonic_s: MachineTime
+    clock_rate: Rate
+    parameters: Values = {}
+    requester: Mention = ""
+    run_directory: Line = ""
+    process: NameOrNone = ""
+    incarnation: Mention = ""
 
     @property
     def is_shared_process(self) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.naming import IllegalName, Subsystem
+from backbone.ranges import Count, ExitCode
 from backbone.wire import Message
 
 PROCESSES = f"{Subsystem.BACKBONE}/*/*/*"
@@ -24,7 +25,7 @@ class Admit(Message, frozen=True):
     """
 
     launch: Launch
-    life: int
+    life: Count
 
 
 class Admitted(Message, frozen=True):
@@ -34,7 +35,7 @@ class Admitted(Message, frozen=True):
 class AwaitEnd(Message, frozen=True):
     """How does this life end? Answered when it has ended, be it long ago."""
 
-    life: int
+    life: Count
 
 
 class MemberEnded(Message, frozen=True):
@@ -44,14 +45,14 @@ class MemberEnded(Message, frozen=True):
         exit_code: What a process of its own would have exited with.
     """
 
-    life: int
-    exit_code: int
+    life: Count
+    exit_code: ExitCode
 
 
 class EndMember(Message, frozen=True):
     """End this member in good order, as SIGTERM would end a process of its own. May be asked twice."""
 
-    life: int
+    life: Count
 
 
 class MemberEnding(Message, frozen=True):
@@ -84,6 +85,13 @@ class NotItsCreator(Refusal):
 
     code = "component.not_its_creator"
     remedy = "Ask the placer to start or stop the component."
+
+
+class AskedAgain(Refusal):
+    """The end of this life was asked for once more; only the newest question is answered when it comes."""
+
+    code = "component.asked_again"
+    remedy = "Nothing to do: the newer question waits."
 
 
 ProcessQuestion = Admit | AwaitEnd | EndMember

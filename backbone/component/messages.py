@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
+from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
 
@@ -34,12 +35,30 @@ class Absence(Message, frozen=True):
         vital: True if the mission cannot do its work without it (core services).
     """
 
-    name: str
-    since_s: float
-    cause: str
-    doing: str = ""
-    remedy: str = ""
+    name: Mention
+    since_s: Instant
+    cause: Text
+    doing: Text = ""
+    remedy: Text = ""
     vital: bool = False
+
+
+class StandingStop(Message, frozen=True):
+    """An emergency stop that is in force: the component moves nothing until an operator lifts it.
+
+    Attributes:
+        number: Grows with each stop; the one that is lifted is named by it.
+        by: The operator who stopped the component.
+        reason: As given; may be empty.
+        since_s: Mission time of the stop.
+        is_confirmed: False if the hardware did not confirm that it stands still.
+    """
+
+    number: Count
+    by: Text
+    reason: Text
+    since_s: Instant
+    is_confirmed: bool = True
 
 
 class ComponentState(Message, frozen=True):
@@ -55,17 +74,19 @@ class ComponentState(Message, frozen=True):
         feedback: One line for people: what it is doing.
         requester: Address of whoever had it started.
         absent: Components that this one wants and that are absent.
+        stop: The emergency stop in force on it; None: there is none.
     """
 
-    address: str
-    type: str
-    host: str
-    pid: int
+    address: Address
+    type: Mention
+    host: Mention
+    pid: Pid
     state: LifeState
-    since_s: float
-    feedback: str = ""
-    requester: str = ""
-    absent: list[Absence] = []
+    since_s: Instant
+    feedback: Text = ""
+    requester: Mention = ""
+    absent: Annotated[list[Absence], MANY] = []
+    stop: StandingStop | None = None
 
 
 class AskTime(Message, frozen=True):
@@ -80,8 +101,8 @@ class MissionTime(Message, frozen=True):
         rate: Mission seconds per second of the machine.
     """
 
-    at_s: float
-    rate: float
+    at_s: Instant
+    rate: Rate
 
 
 class AskStatistics(Message, frozen=True):
@@ -91,7 +112,7 @@ class AskStatistics(Message, frozen=True):
 class Statistics(Message, frozen=True):
     """Answer to ``AskStatistics``: named counters and measures with their unit in the name."""
 
-    values: dict[str, float]
+    values: Annotated[dict[Mention, Measure], MANY]
 
 
 class AskParameters(Message, frozen=True):
@@ -101,7 +122,7 @@ class AskParameters(Message, frozen=True):
 class Parameters(Message, frozen=True):
     """Answer to ``AskParameters`` and ``SetParameter``: all parameters as they are now."""
 
-    values: dict[str, Any]
+    values: Values
 
 
 class SetParameter(Message, frozen=True):
@@ -113,9 +134,9 @@ class SetParameter(Message, frozen=True):
         user: Who wants it, for the record.
     """
 
-    name: str
+    name: Mention
     value: Any
-    user: str = ""
+    user: Mention = ""
 
 
 class AskStory(Message, frozen=True):
@@ -125,7 +146,7 @@ class AskStory(Message, frozen=True):
         subject: Only events about this name; empty for all.
     """
 
-    subject: str = ""
+    subject: Mention = ""
 
 
 class StoryEvent(Message, frozen=True):
@@ -139,17 +160,17 @@ class StoryEvent(Message, frozen=True):
         cause: Id of the message that led to it, empty for a first cause.
     """
 
-    at_s: float
-    where: str
-    what: str
-    subject: str
-    cause: str
+    at_s: Instant
+    where: Mention
+    what: Text
+    subject: Mention
+    cause: Mention
 
 
 class Story(Message, frozen=True):
     """Answer to ``AskStory``: the newest events, oldest first."""
 
-    events: list[StoryEvent]
+    events: Annotated[list[StoryEvent], MANY]
 
 
 class Stop(Message, frozen=True):
@@ -161,8 +182,8 @@ class Stop(Message, frozen=True):
             Another life of the same address refuses with ``OtherIncarnation``.
     """
 
-    reason: str = ""
-    incarnation: str = ""
+    reason: Text = ""
+    incarnation: Mention = ""
 
 
 class Stopping(Message, frozen=True):

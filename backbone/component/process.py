@@ -6,9 +6,7 @@ import asyncio
 import faulthandler
 import importlib
 import logging
-import os
 import signal
-import sys
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -19,6 +17,7 @@ from backbone.bus.interface import Clock
 from backbone.component.component import Component
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
+from backbone.component.logs import ComponentLog
 from backbone.errors import BackboneError, Refusal
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
@@ -65,18 +64,17 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -
         begin: Called before there is a loop.
     """
     faulthandler.enable()
-    logging.basicConfig(
-        level=os.environ.get("SCOUT_LOG", "INFO"),
-        stream=sys.stderr,
-        format=f"%(asctime)s %(levelname)s {launch.name} %(name)s: %(message)s",
-        force=True,
-    )
+    component_log = ComponentLog(launch.name, launch.run_directory)
+    component_log.install()
     try:
         work = begin()
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            component_log.watch(runner.get_loop())
             runner.run(work)
     except BaseException as error:
         return exit_code_of(error, launch.address)
+    finally:
+        component_log.close()
     return 0
 
 

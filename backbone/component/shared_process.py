@@ -26,6 +26,7 @@ from backbone.component.membership import (
     Admit,
     Admitted,
     AlreadyMember,
+    AskedAgain,
     AwaitEnd,
     EndMember,
     MemberEnded,
@@ -55,6 +56,18 @@ class _Member:
     component: Component[Any] | None = None
     ended: asyncio.Future[int] = field(default_factory=lambda: asyncio.get_running_loop().create_future())
     end_reason: str = ""
+    asked: asyncio.Future[int] | None = None
+
+    async def wait_ended(self) -> int:
+        """Return its exit code as soon as there is one; who asked before has given up, and waits no longer.
+
+        Raises:
+            AskedAgain: A newer question waits.
+        """
+        if self.asked is not None and not self.asked.done():
+            self.asked.set_exception(AskedAgain(f"the end of {self.launch.name} was asked for once more"))
+        self.asked = asyncio.shield(self.ended)
+        return await self.asked
 
     def end(self, reason: str) -> None:
         """Have it leave in good order, at once or as soon as it can be told."""
@@ -121,7 +134,7 @@ class SharedProcess:
                 self._admit(launch, life)
                 return Admitted()
             case AwaitEnd(life=life):
-                return MemberEnded(life, await asyncio.shield(self._member(life).ended))
+                return MemberEnded(life, await self._member(life).wait_ended())
             case EndMember(life=life):
                 self._member(life).end(f"told by {asked.source}")
                 return MemberEnding()

@@ -8,8 +8,11 @@ from functools import lru_cache
 
 from backbone.bus.interface import Clock, current_cause
 from backbone.component.messages import StoryEvent
+from backbone.printable import printable_all
+from backbone.ranges import LONGEST_MENTION
 
 LENGTH = 512  # chosen: some minutes of a busy component, under 100 kB
+LONGEST_WHAT = 1_000  # chosen: a refusal with its remedy; 512 of them are half a megabyte
 
 
 class StoryBook:
@@ -25,19 +28,23 @@ class StoryBook:
         self._events: deque[StoryEvent] = deque(maxlen=LENGTH)
 
     def note(self, subject: str, what: str) -> StoryEvent:
-        """Keep that this happened to the subject now, because of the message being handled."""
-        event = StoryEvent(self._clock.now_s(), self._where, what, subject, current_cause.get())
+        """Keep that this happened to the subject now, because of the message being handled; as printable text.
+
+        What is longer than ``LONGEST_WHAT`` is cut: others compose it too, and the book has its size.
+        """
+        what, subject, cause = what[:LONGEST_WHAT], subject[:LONGEST_MENTION], current_cause.get()[:LONGEST_MENTION]
+        event = printable_all(StoryEvent(self._clock.now_s(), self._where, what, subject, cause))
         self._events.append(event)
         return event
 
     def of(self, subject: str = "") -> list[StoryEvent]:
-        """Return the events about a subject, or all, oldest first."""
+        """Return the events about a subject or because of a message, or all, oldest first."""
         return [event for event in self._events if not subject or _is_about(event, subject)]
 
 
 def _is_about(event: StoryEvent, subject: str) -> bool:
-    """Say whether the event's subject or a whole name in its text is this one: not scout10 for scout1."""
-    return event.subject == subject or _spoken_of(subject).search(event.what) is not None
+    """Say whether the event's subject, its cause or a whole name in its text is this one: not scout10 for scout1."""
+    return subject in (event.subject, event.cause) or _spoken_of(subject).search(event.what) is not None
 
 
 @lru_cache(maxsize=64)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Annotated
 
 from backbone.errors import Refusal
 from backbone.naming import Subsystem
+from backbone.ranges import FEW, MANY, Count, Line, Mention
 from backbone.wire import Message
 
 ADDRESS = "backbone/component_database"
@@ -28,25 +30,26 @@ class ComponentType(Message, frozen=True):
         multiplicity: How many may run.
         core: True for core services, which only the bring-up starts.
         tags: Host tags its components need.
-        restart: True if its creator restarts it after an unexpected end.
+        restart: True if its creator restarts it however it ended, unless it was ordered to; False: its owner asks for
+            another one.
         needs: Kinds of RC it holds one of each; empty if it is no ARC.
     """
 
-    name: str
-    class_path: str
+    name: Mention
+    class_path: Line
     subsystem: Subsystem
     multiplicity: Multiplicity = Multiplicity.MANY
     core: bool = False
-    tags: list[str] = []
+    tags: Annotated[list[Mention], FEW] = []
     restart: bool = True
-    needs: list[str] = []
+    needs: Annotated[list[Mention], FEW] = []
 
 
 class Admit(Message, frozen=True):
     """May one more component of this type start under this name?"""
 
-    type: str
-    name: str
+    type: Mention
+    name: Mention
 
 
 class Admitted(Message, frozen=True):
@@ -63,13 +66,13 @@ class TypeCount(Message, frozen=True):
     """A type and how many of it run now."""
 
     component_type: ComponentType
-    running: int
+    running: Count
 
 
 class Types(Message, frozen=True):
     """Answer to ``ListTypes``, sorted by name."""
 
-    types: list[TypeCount]
+    types: Annotated[list[TypeCount], MANY]
 
 
 class UnknownType(Refusal):

@@ -91,7 +91,7 @@ class KeptCreator:
         """
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
-        directory = run_files.make_directory(f"{self._launch.mission}-{self._launch.host}")
+        directory = run_files.prepare(f"{self._launch.mission}-{self._launch.host}")
         if self._offered.secret:
             keep_secret(directory, self._offered.secret)
         self._zygote = await Zygote.spawn_fresh(run_directory=str(directory))

@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
+from typing import Annotated
 
 from backbone.errors import Refusal
 from backbone.naming import Subsystem
+from backbone.ranges import (
+    FEW,
+    MANY,
+    Count,
+    Duration,
+    ExitCode,
+    Line,
+    Mention,
+    Name,
+    NameOrNone,
+    Pause,
+    Pid,
+    Share,
+    Text,
+    Values,
+)
 from backbone.wire import Message
 
 TYPE = "creator"
@@ -29,12 +45,12 @@ class RestartPolicy(Message, frozen=True):
     """
 
     restart: bool = True
-    back_off_s: float = 0.05
-    back_off_most_s: float = 2.0
-    limit: int = 20
-    window_s: float = 60.0
-    failing_pause_s: float = 10.0
-    hung_after_s: float = 3.0
+    back_off_s: Duration = 0.05
+    back_off_most_s: Duration = 2.0
+    limit: Count = 20
+    window_s: Duration = 60.0
+    failing_pause_s: Duration = 10.0
+    hung_after_s: Duration = 3.0
 
 
 class Spawn(Message, frozen=True):
@@ -55,23 +71,23 @@ class Spawn(Message, frozen=True):
     """
 
     subsystem: Subsystem
-    name: str
-    type: str
-    class_path: str
-    parameters: dict[str, Any] = {}
-    requester: str = ""
+    name: Name
+    type: Mention
+    class_path: Line
+    parameters: Values = {}
+    requester: Mention = ""
     policy: RestartPolicy = RestartPolicy()
-    ready_within_s: float = READY_WITHIN_S
+    ready_within_s: Duration = READY_WITHIN_S
     pinned: bool = False
-    tags: list[str] = []
-    process: str = ""
+    tags: Annotated[list[Mention], FEW] = []
+    process: NameOrNone = ""
 
 
 class Spawned(Message, frozen=True):
     """Answer to ``Spawn``: it is ready."""
 
-    address: str
-    pid: int
+    address: Mention
+    pid: Pid
 
 
 class EndProcess(Message, frozen=True):
@@ -87,10 +103,10 @@ class EndProcess(Message, frozen=True):
         term_s: Seconds it has after SIGTERM.
     """
 
-    name: str
-    reason: str = ""
-    ask_s: float = 1.5
-    term_s: float = 0.5
+    name: Mention
+    reason: Text = ""
+    ask_s: Duration = 1.5
+    term_s: Duration = 0.5
 
 
 class EndedBy(StrEnum):
@@ -105,9 +121,9 @@ class EndedBy(StrEnum):
 class ProcessEnded(Message, frozen=True):
     """Answer to ``EndProcess``: nothing of it is left."""
 
-    name: str
+    name: Mention
     by: EndedBy
-    exit_code: int
+    exit_code: ExitCode
 
 
 class ListProcesses(Message, frozen=True):
@@ -127,19 +143,19 @@ class ProcessState(Message, frozen=True):
     """
 
     spawn: Spawn
-    pid: int
-    restarts: int
-    last_end: str
-    silent_s: float = 0.0
-    doing: str = ""
+    pid: Pid
+    restarts: Count
+    last_end: Text
+    silent_s: Duration = 0.0
+    doing: Text = ""
 
 
 class Processes(Message, frozen=True):
     """Answer to ``ListProcesses``: the truth about this host, from which others rebuild their picture."""
 
-    host: str
-    tags: list[str]
-    processes: list[ProcessState]
+    host: Mention
+    tags: Annotated[list[Mention], FEW]
+    processes: Annotated[list[ProcessState], MANY]
 
 
 class HostLoad(Message, frozen=True):
@@ -154,12 +170,12 @@ class HostLoad(Message, frozen=True):
         components: Number of components this creator runs.
     """
 
-    host: str
-    tags: list[str]
-    cpu: float
-    memory: float
-    cores: int
-    components: int
+    host: Mention
+    tags: Annotated[list[Mention], FEW]
+    cpu: Share
+    memory: Share
+    cores: Count
+    components: Count
 
 
 class ProcessFell(Message, frozen=True):
@@ -173,10 +189,10 @@ class ProcessFell(Message, frozen=True):
         failing: True if it ended more often than its policy's limit.
     """
 
-    name: str
-    how: str
-    restart_in_s: float
-    last_lines: list[str]
+    name: Mention
+    how: Text
+    restart_in_s: Pause
+    last_lines: Annotated[list[Text], FEW]
     failing: bool = False
 
 

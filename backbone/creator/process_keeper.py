@@ -22,6 +22,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.heartbeat import Vitals, forget_heartbeat, read_vitals
 from backbone.component.launch import Launch
+from backbone.component.logs import log_path
 from backbone.component.membership import (
     PROCESSES,
     Admit,
@@ -73,7 +74,6 @@ from backbone.creator.shared_processes import (
 from backbone.creator.silence import LOOK_EVERY_S, Silence
 from backbone.creator.supervision import Phase, Supervision
 from backbone.creator.zygote import NoProcess
-from backbone.creator.zygote_process import log_path
 from backbone.errors import BackboneError, Refusal
 from backbone.naming import IllegalName, Subsystem, component_of
 

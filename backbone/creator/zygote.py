@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable
 import msgspec
 
 from backbone.component.launch import Launch
+from backbone.component.logs import log_path, open_log
 from backbone.creator import process_table
 from backbone.creator.zygote_process import (
     LENGTH,
@@ -34,7 +35,6 @@ from backbone.creator.zygote_process import (
     ZygoteSettings,
     frame,
     fresh_interpreter,
-    log_path,
     serve,
 )
 from backbone.errors import BackboneError
@@ -264,9 +264,7 @@ def _spawn(settings: ZygoteSettings) -> _Body:
     with its:
         output = None
         if settings.run_directory:
-            path = log_path(settings.run_directory, "zygote")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            output = path.open("ab")
+            output = open_log(settings.run_directory, "zygote")
         process = subprocess.Popen(  # noqa: S603  our own interpreter, our own program
             fresh_interpreter(its.fileno(), settings),
             pass_fds=[its.fileno()],
@@ -277,7 +275,7 @@ def _spawn(settings: ZygoteSettings) -> _Body:
             start_new_session=True,
         )
         if output is not None:
-            output.close()
+            os.close(output)
     return _Body(process.pid, ours, process.wait)
 
 

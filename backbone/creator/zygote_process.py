@@ -34,9 +34,11 @@ from typing import NoReturn, assert_never
 import msgspec
 
 from backbone.component.launch import Launch
+from backbone.component.logs import redirect
 from backbone.component.process import EXIT_BUG, run_process
 from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
+from backbone.ranges import ExitCode, Pid, Signal, Text
 from backbone.run_files import ENDED
 from backbone.wire import Message
 
@@ -58,20 +60,20 @@ class Fork(Message, frozen=True):
 class Kill(Message, frozen=True):
     """Send the signal to everything that belongs to the component."""
 
-    pid: int
-    number: int
+    pid: Pid
+    number: Signal
 
 
 class Forked(Message, frozen=True):
     """It runs under this pid."""
 
-    pid: int
+    pid: Pid
 
 
 class ForkFailed(Message, frozen=True):
     """The system did not give another process."""
 
-    why: str
+    why: Text
 
 
 class Exited(Message, frozen=True):
@@ -82,8 +84,8 @@ class Exited(Message, frozen=True):
         returncode: Exit code, or the number of the signal that killed it, negative.
     """
 
-    pid: int
-    returncode: int
+    pid: Pid
+    returncode: ExitCode
 
 
 class ZygoteSettings(msgspec.Struct, frozen=True):
@@ -284,7 +286,7 @@ class _ZygoteProcess:
                 inherited.close()
             os.environ[process_table.MARK] = str(os.getpid())
             process_table.set_title(launch.name)
-            _redirect(launch)
+            redirect(launch.run_directory, launch.name)
             code = run_shared_process(launch) if launch.is_shared_process else run_process(launch)
         except BaseException:
             traceback.print_exc()
@@ -367,24 +369,3 @@ class _ZygoteProcess:
 
 def _only_wake(_number: int, _frame: object) -> None:
     """Let the wakeup descriptor do the work; a handler must exist for it to be written."""
-
-
-def _redirect(launch: Launch) -> None:
-    """Connect standard input to nothing, output and errors to the component's log while the mission has a folder."""
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
-    if launch.run_directory:
-        path = log_path(launch.run_directory, launch.name)
-        try:
-            file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
-        except FileNotFoundError:  # the mission ends just now and its folder is gone: do not bring it back
-            file = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(file, 1)
-        os.dup2(file, 2)
-        os.close(file)
-
-
-def log_path(run_directory: str, name: str) -> Path:
-    """Return where a component's output goes."""
-    return Path(run_directory) / "log" / f"{name}.log"

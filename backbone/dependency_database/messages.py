@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from backbone.errors import Refusal
+from backbone.ranges import FEW, MANY, Duration, Mention, Share, Values
 from backbone.wire import Message
 
 ADDRESS = "backbone/dependency_database"
@@ -29,18 +30,18 @@ class Resource(Message, frozen=True):
         process: Name of the process its RC shares with others; empty: a process of its own.
     """
 
-    name: str
-    type: str
-    host: str = ""
+    name: Mention
+    type: Mention
+    host: Mention = ""
     sharable: bool = False
-    capacity: float = 1.0
-    connect_s: float = 0.0
-    disconnect_s: float = 0.0
-    driver: str = "simulated"
-    parameters: dict[str, Any] = {}
-    features: list[str] = []
-    links: dict[str, list[str]] = {}
-    process: str = ""
+    capacity: Share = 1.0
+    connect_s: Duration = 0.0
+    disconnect_s: Duration = 0.0
+    driver: Mention = "simulated"
+    parameters: Values = {}
+    features: Annotated[list[Mention], FEW] = []
+    links: Annotated[dict[Mention, Annotated[list[Mention], MANY]], FEW] = {}
+    process: Mention = ""
 
     def rc_parameters(self) -> dict[str, Any]:
         """Return the parameters its RC is launched with: driver, sharing and links, then its own."""
@@ -55,7 +56,7 @@ class AskResources(Message, frozen=True):
 class Resources(Message, frozen=True):
     """Answer to ``AskResources``, sorted by name."""
 
-    resources: list[Resource]
+    resources: Annotated[list[Resource], MANY]
 
 
 class FindRcs(Message, frozen=True):
@@ -67,15 +68,15 @@ class FindRcs(Message, frozen=True):
         features: Kind → features wanted of that kind.
     """
 
-    roles: list[str]
-    wish: dict[str, str] = {}
-    features: dict[str, list[str]] = {}
+    roles: Annotated[list[Mention], FEW]
+    wish: Annotated[dict[Mention, Mention], MANY] = {}
+    features: Annotated[dict[Mention, Annotated[list[Mention], FEW]], FEW] = {}
 
 
 class RcSets(Message, frozen=True):
     """Answer to ``FindRcs``: kind → name, one entry a possible set, in the mission file's order; never empty."""
 
-    sets: list[dict[str, str]]
+    sets: Annotated[list[Annotated[dict[Mention, Mention], FEW]], MANY]
 
 
 class NoSuchHardware(Refusal):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from backbone.component.messages import ComponentState
 from backbone.errors import Refusal
+from backbone.ranges import MANY, Instant, Mention
 from backbone.wire import Message
 
 ADDRESS = "backbone/nameserver"
@@ -27,7 +30,7 @@ class Registered(Message, frozen=True):
 class Resolve(Message, frozen=True):
     """Where is the component of this name?"""
 
-    name: str
+    name: Mention
 
 
 class Resolved(Message, frozen=True):
@@ -39,8 +42,8 @@ class Resolved(Message, frozen=True):
 class ListComponents(Message, frozen=True):
     """Who is there? Empty fields match all."""
 
-    subsystem: str = ""
-    type: str = ""
+    subsystem: Mention = ""
+    type: Mention = ""
 
 
 class Components(Message, frozen=True):
@@ -51,11 +54,13 @@ class Components(Message, frozen=True):
         complete: False for the moment after the hub's own restart in which components still reconnect
             (``RECONNECT_S``): absence proves nothing then.
         hub_since_s: Mission time at which the hub began to listen.
+        unknown: Addresses that are alive and did not say yet who they are, sorted; they are not in the list.
     """
 
-    components: list[ComponentState]
+    components: Annotated[list[ComponentState], MANY]
     complete: bool
-    hub_since_s: float
+    hub_since_s: Instant
+    unknown: Annotated[list[Mention], MANY] = []
 
 
 class Appeared(Message, frozen=True):
@@ -67,7 +72,7 @@ class Appeared(Message, frozen=True):
 class Disappeared(Message, frozen=True):
     """Published when a component's liveliness token has fallen."""
 
-    address: str
+    address: Mention
 
 
 class NameTaken(Refusal):

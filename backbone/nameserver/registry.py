@@ -194,7 +194,9 @@ class Registry:
             for state in self.states()
             if (not subsystem or state.address.startswith(f"{subsystem}/")) and (not type or state.type == type)
         ]
-        return Components(found, self._is_complete(now_s), self._hub_since_s)
+        unknown = sorted(address for entry in self._entries.values() for address in entry.tokens)
+        unknown = [address for address in unknown if address.startswith(subsystem) and self.is_unknown(address)]
+        return Components(found, self._is_complete(now_s), self._hub_since_s, unknown)
 
     def states(self) -> Iterator[ComponentState]:
         """Yield everybody who is registered, sorted by address."""

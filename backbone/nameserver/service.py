@@ -10,6 +10,7 @@ beginning and bring-up need not wait. It leaves a file in the run directory by w
 from __future__ import annotations
 
 import asyncio
+import logging
 import os
 from pathlib import Path
 from typing import Any, assert_never
@@ -37,8 +38,10 @@ from backbone.nameserver.messages import (
     Resolved,
 )
 from backbone.nameserver.registry import CLAIM_WITHIN_S, Announce, Instruction, Introduce, Registry
-from backbone.naming import IllegalName, component_of, read_claim
+from backbone.naming import IllegalName, component_of, is_component, read_claim
 from backbone.wire import Envelope, Message, UnknownMessage
+
+log = logging.getLogger(__name__)
 
 HUB_BEGAN = "hub-began"
 INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; its token is then all we know
@@ -155,6 +158,9 @@ class Nameserver(Component[NameserverParameters]):
         self._registry.claim_changed(address, host, pid, stands=stands)
 
     def _token_changed(self, address: str, stands: bool) -> None:
+        if not is_component(address):  # a stranger's token: nobody would ever answer there, and each is kept
+            self.story.note(address, "ignored: no component can have this address")
+            return
         self._carry_out(self._registry.token_changed(address, stands=stands, now_s=self.clock.now_s()))
 
     def _status_heard(self, heard: Envelope[ComponentState]) -> None:
@@ -205,13 +211,16 @@ class Nameserver(Component[NameserverParameters]):
 
 
 def _is_first(launch: Launch) -> bool:
-    """Say whether no hub of this mission ran before; without a run directory nobody knows, so one may have."""
+    """Say whether no hub of this mission ran before; without a file to know it by, one may have."""
     if not launch.run_directory:
         return False
     directory = Path(launch.run_directory)
-    directory.mkdir(mode=0o700, parents=True, exist_ok=True)
     try:
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         (directory / HUB_BEGAN).touch(exist_ok=False)
     except FileExistsError:
+        return False
+    except OSError as error:
+        log.warning("no note of the first hub: %s; components are waited for as after a restart", error)
         return False
     return True

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated
 
 from backbone.creator.messages import EndedBy
 from backbone.errors import Refusal
+from backbone.ranges import FEW, MANY, Instant, Mention, NameOrNone, Pid, Text, Values
 from backbone.wire import Message
 
 ADDRESS = "backbone/placer"
@@ -23,12 +24,12 @@ class Start(Message, frozen=True):
         process: Name of the process it shares with others, which are on the same host then; empty: its own.
     """
 
-    type: str
-    name: str = ""
-    parameters: dict[str, Any] = {}
-    host: str = ""
-    tags: list[str] = []
-    process: str = ""
+    type: Mention
+    name: Mention = ""
+    parameters: Values = {}
+    host: Mention = ""
+    tags: Annotated[list[Mention], FEW] = []
+    process: NameOrNone = ""
 
 
 class Started(Message, frozen=True):
@@ -41,30 +42,30 @@ class Started(Message, frozen=True):
         reasons: One line a host: why it was chosen or not.
     """
 
-    address: str
-    host: str
-    pid: int
-    reasons: list[str]
+    address: Mention
+    host: Mention
+    pid: Pid
+    reasons: Annotated[list[Text], MANY]
 
 
 class StopComponent(Message, frozen=True):
     """End a component and forget that it was wanted."""
 
-    name: str
-    reason: str = ""
+    name: Mention
+    reason: Text = ""
 
 
 class Ended(Message, frozen=True):
     """Answer to ``StopComponent``: it is gone."""
 
-    name: str
+    name: Mention
     by: EndedBy
 
 
 class AskPlacement(Message, frozen=True):
     """Why is this component where it is?"""
 
-    name: str
+    name: Mention
 
 
 class Placement(Message, frozen=True):
@@ -79,12 +80,12 @@ class Placement(Message, frozen=True):
         reasons: One line a host: why it was chosen or not.
     """
 
-    name: str
-    type: str
-    host: str
-    requester: str
-    since_s: float
-    reasons: list[str]
+    name: Mention
+    type: Mention
+    host: Mention
+    requester: Mention
+    since_s: Instant
+    reasons: Annotated[list[Text], MANY]
 
 
 class ListPlacements(Message, frozen=True):
@@ -100,8 +101,8 @@ class Placements(Message, frozen=True):
             them again.
     """
 
-    placements: list[Placement]
-    stopped: dict[str, str] = {}
+    placements: Annotated[list[Placement], MANY]
+    stopped: Annotated[dict[Mention, Text], MANY] = {}
 
 
 class NoHost(Refusal):

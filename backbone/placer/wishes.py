@@ -38,7 +38,7 @@ class Wish:
 
     Attributes:
         name: The component.
-        missing_since_s: When it was first found missing; negative: it is placed, or was never started.
+        missing_since_s: When it was first found missing; negative: it is placed, or is being started.
         cause: Why it is missing.
         started: Whether it ever was placed.
     """
@@ -61,8 +61,7 @@ class Wish:
 
     def not_started(self, cause: str, now_s: float) -> float:
         """Take note that a start failed; return the pause before the next one, seconds of the machine."""
-        if self.started:
-            self.missing(cause, now_s)
+        self.missing(cause, now_s)
         pause_s, self._pause_s = self._pause_s, min(2 * self._pause_s, PAUSE_MOST_S)
         return pause_s
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from backbone.ranges import A_DAY_S
 from backbone.rc_manager.entries import CONNECTED
 from backbone.rc_manager.messages import (
     CapacityExceeded,
@@ -24,6 +25,8 @@ from backbone.rc_manager.radio_admission import admissible, remedy, stream, util
 from backbone.rc_manager.table import Table
 
 Wish = Mapping[str, RcUse]
+
+SHORTEST_RUNTIME_S = 0.001  # chosen: less than any context switch takes; shorter slices only keep RCs from everybody
 
 
 def choose(table: Table, request: SchedulingRequest) -> tuple[str, ...]:
@@ -98,9 +101,14 @@ def _share(streams: Sequence[Usage]) -> float:
     return utilization([stream(usage) for usage in streams])
 
 
+def can_be_planned(least_s: float, most_s: float) -> bool:
+    """Say whether slices of these times can be planned."""
+    return SHORTEST_RUNTIME_S <= least_s <= most_s <= A_DAY_S
+
+
 def _check_form(request: SchedulingRequest) -> None:
     least_s, most_s = request.minimum_runtime_s, request.maximum_runtime_s
-    if not (0 < least_s < math.inf and (most_s == 0 or least_s <= most_s < math.inf)):
+    if not (can_be_planned(least_s, least_s) and (most_s == 0 or can_be_planned(least_s, most_s))):
         raise MissingRuntime(f"{request.arc} asks for at least {least_s:g} s and at most {most_s:g} s", arc=request.arc)
     if not request.alternatives or not all(request.alternatives):
         raise SchedulingRefusal(f"{request.arc} asks for no RC", arc=request.arc)

@@ -20,20 +20,23 @@ STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a
 class Chronicle:
     """Hands out each line, and remembers the last ones."""
 
-    def __init__(self, tell: Callable[[Record], None]) -> None:
+    def __init__(self, tell: Callable[[Record], None], *, goes_on: bool = False) -> None:
         """Begin with nothing introduced.
 
         Args:
             tell: Takes each line, in order.
+            goes_on: True if the lines follow those of an earlier RC manager, by which an RC may be down.
         """
-        self._tell = tell
-        self._rcs: set[str] = set()
+        self._tell, self._goes_on = tell, goes_on
+        self._is_up: dict[str, bool] = {}
         self._nodes: dict[tuple[str, ...], tuple[str | None, int]] = {}
         self._ids: dict[tuple[str, ...], str] = {}
         self._story: deque[trace.Line] = deque(maxlen=STORY_LINES)
 
     def record(self, line: trace.Line, cause: str = "") -> None:
         """Write this line."""
+        if line["ev"] == "rc_state":
+            self._is_up[line["id"]] = line["state"] == "up"
         self._story.append(line)
         self._tell(Record(line, cause))
 
@@ -43,13 +46,17 @@ class Chronicle:
 
     def has_introduced(self, rc: str) -> bool:
         """Say whether the RC was introduced."""
-        return rc in self._rcs
+        return rc in self._is_up
+
+    def says_up(self, rc: str) -> bool | None:
+        """Return whether the RC is up by the lines so far; None if no line was about it."""
+        return self._is_up.get(rc)
 
     def introduce_rc(self, rc: RcEntry, now_s: float) -> None:
         """Introduce an RC that was not: when it is up for the first time, or asked for before."""
-        if rc.name in self._rcs:
+        if rc.name in self._is_up:
             return
-        self._rcs.add(rc.name)
+        self._is_up[rc.name] = True
         self.record(
             trace.rc(
                 now_s,
@@ -62,6 +69,8 @@ class Chronicle:
         )
         if not rc.up:
             self.record(trace.rc_state(now_s, rc.name, up=False), "not started yet")
+        elif self._goes_on:
+            self.record(trace.rc_state(now_s, rc.name, up=True), "it answers this RC manager")
 
     def introduce_nodes(self, path: Path, now_s: float) -> None:
         """Introduce new nodes, new numbers and new parents on this way, parents first."""

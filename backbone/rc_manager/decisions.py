@@ -42,9 +42,15 @@ class RcKnown:
 
 @dataclass(frozen=True, slots=True)
 class RcWentDown:
-    """The RC does not answer any more."""
+    """The RC does not answer any more, or cannot be believed.
+
+    Attributes:
+        rc: Its name.
+        fault: What it says that cannot be; empty: it does not answer.
+    """
 
     rc: str
+    fault: str = ""
 
 
 @dataclass(frozen=True, slots=True)

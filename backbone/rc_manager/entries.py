@@ -35,6 +35,7 @@ class RcEntry:
         epoch: Largest epoch given so far, at the beginning of settling.
         granted_epoch: Largest epoch of a grant so far.
         failed: True if it went down; False if it only was not started yet.
+        fault: Why it is put aside while it answers; empty: it is not.
         holders: ARCs that hold it, settling or not yet free of it, in the order in which they got it.
     """
 
@@ -48,6 +49,7 @@ class RcEntry:
     epoch: int
     granted_epoch: int = 0
     failed: bool = False
+    fault: str = ""
     holders: dict[ArcEntry, None] = field(default_factory=dict)
 
 

@@ -177,6 +177,8 @@ class Explanation:
         waiting = [(arc, self._place(arc, now_s)[1]) for arc in users if arc.queued]
         coming = sorted(waiting, key=lambda item: item[1])
         lines = [f"{rc.name} is {'up' if rc.up else 'down' if rc.failed else 'not started'}"]
+        if rc.fault:
+            lines = [f"{rc.name} is put aside: {rc.fault}"]
         lines += [
             f"{arc.name} holds it under epoch {arc.epochs[rc.name]} since {_at(arc.began_s)}: {self._where(arc, now_s)}"
             for arc in holders
@@ -196,7 +198,7 @@ class Explanation:
             rule="11" if not rc.up else "3",
             blockers=[arc.name for arc in holders],
             expected_start_s=next((granted_s for _, granted_s in coming if granted_s < math.inf), UNKNOWN_S),
-            would_change="its process answers again" if not rc.up else "a request, or the end of one, that names it",
+            would_change=_what_brings_back(rc) if not rc.up else "a request, or the end of one, that names it",
         )
 
     def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
@@ -249,7 +251,9 @@ class Explanation:
         age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
         down = [rc for rc in arc.uses if not self._table.rcs[rc].up]
         if down:
-            return _Told([f"{age} for {', '.join(down)}, not up"], "11", f"{', '.join(down)} answers")
+            faults = [f"{rc} is put aside: {self._table.rcs[rc].fault}" for rc in down if self._table.rcs[rc].fault]
+            reason = "; ".join([f"{age} for {', '.join(down)}, not up", *faults])
+            return _Told([reason], "11", f"{', '.join(down)} answers")
         if slot is None or not self._table.usable(arc):
             crowded = ", ".join(rc for rc in arc.uses if self._table.rcs[rc].sharable)
             return _Told([f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows")
@@ -330,6 +334,12 @@ class Explanation:
                 return arc.began_s + arc.length_s
             case _:
                 return UNKNOWN_S
+
+
+def _what_brings_back(rc: RcEntry) -> str:
+    if rc.fault:
+        return f"it makes sense again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
+    return "its process answers again"
 
 
 def _expected_s(arc: ArcEntry, granted_s: float) -> float:

@@ -11,15 +11,37 @@ Who speaks to whom:
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
+from typing import Annotated
 
 from backbone.errors import Refusal
+from backbone.ranges import (
+    FEW,
+    FEW_STREAMS,
+    MANY,
+    Address,
+    Count,
+    Duration,
+    Epoch,
+    Instant,
+    LeaseSeconds,
+    Mention,
+    Name,
+    Period,
+    Priority,
+    Rank,
+    RunTime,
+    Share,
+    Text,
+    Values,
+)
 from backbone.wire import Message
 
 ADDRESS = "backbone/rc_manager"
 
 LEASE_S = 2.0  # chosen: outlives a restart of the hub or RC manager (under 1 s), ends an orphan's hold soon
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
+EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
+EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
 BEAT_EVERY_S = 0.3  # chosen: ARC to RC manager; a hung ARC is noticed within BEAT_MISSED_S
 BEAT_MISSED_S = 1.0  # chosen: three beats
 
@@ -36,11 +58,11 @@ class Usage(Message, frozen=True):
         kind: What the requests are, for people (``drive``).
     """
 
-    period_s: float
-    packet_time_s: float
-    deadline_s: float = 0.0
-    jitter_s: float = 0.0
-    kind: str = ""
+    period_s: Period
+    packet_time_s: Period
+    deadline_s: Duration = 0.0
+    jitter_s: Period = 0.0
+    kind: Mention = ""
 
 
 class RcUse(Message, frozen=True):
@@ -50,14 +72,14 @@ class RcUse(Message, frozen=True):
         streams: Its streams; none means exclusive.
     """
 
-    streams: list[Usage] = []
+    streams: Annotated[list[Usage], FEW_STREAMS] = []
 
 
 class PathNode(Message, frozen=True):
     """One node on the way from the root to a decision process."""
 
-    name: str
-    priority: int
+    name: Name
+    priority: Priority
 
 
 class SchedulingRequest(Message, frozen=True):
@@ -76,13 +98,13 @@ class SchedulingRequest(Message, frozen=True):
             its slice need not wait for it.
     """
 
-    arc: str
-    owner: str
-    path: list[PathNode]
+    arc: Name
+    owner: Address
+    path: Annotated[list[PathNode], FEW]
     console: bool
-    alternatives: list[dict[str, RcUse]]
-    minimum_runtime_s: float
-    maximum_runtime_s: float = 0.0
+    alternatives: Annotated[list[Annotated[dict[Mention, RcUse], FEW]], MANY]
+    minimum_runtime_s: RunTime
+    maximum_runtime_s: RunTime = 0.0
     idle: bool = False
     stops_at_once: bool = False
 
@@ -108,54 +130,54 @@ class Scheduled(Message, frozen=True):
         expected_start_s: Mission time of the predicted grant; negative: none can be predicted.
     """
 
-    rcs: list[str]
+    rcs: Annotated[list[Mention], FEW]
     state: RequestState
-    position: int
-    blockers: list[str]
-    expected_start_s: float
+    position: Count
+    blockers: Annotated[list[Mention], MANY]
+    expected_start_s: Instant
 
 
 class Withdraw(Message, frozen=True):
     """This ARC needs no time any more and is about to end."""
 
-    arc: str
-    reason: str = ""
+    arc: Mention
+    reason: Text = ""
 
 
 class SetIdle(Message, frozen=True):
     """Keep the request, free the RCs (idle), or want them again (not idle)."""
 
-    arc: str
+    arc: Mention
     idle: bool
 
 
 class ChangeRuntime(Message, frozen=True):
     """Ask for other run times from the next slice on."""
 
-    arc: str
-    minimum_runtime_s: float
-    maximum_runtime_s: float = 0.0
+    arc: Mention
+    minimum_runtime_s: RunTime
+    maximum_runtime_s: RunTime = 0.0
 
 
 class Extend(Message, frozen=True):
     """Let the running slice last until this mission time, at most until grant + maximum run time."""
 
-    arc: str
-    until_s: float
+    arc: Mention
+    until_s: Instant
 
 
 class SetPriority(Message, frozen=True):
     """Give a node of the behavior tree, or a console, another priority among its siblings."""
 
-    node: str
-    priority: int
+    node: Mention
+    priority: Priority
 
 
 class MoveNode(Message, frozen=True):
     """Put a node of the behavior tree, with all below it, below another parent; its priority stays."""
 
-    node: str
-    parent: str
+    node: Mention
+    parent: Mention
 
 
 class Done(Message, frozen=True):
@@ -165,7 +187,7 @@ class Done(Message, frozen=True):
 class Beat(Message, frozen=True):
     """Published by each ARC under ``Conversation.BEAT`` every ``BEAT_EVERY_S``: my loop runs and my owner's too."""
 
-    arc: str
+    arc: Mention
 
 
 # ---------------------------------------------------------------------- to ARCs
@@ -178,9 +200,9 @@ class OpenGate(Message, frozen=True):
         until_s: Mission time until which the slice lasts at least, counted from now.
     """
 
-    epochs: dict[str, int]
-    settled_s: float
-    until_s: float
+    epochs: Annotated[dict[Mention, Epoch], FEW]
+    settled_s: Instant
+    until_s: Instant
 
 
 class GateOpens(Message, frozen=True):
@@ -197,10 +219,10 @@ class CloseGate(Message, frozen=True):
         expected_s: Mission time of the next expected slot; negative: unknown.
     """
 
-    reason: str
-    by: str
-    deadline_s: float
-    expected_s: float
+    reason: Text
+    by: Mention
+    deadline_s: Duration
+    expected_s: Instant
 
 
 class GateClosed(Message, frozen=True):
@@ -214,7 +236,7 @@ class AskRequest(Message, frozen=True):
 class TakePath(Message, frozen=True):
     """An operator changed your owner's priority or place: ask by this path from now on, also a later RC manager."""
 
-    path: list[PathNode]
+    path: Annotated[list[PathNode], FEW]
 
 
 class CurrentRequest(Message, frozen=True):
@@ -228,9 +250,9 @@ class CurrentRequest(Message, frozen=True):
     """
 
     request: SchedulingRequest
-    rcs: list[str]
-    epochs: dict[str, int]
-    granted_s: float
+    rcs: Annotated[list[Mention], FEW]
+    epochs: Annotated[dict[Mention, Epoch], FEW]
+    granted_s: Instant
 
 
 # ---------------------------------------------------------------------- to RCs
@@ -246,26 +268,26 @@ class Connect(Message, frozen=True):
         rank: Place in the order of user priority among the holders, 0 first; for sharable RCs.
     """
 
-    arc: str
-    epoch: int
-    lease_s: float
+    arc: Mention
+    epoch: Epoch
+    lease_s: LeaseSeconds
     use: RcUse
-    companions: dict[str, int]
-    rank: int = 0
+    companions: Annotated[dict[Mention, Epoch], FEW]
+    rank: Rank = 0
 
 
 class Connected(Message, frozen=True):
     """Answer to ``Connect``."""
 
-    epoch: int
+    epoch: Epoch
 
 
 class Disconnect(Message, frozen=True):
     """Stop serving this ARC: safe state, nothing queued survives. Right even if it is not connected."""
 
-    arc: str
-    epoch: int
-    reason: str = ""
+    arc: Mention
+    epoch: Epoch
+    reason: Text = ""
 
 
 class Disconnected(Message, frozen=True):
@@ -275,7 +297,7 @@ class Disconnected(Message, frozen=True):
         last_epoch: Largest epoch this RC has seen.
     """
 
-    last_epoch: int
+    last_epoch: Epoch
 
 
 class AskRc(Message, frozen=True):
@@ -285,10 +307,10 @@ class AskRc(Message, frozen=True):
 class Holder(Message, frozen=True):
     """One ARC an RC serves."""
 
-    arc: str
-    epoch: int
-    since_s: float
-    lease_until_s: float
+    arc: Mention
+    epoch: Epoch
+    since_s: Instant
+    lease_until_s: Instant
 
 
 class RcState(Message, frozen=True):
@@ -306,15 +328,15 @@ class RcState(Message, frozen=True):
         feedback: One line for people.
     """
 
-    name: str
-    kind: str
+    name: Mention
+    kind: Mention
     sharable: bool
-    capacity: float
-    holders: list[Holder]
-    last_epoch: int
-    applied: int
-    refused_stale: int
-    feedback: str = ""
+    capacity: Share
+    holders: Annotated[list[Holder], MANY]
+    last_epoch: Epoch
+    applied: Count
+    refused_stale: Count
+    feedback: Text = ""
 
 
 class Lease(Message, frozen=True):
@@ -328,10 +350,10 @@ class Lease(Message, frozen=True):
             when others come and go, and with every change of priority.
     """
 
-    rc: str
-    arc: str
-    epoch: int
-    rank: int = -1
+    rc: Mention
+    arc: Mention
+    epoch: Epoch
+    rank: Rank = -1
 
 
 class Leases(Message, frozen=True):
@@ -346,9 +368,9 @@ class Leases(Message, frozen=True):
         missing: RCs that do not answer, as far as the RC manager knows.
     """
 
-    leases: list[Lease]
-    lease_s: float
-    missing: list[str] = []
+    leases: Annotated[list[Lease], MANY]
+    lease_s: LeaseSeconds
+    missing: Annotated[list[Mention], MANY] = []
 
 
 # ---------------------------------------------------------------------- for everybody
@@ -372,16 +394,16 @@ class RcView(Message, frozen=True):
         next_s: Mission times of their predicted starts, for each of ``next``.
     """
 
-    rc: str
-    kind: str
-    state: str
+    rc: Mention
+    kind: Mention
+    state: Mention
     sharable: bool
-    capacity: float
-    holders: list[Holder]
-    last_epoch: int
-    next: list[str]
-    until_s: list[float] = []
-    next_s: list[float] = []
+    capacity: Share
+    holders: Annotated[list[Holder], MANY]
+    last_epoch: Epoch
+    next: Annotated[list[Mention], MANY]
+    until_s: Annotated[list[Instant], MANY] = []
+    next_s: Annotated[list[Instant], MANY] = []
 
 
 class RequestView(Message, frozen=True):
@@ -405,36 +427,36 @@ class RequestView(Message, frozen=True):
         raised: Levels by which it rose because it waits long.
     """
 
-    arc: str
-    owner: str
+    arc: Mention
+    owner: Mention
     state: RequestState
-    rcs: list[str]
-    since_s: float
-    until_s: float
-    expected_start_s: float
-    because: str
-    blockers: list[str]
-    minimum_runtime_s: float
-    priority: str
-    turns: int
-    rule: str = ""
-    would_change: str = ""
-    raised: int = 0
+    rcs: Annotated[list[Mention], FEW]
+    since_s: Instant
+    until_s: Instant
+    expected_start_s: Instant
+    because: Text
+    blockers: Annotated[list[Mention], MANY]
+    minimum_runtime_s: RunTime
+    priority: Text
+    turns: Count
+    rule: Mention = ""
+    would_change: Text = ""
+    raised: Count = 0
 
 
 class Schedule(Message, frozen=True):
     """Answer to ``AskSchedule``; also published on every change."""
 
-    at_s: float
-    rcs: list[RcView]
-    requests: list[RequestView]
-    groups: list[list[str]]
+    at_s: Instant
+    rcs: Annotated[list[RcView], MANY]
+    requests: Annotated[list[RequestView], MANY]
+    groups: Annotated[list[Annotated[list[Mention], MANY]], MANY]
 
 
 class AskWhy(Message, frozen=True):
     """Why does this ARC, decision process or RC wait, run or stand idle?"""
 
-    name: str
+    name: Mention
 
 
 class Why(Message, frozen=True):
@@ -450,19 +472,19 @@ class Why(Message, frozen=True):
         would_change: What would end the wait, for people.
     """
 
-    name: str
-    state: str
-    lines: list[str]
-    rule: str
-    blockers: list[str]
-    expected_start_s: float
-    would_change: str
+    name: Mention
+    state: Mention
+    lines: Annotated[list[Text], MANY]
+    rule: Mention
+    blockers: Annotated[list[Mention], MANY]
+    expected_start_s: Instant
+    would_change: Text
 
 
 class AskAttributes(Message, frozen=True):
     """What is asked for by this ARC, by this decision process, or by all at and below this node?"""
 
-    name: str
+    name: Mention
 
 
 class RequestAttributes(Message, frozen=True):
@@ -480,13 +502,13 @@ class RequestAttributes(Message, frozen=True):
         stops_at_once: True if the end of a slice need not wait for the decision process.
     """
 
-    arc: str
-    owner: str
+    arc: Mention
+    owner: Mention
     state: RequestState
-    uses: dict[str, RcUse]
-    minimum_runtime_s: float
-    maximum_runtime_s: float
-    path: list[PathNode]
+    uses: Annotated[dict[Mention, RcUse], FEW]
+    minimum_runtime_s: RunTime
+    maximum_runtime_s: RunTime
+    path: Annotated[list[PathNode], FEW]
     console: bool
     stops_at_once: bool
 
@@ -494,13 +516,13 @@ class RequestAttributes(Message, frozen=True):
 class Attributes(Message, frozen=True):
     """Answer to ``AskAttributes``: at least one request."""
 
-    requests: list[RequestAttributes]
+    requests: Annotated[list[RequestAttributes], MANY]
 
 
 class TraceLine(Message, frozen=True):
     """Published as an event: one decision, in the trace format of the schedule."""
 
-    line: dict[str, Any]
+    line: Values
 
 
 class SchedulingRefusal(Refusal):
@@ -514,7 +536,7 @@ class MissingRuntime(SchedulingRefusal):
     """The request lacks a usable minimum run time."""
 
     code = "scheduling.minimum_runtime"
-    remedy = "Give minimum_runtime_s above 0 and maximum_runtime_s of 0 or at least the minimum."
+    remedy = "Give minimum_runtime_s of 1 ms to a day, and maximum_runtime_s of 0 or at least the minimum."
 
 
 class UnknownRc(SchedulingRefusal):
@@ -564,6 +586,16 @@ class Held(Refusal):
 
     code = "rc.held"
     remedy = "Disconnect the holder first."
+
+
+def most_epoch(now_s: float) -> int:
+    """Return the largest epoch that can have been given by this mission time: an RC begins with the time of its start.
+
+    Example:
+        >>> most_epoch(2.5)
+        1002500
+    """
+    return int(max(0.0, now_s) * EPOCHS_PER_S) + EPOCHS_AHEAD
 
 
 RcManagerQuestion = (

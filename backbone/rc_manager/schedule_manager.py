@@ -31,7 +31,7 @@ from typing import assert_never
 import msgspec
 
 from backbone.rc_manager import trace
-from backbone.rc_manager.alternatives import choose
+from backbone.rc_manager.alternatives import can_be_planned, choose
 from backbone.rc_manager.attributes import attributes
 from backbone.rc_manager.chronicle import Chronicle
 from backbone.rc_manager.decisions import (
@@ -96,6 +96,7 @@ class ScheduleManager:
         exact_up_to: int = EXACT_UP_TO,
         mission: str,
         mission_priority: int,
+        goes_on: bool = False,
     ) -> None:
         """Begin with no RCs and no ARCs.
 
@@ -105,6 +106,7 @@ class ScheduleManager:
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
             mission_priority: Its number among the consoles.
+            goes_on: True if the trace goes on after that of an earlier RC manager.
         """
         self._rules = rules
         self._tolerance_s = tolerance_s
@@ -124,7 +126,7 @@ class ScheduleManager:
         self._wake_s: float | None = None
         self._replaced_by: dict[str, Requested] = {}
         self._retrying: dict[str, ArcEntry] = {}
-        self._chronicle = Chronicle(self._tell)
+        self._chronicle = Chronicle(self._tell, goes_on=goes_on)
 
     # Events in, instructions out.
 
@@ -157,8 +159,8 @@ class ScheduleManager:
         match event:
             case RcKnown():
                 self._rc_known(event)
-            case RcWentDown(rc=rc):
-                self._rc_down(rc)
+            case RcWentDown(rc=rc, fault=fault):
+                self._rc_down(rc, fault=fault)
             case RcCameBack(rc=rc, last_epoch=last_epoch):
                 self._rc_up(rc, last_epoch)
             case CapacityChanged(rc=rc, capacity=capacity):
@@ -454,7 +456,7 @@ class ScheduleManager:
         maximum_s = max(maximum_s, self._longest_s(minimum_s))
         if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
             return
-        if not 0 < minimum_s <= maximum_s < math.inf:
+        if not can_be_planned(minimum_s, maximum_s):
             return  # no slice can be planned for such times; the old ones hold on
         arc.minimum_s, arc.maximum_s = minimum_s, maximum_s
         self._table.touch(arc)
@@ -557,15 +559,19 @@ class ScheduleManager:
             self._rc_down(event.rc)
         self._capacity_changed(event.rc, event.capacity)
 
-    def _rc_down(self, name: str, lost_by: str = "") -> None:
+    def _rc_down(self, name: str, lost_by: str = "", fault: str = "") -> None:
         """Take note that the RC does not answer; its holders lose all their RCs, ``lost_by`` has lost them already."""
         rc = self._table.rcs.get(name)
-        if rc is None or not rc.up:
+        if rc is None:
+            return
+        if not lost_by:
+            rc.fault = fault
+        if not rc.up:
             return
         rc.up = False
         rc.failed = True
         self._table.rc_changed(name)
-        self._chronicle.record(trace.rc_state(self._now_s, name, up=False), "it does not answer")
+        self._chronicle.record(trace.rc_state(self._now_s, name, up=False), _aside(fault) or "it does not answer")
         for arc in [*self._table.arcs.values()]:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
                 self._revoke(arc, "rc", name)
@@ -581,6 +587,7 @@ class ScheduleManager:
             return
         rc.up = True
         rc.failed = False
+        rc.fault = ""
         self._table.rc_changed(name)
         if self._chronicle.has_introduced(name):
             self._chronicle.record(trace.rc_state(self._now_s, name, up=True), "it answers")
@@ -588,7 +595,7 @@ class ScheduleManager:
 
     def _capacity_changed(self, name: str, capacity: float) -> None:
         rc = self._table.rcs.get(name)
-        if rc is None or rc.capacity == capacity:
+        if rc is None or rc.capacity == capacity or not 0 <= capacity <= 1:
             return
         rc.capacity = capacity
         self._table.rc_changed(name)
@@ -658,6 +665,10 @@ class ScheduleManager:
             for rc, epoch in arc.epochs.items()
         ]
 
+    def epoch_of(self, rc: str) -> int:
+        """Return the largest epoch given for this RC so far; 0 if it is not known."""
+        return self._table.rcs[rc].epoch if rc in self._table.rcs else 0
+
     def opening_lines(self) -> list[Record]:
         """Return the records with which a trace begins."""
         return [Record(self._meta())]
@@ -681,6 +692,10 @@ class ScheduleManager:
         for promise, whom in broken(self._table, self._now_s):
             story = self._chronicle.story_of({arc.name for arc in whom})
             raise AssertionError("\n".join([f"broken at {self._now_s}: {promise}", *map(str, story)]))
+        for rc in self._table.rcs.values():
+            if self._chronicle.says_up(rc.name) not in (None, rc.up):
+                lines = map(str, self._chronicle.story_of({rc.name}))
+                raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))
 
     # Bookkeeping.
 
@@ -727,6 +742,10 @@ _CAUSES: Mapping[str, str] = {
     "dead": "it died (rule 11)",
     "silent": "it does not give signs of life (rule 11)",
 }
+
+
+def _aside(fault: str) -> str:
+    return f"it is put aside: {fault} (rule 11)" if fault else ""
 
 
 def _because(why: str, by: str) -> str:

@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import logging
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Iterable, Mapping
 from pathlib import Path
-from typing import Any, TextIO, assert_never
+from typing import Any, assert_never
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
@@ -32,6 +31,7 @@ from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
+from backbone.rc_manager.credibility import contradiction
 from backbone.rc_manager.decisions import (
     Adopted,
     CapacityChanged,
@@ -92,7 +92,8 @@ from backbone.rc_manager.messages import (
 from backbone.rc_manager.roll_call import Found, RollCall
 from backbone.rc_manager.rules import SchedulingRules
 from backbone.rc_manager.schedule_manager import ScheduleManager
-from backbone.wire import Envelope, Message
+from backbone.rc_manager.trace_file import TraceFile
+from backbone.wire import Envelope, MalformedMessage, Message
 
 log = logging.getLogger(__name__)
 
@@ -131,6 +132,7 @@ class RcManager(Component[RcManagerParameters]):
             tolerance_s=TOLERANCE_S,
             mission=given.mission,
             mission_priority=given.mission_priority,
+            goes_on=bool(given.trace) and _has_lines(Path(given.trace)),
         )
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
@@ -138,11 +140,13 @@ class RcManager(Component[RcManagerParameters]):
         self._beats: dict[str, float] = {}
         self._requesting: Counter[str] = Counter()
         self._failing_rcs: set[str] = set()
+        self._faults: dict[str, str] = {}
+        self._doubted: set[str] = set()
         self._starts: dict[str, asyncio.Task[None]] = {}
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
-        self._trace: TextIO | None = None
+        self._trace = TraceFile("")
         self._context_switch = ContextSwitch(bus, clock, self.story.note)
         self._roll_call = RollCall(bus, clock)
         self._found = Found({}, {})
@@ -152,13 +156,14 @@ class RcManager(Component[RcManagerParameters]):
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
         """Learn the hardware and, after a restart, who holds it; then watch the nameserver for changes."""
-        if self.parameters.trace:
-            self._trace = Path(self.parameters.trace).open("a", encoding="utf-8", buffering=1)  # noqa: ASYNC230, SIM115
+        self._trace = TraceFile(self.parameters.trace)
+        if self._trace.stopped_by:
+            self._trace_stopped()
         for record in self.manager.opening_lines():
             self._record(record)
         found = await self._roll_call.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
         self._resources = {resource.name: resource for resource in found.resources}
-        self._found = await self._roll_call.find(self._resources)
+        self._found = self._believed(await self._roll_call.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
     async def serve(self) -> None:
@@ -186,9 +191,8 @@ class RcManager(Component[RcManagerParameters]):
         for task in [*self._switches.values(), *self._starts.values()]:
             task.cancel()
         await asyncio.gather(*self._switches.values(), *self._starts.values(), return_exceptions=True)
-        if self._trace is not None:
-            self._trace.write(json.dumps({"ev": "end", "t": round(self.clock.now_s(), 6)}) + "\n")
-            self._trace.close()
+        self._trace.write({"ev": "end", "t": round(self.clock.now_s(), 6)})
+        self._trace.close()
 
     def statistics(self) -> dict[str, float]:
         """Count decisions and switches; switch times are from revoke to grant, settling not counted."""
@@ -305,11 +309,19 @@ class RcManager(Component[RcManagerParameters]):
 
     def _record(self, record: Record) -> None:
         line = dict(record.line)
-        if self._trace is not None:
-            self._trace.write(json.dumps(line) + "\n")
+        if not self._trace.write(line):
+            self._trace_stopped()
         subject = str(line.get("arc") or line.get("id") or "")
         self.story.note(subject, f"{line['ev']}{': ' + record.cause if record.cause else ''}")
         self.bus.publish(self.address, Conversation.EVENTS, TraceLine(line))
+
+    def _trace_stopped(self) -> None:
+        """Let people know; the mission goes on without a trace."""
+        self.tell(self.name, self._why_no_trace())
+        self.changed()
+
+    def _why_no_trace(self) -> str:
+        return f"the trace of the schedule stopped: {self._trace.stopped_by}"
 
     # ------------------------------------------------------------------ context switches
     async def _connect(self, order: ConnectArc) -> None:
@@ -341,7 +353,7 @@ class RcManager(Component[RcManagerParameters]):
         Raises:
             Refusal: One of them cannot be started.
         """
-        missing = [rc for rc in rcs if rc not in self._running_rcs]
+        missing = [rc for rc in rcs if rc not in self._running_rcs and rc not in self._faults]
         for rc in missing:
             if rc not in self._starts:
                 self._starts[rc] = asyncio.create_task(self._start_rc(self._resources[rc]), name=f"start {rc}")
@@ -360,26 +372,68 @@ class RcManager(Component[RcManagerParameters]):
         await self._meet_rc(resource.name)
 
     async def _meet_rc(self, rc: str) -> bool:
-        """Ask the RC how it is and let the schedule manager know; return whether it answered.
+        """Ask the RC how it is and let the schedule manager know; return whether it is up.
 
         It was counted as down, so whoever holds it still does so by an earlier grant: that ends first.
         """
         if rc in self._running_rcs:
             return True
-        try:
-            state = await self.bus.ask(_rc(rc), AskRc(), RcState, within_s=RC_REPLY_S)
-        except (Refusal, LinkError) as error:
-            log.warning("%s does not say how it is: %s", rc, error)
+        state = await self._ask_rc(rc)
+        if state is None:
             return False
         orphans = [(rc, holder.arc, holder.epoch) for holder in state.holders]
         if orphans and rc not in self._running_rcs:
             await self._context_switch.disconnect(orphans, "held from before it was down")
         if rc not in self._running_rcs:
+            if self._faults.pop(rc, ""):
+                self.story.note(rc, "makes sense again")
             self._running_rcs.add(rc)
             self.happened(RcCameBack(rc, state.last_epoch))
             if state.capacity != self._resources[rc].capacity:
                 self.happened(CapacityChanged(rc, state.capacity))
         return True
+
+    # ------------------------------------------------------------------ RCs that cannot be believed
+    async def _ask_rc(self, rc: str, given: int | None = None) -> RcState | None:
+        """Return how the RC is by its own answer; None if there is none, or one that cannot be, and it is put aside."""
+        try:
+            state = await self.bus.ask(_rc(rc), AskRc(), RcState, within_s=RC_REPLY_S)
+        except MalformedMessage as nonsense:
+            self._put_aside(rc, f"its answer cannot be read: {nonsense.detail}")
+            return None
+        except (Refusal, LinkError) as error:
+            log.warning("%s does not say how it is: %s", rc, error)
+            return None
+        fault = contradiction(state, self._resources[rc], self.clock.now_s(), given)
+        if fault:
+            self._put_aside(rc, fault)
+            return None
+        return state
+
+    def _put_aside(self, rc: str, fault: str) -> None:
+        """Plan nothing on this RC until it makes sense, and go on with the others."""
+        self._running_rcs.discard(rc)
+        if self._faults.get(rc) != fault:
+            self._faults[rc] = fault
+            log.warning("%s is put aside: %s", rc, fault)
+            self.tell(rc, f"is put aside: {fault}")
+            self.happened(RcWentDown(rc, fault))
+        if rc not in self._failing_rcs:
+            self.start_task(self._meet_later(rc), f"meet {rc}")
+
+    async def _ask_doubted(self, rc: str) -> None:
+        """Ask an RC itself about which something was published that cannot be: anybody may publish in its name."""
+        self._doubted.add(rc)
+        try:
+            await self._ask_rc(rc, self.manager.epoch_of(rc))
+        finally:
+            self._doubted.discard(rc)
+
+    def _believed(self, found: Found) -> Found:
+        """Return what was found without the RCs that cannot be as they say; they are met once this one serves."""
+        now_s = self.clock.now_s()
+        believed = {rc: s for rc, s in found.rcs.items() if not contradiction(s, self._resources[rc], now_s)}
+        return Found(believed, found.arcs)
 
     # ------------------------------------------------------------------ who is there
     def _take_over(self, found: Found) -> None:
@@ -436,9 +490,15 @@ class RcManager(Component[RcManagerParameters]):
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
         state: RcState = envelope.body
         rc = state.name
+        if rc not in self._resources:
+            return
         if rc not in self._running_rcs:
             if rc not in self._failing_rcs:
                 self.start_task(self._meet_again(rc), f"meet {rc}")
+            return
+        if contradiction(state, self._resources[rc], self.clock.now_s(), self.manager.epoch_of(rc)):
+            if rc not in self._doubted:
+                self.start_task(self._ask_doubted(rc), f"ask {rc}")
             return
         self.happened(CapacityChanged(rc, state.capacity))
         holds = {(holder.arc, holder.epoch) for holder in state.holders}
@@ -455,7 +515,7 @@ class RcManager(Component[RcManagerParameters]):
         return [lease for lease in self.manager.leases() if not self._context_switch.gives_back(lease.arc)]
 
     def _disappeared(self, name: str) -> None:
-        if name in self._running_rcs:
+        if name in self._running_rcs or self._faults.pop(name, ""):
             self._running_rcs.discard(name)
             self.happened(RcWentDown(name))
         elif name in self._uses:
@@ -515,6 +575,8 @@ class RcManager(Component[RcManagerParameters]):
         schedule = self.manager.schedule(self.clock.now_s())
         running = sum(1 for request in schedule.requests if request.state == "running")
         feedback = f"{running} of {len(schedule.requests)} ARCs run"
+        if self._trace.stopped_by:
+            feedback += f"; {self._why_no_trace()}"
         if feedback != self.feedback:
             self.feedback = feedback
             super().publish_news()
@@ -539,6 +601,10 @@ class RcManager(Component[RcManagerParameters]):
             await self._request(current.request)  # its own question was lost, or is still on its way
         except (Refusal, LinkError) as error:
             self.story.note(arc, f"cannot be scheduled: {error}")
+
+
+def _has_lines(trace: Path) -> bool:
+    return trace.is_file() and trace.stat().st_size > 0
 
 
 def _rc(rc: str) -> str:

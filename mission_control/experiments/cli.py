@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from backbone.cli import finite
 from backbone.errors import Refusal, code_of
 
 app = typer.Typer(
@@ -19,6 +20,9 @@ app = typer.Typer(
     help="Run the papers' experiments on simulated robots, many trials, faster than real time, from a seed.",
 )
 
+MOST_TRIALS = 1_000_000  # chosen: days of work
+LARGEST_SEED = 2**32 - 1  # as numpy has it
+MOST_JOBS = 1024  # chosen: more cores than any machine this was tried on
 PIPE_WIDTH = 200  # chosen: into a file or pipe nothing is cut; no table is wider
 
 
@@ -49,9 +53,9 @@ class Order(StrEnum):
     INTERLEAVED = "interleaved"
 
 
-Trials = Annotated[int, typer.Option("--trials", min=1, help="Of each condition.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="The same seed gives the same table.")]
-Jobs = Annotated[int, typer.Option("--jobs", min=0, help="Processes; 0: one a core.")]
+Trials = Annotated[int, typer.Option("--trials", min=1, max=MOST_TRIALS, help="Of each condition.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, max=LARGEST_SEED, help="The same seed gives the same table.")]
+Jobs = Annotated[int, typer.Option("--jobs", min=0, max=MOST_JOBS, help="Processes; 0: one a core.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 PlotTo = Annotated[Path | None, typer.Option("--plot", help="Write a picture of the rates, PNG or SVG.")]
 TracesTo = Annotated[Path | None, typer.Option("--traces", help="Folder for the schedule trace of each trial.")]
@@ -125,7 +129,7 @@ def surveillance(
 def load(
     policy: Annotated[Policy, typer.Option("--policy", help="How to ask.")] = Policy.PAPER,
     channels: Annotated[int, typer.Option("--channels", min=1, max=4, help="Video frequencies.")] = 1,
-    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, help="Share of time driven.")] = 1.0,
+    driven: Annotated[float, typer.Option("--driven", min=0.0, max=1.0, callback=finite, help="Share of time")] = 1.0,
     trials: Trials = 100,
     seed: Seed = 1,
     jobs: Jobs = 0,
@@ -142,9 +146,11 @@ def load(
 
 @app.command()
 def servoing(
-    trials: Annotated[int, typer.Option("--trials", min=1, help="Starts.")] = 100,
+    trials: Annotated[int, typer.Option("--trials", min=1, max=MOST_TRIALS, help="Starts.")] = 100,
     seed: Seed = 1,
-    noise: Annotated[float, typer.Option("--noise", min=0, max=10, help="Of the pictures: 0 none, 1 papers'.")] = 1.0,
+    noise: Annotated[
+        float, typer.Option("--noise", min=0, max=10, callback=finite, help="Of the pictures: 0 none, 1 papers'.")
+    ] = 1.0,
     jobs: Jobs = 0,
     as_json: AsJson = False,
 ) -> None:

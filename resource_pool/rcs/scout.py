@@ -16,8 +16,10 @@ from typing import Any
 
 import msgspec
 
+from backbone.atomic_file import replace_file
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import StandingStop
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -191,22 +193,33 @@ class Scout(ResourceController[ScoutParameters]):
                 self._latch.confirm(False)
             else:
                 self._latch.confirm(True)
+            self.changed()
         if is_new:
             self._tell_stop(self._latch.state, f"was stopped{f': {reason}' if reason else ''}")
         return self._latch.state
 
+    def standing_stop(self) -> StandingStop | None:
+        """Return the stop in force, for everybody who looks at the mission."""
+        state = self._latch.state
+        if not state.is_stopped:
+            return None
+        return StandingStop(state.number, state.by, state.reason, state.at_s, state.is_confirmed)
+
     def _tell_stop(self, state: StopState, what: str) -> None:
+        self.changed()
         self.bus.publish(self.address, Conversation.EVENTS, state)
         self.tell(self.name, f"{what} (by {state.by})")
 
     def _keep_stop(self) -> None:
-        """Let whatever runs as this RC after this process know."""
+        """Keep the stop for the next process of this RC; a disk that refuses must not keep the wheels turning."""
         if self._stop_file is None:
             return
-        self._stop_file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        whole = self._stop_file.with_suffix(".new")
-        whole.write_bytes(msgspec.msgpack.encode(self._latch.state))
-        whole.replace(self._stop_file)
+        try:
+            self._stop_file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            replace_file(self._stop_file, msgspec.msgpack.encode(self._latch.state), is_lasting=False)
+        except OSError as error:
+            news = "is stopped" if self._latch.state.is_stopped else "is free again"
+            self.tell(self.name, f"a restart of this RC will not know that {self.name} {news}: {error.strerror}")
 
     def _stopped(self, hold: Hold) -> None:
         """Note that the wheels stand, unless the robot has another holder by now."""

@@ -8,6 +8,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.ranges import Epoch, Mention, Share
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import DriverSite
 from resource_pool.holds import Hold
@@ -18,9 +19,9 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 class Shine(Message, frozen=True):
     """Shine this brightly, 0 (dark) to 1, under the grant of this epoch."""
 
-    arc: str
-    epoch: int
-    brightness: float
+    arc: Mention
+    epoch: Epoch
+    brightness: Share
 
 
 class PaintedLamp:

@@ -6,10 +6,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from full_disk import disk_full_at
 
 from backbone import run_files
 from backbone.errors import Refusal
-from backbone.run_files import MissionNotUp, RunFile, SeveralMissions, UnsafeDirectory
+from backbone.run_files import (
+    MissionNotUp,
+    RunFile,
+    RunFolderUnusable,
+    SeveralMissions,
+    TraceUnwritable,
+    UnsafeDirectory,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -72,7 +80,7 @@ def test_a_broken_file_is_passed_over() -> None:
 
 def test_removing_leaves_nothing_and_may_be_done_twice(runtime_directory: Path) -> None:
     path = run_files.write(up("iros2001"))
-    (path.parent / "log" / "scout1.log").touch()
+    (path.parent / "log").mkdir()
     run_files.remove("iros2001")
     run_files.remove("iros2001")
     assert list((runtime_directory / "scout-backbone").iterdir()) == []
@@ -102,7 +110,7 @@ def test_a_mission_name_cannot_lead_out_of_the_folder() -> None:
 
 
 def test_folders_that_killed_zygotes_hid_are_removed_at_the_next_beginning() -> None:
-    directory = run_files.make_directory("iros2001")
+    directory = run_files.prepare("iros2001")
     child = subprocess.Popen(["true"])
     child.wait()
     left, ending, others = (
@@ -111,5 +119,30 @@ def test_folders_that_killed_zygotes_hid_are_removed_at_the_next_beginning() -> 
     )
     for hidden in (left, ending, others):
         (hidden / "log").mkdir(parents=True)
-    run_files.make_directory("iros2001")
+    run_files.prepare("iros2001")
     assert [left.exists(), ending.exists(), others.exists()] == [False, True, True]
+
+
+def test_a_folder_that_takes_nothing_is_refused_before_anything_starts_and_is_away(runtime_directory: Path) -> None:
+    with disk_full_at(1000), pytest.raises(RunFolderUnusable, match="iros2001: File too large"):
+        run_files.prepare("iros2001")
+    assert list((runtime_directory / "scout-backbone").iterdir()) == []
+    run_files.write(up("iros2001"))
+    with disk_full_at(10), pytest.raises(RunFolderUnusable):
+        run_files.write(up("iros2001"))
+    assert run_files.find().mission == "iros2001", "the old one stays"
+
+
+def test_a_runtime_folder_that_cannot_be_made_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "file"))
+    with pytest.raises(RunFolderUnusable, match="Not a directory"):
+        run_files.find()
+
+
+def test_a_trace_that_cannot_be_opened_is_refused_and_an_old_one_stays(tmp_path: Path) -> None:
+    with pytest.raises(TraceUnwritable, match="No such file"):
+        run_files.require_writable(tmp_path / "no" / "trace.jsonl")
+    (tmp_path / "trace.jsonl").write_text("old")
+    run_files.require_writable(tmp_path / "trace.jsonl")
+    assert (tmp_path / "trace.jsonl").read_text() == "old"

@@ -18,7 +18,8 @@ from backbone.door import SocketPathTooLong
 from backbone.errors import Refusal
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission.reader import read_mission
-from backbone.preconditions import PortTaken, TraceUnwritable
+from backbone.preconditions import PortTaken
+from backbone.run_files import TraceUnwritable
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 FAR = Host(name="far", address="192.0.2.7")

@@ -28,6 +28,13 @@ ARC = {"kind": "capture", "minimum_runtime_s": 5.0, "wish": {"scout": "scout1"}}
 Run = Callable[[Callable[[FakePlacer], Awaitable[None]]], None]
 
 
+async def stop(placer: FakePlacer, name: str) -> None:
+    """Stop a component as an operator does."""
+    operator = placer.network.join("ui_console/cli", placer.clock)
+    await operator.ask("backbone/placer", StopComponent(name, "by command"), Ended, within_s=5.0)
+    await operator.close()
+
+
 class Watcher(Behavior[Any]):
     """Writes down all it hears."""
 
@@ -333,9 +340,9 @@ def test_a_parent_starts_its_children_with_their_paths_and_ends_them_with_itself
         await placer.wait(lambda: {"left", "right"} <= set(placer.components) and placer.arcs)
         path = placer.arcs["left-capture"].parameters["path"]
         assert path == [["iros2001", 10], ["surveillance", 5], ["left", 3]]
-        placer.components["surveillance"].end("test")
+        await stop(placer, "surveillance")
         await placer.wait(lambda: not placer.components)
-        assert set(placer.ended) == {"left", "right", "left-capture"}
+        assert set(placer.ended) == {"surveillance", "left", "right", "left-capture"}
 
     placer_world(scene)
 
@@ -355,6 +362,22 @@ def test_children_go_on_while_their_parent_is_away(placer_world: Run) -> None:
         await placer.clock.sleep_s(5.0)
         assert top.children == {"middle": BehaviorStatus.RUNNING}
         assert placer.components["leaf"] is before["leaf"]
+
+    placer_world(scene)
+
+
+def test_a_signal_that_ends_a_parent_leaves_its_children(placer_world: Run) -> None:
+    """SIGTERM from outside is no order to stop: the parent's next life adopts them as they are."""
+
+    async def scene(placer: FakePlacer) -> None:
+        await root(placer, node("top", "parent", 5, children=[node("leaf")]))
+        await placer.wait(lambda: "leaf" in placer.components)
+        leaf = placer.components["leaf"]
+        placer.components["top"].end("SIGTERM")
+        await placer.wait(lambda: "top" not in placer.components)
+        await placer.restart("top")
+        await placer.clock.sleep_s(3.0)
+        assert placer.components["leaf"] is leaf
 
     placer_world(scene)
 
@@ -525,9 +548,7 @@ def test_a_child_stopped_by_the_operator_is_left_alone(placer_world: Run) -> Non
         Parent.decisions = [Decision.RETRY]
         top = await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
         await placer.wait(lambda: {"a", "b"} <= set(placer.components))
-        operator = placer.network.join("ui_console/cli", placer.clock)
-        await operator.ask("backbone/placer", StopComponent("a", "by command"), Ended, within_s=5.0)
-        await operator.close()
+        await stop(placer, "a")
         await placer.wait(lambda: "a" not in top.children)
         assert set(placer.components) == {"top", "b"}
         assert top.status is BehaviorStatus.RUNNING

@@ -30,11 +30,11 @@ class Stubborn(Component[NoParameters]):
 
 
 class Late(Component[NoParameters]):
-    """Never becomes ready."""
+    """Never becomes ready, and shows no sign of life."""
 
     async def connect(self) -> None:
-        print("waits for what never comes", flush=True)
-        await self.clock.sleep_s(600.0)
+        print("blocks its event loop", flush=True)
+        time.sleep(600.0)  # noqa: ASYNC251  that is the fault
 
 
 class Broken(Component[NoParameters]):

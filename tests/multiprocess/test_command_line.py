@@ -132,6 +132,15 @@ def test_a_stopped_rc_is_started_again_when_it_is_claimed(mission: RunningMissio
     assert mission.component("scout3")["requester"] == "backbone/rc_manager"
 
 
+def test_an_rc_started_by_hand_comes_up_as_the_mission_file_says(mission: RunningMission) -> None:
+    for words in (("stop", "scout2"), ("start", "scout", "--name", "scout2")):
+        done = mission.command("scout-backbone", *words, "--mission", mission.name)
+        assert done.returncode == 0, done.stderr
+    shown = mission.command("scout-backbone", "set", "scout2", "network_id", "--mission", mission.name)
+    assert "2" in shown.stdout, shown.stdout + shown.stderr
+    assert mission.component("scout2")["pid"] == mission.component("scout1")["pid"]
+
+
 def test_a_machine_that_is_offered_takes_components_and_leaves_nothing_when_it_is_withdrawn(
     mission: RunningMission,
 ) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import psutil
 import pytest
 import pytest_asyncio
-from creator_host import CreatorHost, below, creator_host, left_of
+from creator_host import POLICY, CreatorHost, below, creator_host, left_of
 from running_mission import MARK, marked, wait_gone
 
 from backbone.creator.messages import EndedBy, RestartPolicy, StartFailed
@@ -68,7 +68,7 @@ async def test_ending_a_component_ends_what_it_started_too(host: CreatorHost) ->
     assert not left_of(children, 0.5)
 
 
-async def test_a_killed_component_leaves_nothing_and_is_restarted_then_given_up(host: CreatorHost) -> None:
+async def test_a_killed_component_leaves_nothing_and_is_restarted_slowly_from_its_limit_on(host: CreatorHost) -> None:
     pid = (await host.spawn("Parent", "scout1")).pid
     for restarts in (1, 2):
         children = below(pid)
@@ -83,11 +83,11 @@ async def test_a_killed_component_leaves_nothing_and_is_restarted_then_given_up(
         pid = (await host.process("scout1")).pid
     os.kill(pid, signal.SIGKILL)
 
-    async def is_given_up() -> bool:
-        return (await host.process("scout1")).given_up and len(host.fell) == 3
+    async def has_fallen_thrice() -> bool:
+        return len(host.fell) == 3
 
-    await soon(host, "given up", is_given_up)
-    assert [fell.restart_in_s for fell in host.fell] == [0.05, 0.1, -1.0]
+    await soon(host, "third fall", has_fallen_thrice)
+    assert [fell.restart_in_s for fell in host.fell] == [0.05, 0.1, POLICY.failing_pause_s]
 
 
 async def test_who_does_not_obey_is_killed(host: CreatorHost) -> None:
@@ -100,19 +100,62 @@ async def test_who_does_not_obey_is_killed(host: CreatorHost) -> None:
 async def test_a_failed_start_shows_the_end_of_the_log(host: CreatorHost) -> None:
     with pytest.raises(StartFailed, match="the bug of the sample"):
         await host.spawn("Broken", "broken")
-    with pytest.raises(StartFailed, match=r"(?s)not ready within 0\.5 s.*waits for what never comes"):
+    with pytest.raises(StartFailed, match=r"(?s)no sign of life for 0\.5 s.*blocks its event loop"):
         await host.spawn("Late", "late", ready_within_s=0.5)
     with pytest.raises(StartFailed, match="sample_components:Missing"):
         await host.spawn("Missing", "missing")
 
 
-async def test_a_component_may_leave_by_itself(host: CreatorHost) -> None:
-    await host.spawn("Leaver", "watcher")
+async def test_a_component_without_restart_may_leave_by_itself(host: CreatorHost) -> None:
+    await host.spawn("Leaver", "watcher", policy=RestartPolicy(restart=False))
 
     async def is_forgotten() -> bool:
         return "watcher" not in await host.processes()
 
     await soon(host, "forgotten", is_forgotten)
+    assert not host.fell
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+async def test_a_component_that_a_signal_ended_comes_back(host: CreatorHost, how: signal.Signals) -> None:
+    pid = (await host.spawn("Quiet", "scout1")).pid
+    os.kill(pid, how)
+
+    async def is_back() -> bool:
+        return (await host.process("scout1")).pid not in (0, pid)
+
+    await soon(host, "scout1 is back", is_back)
+
+
+async def test_a_stopped_process_is_replaced_and_never_comes_back_beside_its_successor(host: CreatorHost) -> None:
+    pid = (await host.spawn("Quiet", "scout1")).pid
+    os.kill(pid, signal.SIGSTOP)
+
+    async def is_seen_silent() -> bool:
+        return (await host.process("scout1")).silent_s > 0.5
+
+    async def is_replaced() -> bool:
+        return (await host.process("scout1")).pid not in (0, pid)
+
+    await soon(host, "seen as silent", is_seen_silent)
+    await soon(host, "replaced", is_replaced)
+    assert not psutil.pid_exists(pid)
+
+
+async def test_a_process_that_is_stopped_for_a_moment_goes_on(host: CreatorHost) -> None:
+    pid = (await host.spawn("Quiet", "scout1")).pid
+    os.kill(pid, signal.SIGSTOP)
+
+    async def is_seen_silent() -> bool:
+        return (await host.process("scout1")).silent_s > 0.5
+
+    async def is_well() -> bool:
+        return (await host.process("scout1")).silent_s == 0
+
+    await soon(host, "seen as silent", is_seen_silent)
+    os.kill(pid, signal.SIGCONT)
+    await soon(host, "well again", is_well)
+    assert (await host.process("scout1")).pid == pid
     assert not host.fell
 
 
@@ -197,10 +240,10 @@ async def test_a_component_that_is_not_to_be_restarted_is_left_down(host: Creato
     pid = (await host.spawn("Quiet", "scout1", policy=RestartPolicy(restart=False))).pid
     os.kill(pid, signal.SIGKILL)
 
-    async def is_given_up() -> bool:
-        return (await host.process("scout1")).given_up
+    async def is_left_down() -> bool:
+        return "scout1" not in await host.processes()
 
-    await soon(host, "left down", is_given_up)
+    await soon(host, "left down", is_left_down)
 
 
 def test_killing_the_launcher_ends_all_and_removes_its_folder(mark: str, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 import pytest_asyncio
-from creator_host import CreatorHost, creator_host
+from creator_host import POLICY, CreatorHost, creator_host
 from running_mission import MARK, wait_gone
 
 from backbone.component.messages import AskState, ComponentState
@@ -115,16 +115,17 @@ async def test_a_killed_process_is_followed_by_one_with_all_its_members(host: Cr
     }
 
 
-async def test_a_terminated_process_has_its_members_leave_in_good_order(host: CreatorHost) -> None:
+async def test_a_terminated_process_is_followed_by_one_with_all_its_members(host: CreatorHost) -> None:
     pid = await join(host, "scout1")
     await join(host, "radio")
     os.kill(pid, signal.SIGTERM)
 
-    async def are_forgotten() -> bool:
-        return not await pids(host)
+    async def are_back() -> bool:
+        found = await pids(host)
+        return set(found) == {"scout1", "radio"} and pid not in found.values() and 0 not in found.values()
 
-    await soon(host, "both have left", are_forgotten)
-    assert not host.fell
+    await soon(host, "both are back", are_back)
+    assert {(fell.name, fell.how) for fell in host.fell} == {("scout1", "exit code 0"), ("radio", "exit code 0")}
 
 
 async def test_a_member_that_hangs_is_killed_with_its_process_and_its_companions_come_back(host: CreatorHost) -> None:
@@ -145,35 +146,37 @@ async def test_a_member_that_cannot_start_tells_why_and_leaves_the_others_alone(
         await join(host, "broken", "Broken")
     with pytest.raises(StartFailed, match="sample_components:Missing"):
         await join(host, "missing", "Missing")
-    with pytest.raises(StartFailed, match="not ready within"):
-        await host.spawn("Late", "late", process="pool", ready_within_s=0.5)
     assert await pids(host) == {"scout1": pid}
 
 
-async def test_a_member_that_fails_is_restarted_beside_the_others_and_given_up_at_its_limit(host: CreatorHost) -> None:
+async def test_a_member_that_blocks_the_event_loop_is_ended_with_its_process_and_the_others_come_back(
+    host: CreatorHost,
+) -> None:
+    pid = await join(host, "scout1")
+    with pytest.raises(StartFailed, match="no sign of life"):
+        await host.spawn("Late", "late", process="pool", ready_within_s=0.5)
+
+    async def is_back() -> bool:
+        return "scout1" in await pids(host) and (await state_of(host, "scout1")).pid != pid
+
+    await soon(host, "scout1 is back", is_back)
+
+
+async def test_a_member_that_fails_is_restarted_beside_the_others_and_slowly_from_its_limit_on(
+    host: CreatorHost,
+) -> None:
     pid = await join(host, "scout1")
     assert await join(host, "radio", "Stumbling") == pid
 
-    async def is_given_up() -> bool:
-        return (await host.process("radio")).given_up and len(host.fell) == 3
+    async def has_fallen_thrice() -> bool:
+        return len(host.fell) == 3
 
-    await soon(host, "given up", is_given_up)
+    await soon(host, "third fall", has_fallen_thrice)
     assert {(fell.name, fell.how) for fell in host.fell} == {("radio", "exit code 1")}, host.story()
-    assert [fell.restart_in_s for fell in host.fell] == [0.05, 0.1, -1.0]
+    assert [fell.restart_in_s for fell in host.fell] == [0.05, 0.1, POLICY.failing_pause_s]
     assert any("the bug of the sample" in line for line in host.fell[0].last_lines)
     assert (await host.process("scout1")).restarts == 0
     assert (await state_of(host, "scout1")).pid == pid
-
-
-async def test_a_member_may_leave_by_itself(host: CreatorHost) -> None:
-    pid = await join(host, "scout1")
-    await join(host, "watcher", "Leaver")
-
-    async def is_forgotten() -> bool:
-        return await pids(host) == {"scout1": pid}
-
-    await soon(host, "forgotten", is_forgotten)
-    assert not host.fell
 
 
 async def test_a_hub_that_dies_takes_no_member_with_it_and_ends_are_heard_of_afterwards(host: CreatorHost) -> None:

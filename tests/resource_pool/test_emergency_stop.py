@@ -206,3 +206,30 @@ def test_a_stop_outlives_the_process_of_the_robots_rc(local_mission: Any, beside
                 assert not (await ask_stop(operator, "scout1")).is_stopped
 
     run_virtual(main())
+
+
+def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_kept(
+    local_mission: Any, beside: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "stops").touch()  # no folder can be made there
+
+    async def main() -> None:
+        async with a_pool(local_mission, ["radio"]) as pool:
+            launch = Launch(
+                "local",
+                Subsystem.RESOURCE_POOL,
+                "scout1",
+                "scout",
+                "x:Y",
+                "local",
+                "",
+                0.0,
+                1.0,
+                HARDWARE[0].rc_parameters(),
+                run_directory=str(tmp_path),
+            )
+            async with beside(Scout(launch, pool.network.join(launch.address, pool.clock), pool.clock)) as scout:
+                assert (await stop_robot(pool.voice_of(OPERATOR), "scout1", "fire", "anna")).is_stopped
+                assert any("will not know that scout1 is stopped" in one.what for one in scout.story.of("scout1"))
+
+    run_virtual(main())

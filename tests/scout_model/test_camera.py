@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from full_disk import disk_full_at
 from numpy.typing import NDArray
 
 from scout_model import gl_probe
@@ -171,6 +172,22 @@ def test_what_somebody_died_over_while_writing_it_is_found_out_anew(tmp_path: Pa
     first = probe_once(tmp_path, trial_time_s=0.001)
     assert first.backend == "none"
     assert probe_once(tmp_path) == first, "it was not kept"
+
+
+@pytest.mark.parametrize("folder", ["gone", "file"])
+def test_a_folder_that_cannot_be_written_into_makes_probing_only_slower(tmp_path: Path, folder: str) -> None:
+    (tmp_path / "file").touch()
+    assert probe_once(tmp_path / folder, trial_time_s=0.001).backend == "none"
+
+
+def test_a_disk_that_is_full_makes_probing_only_slower(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found, probed = GlSupport("egl", "a renderer", ""), []
+    monkeypatch.setattr(gl_probe, "probe", lambda trial_time_s: probed.append(trial_time_s) or found)
+    with disk_full_at(0):
+        assert [probe_once(tmp_path) for _ in range(2)] == [found] * 2
+    assert len(probed) == 2
+    assert [probe_once(tmp_path) for _ in range(2)] == [found] * 2
+    assert len(probed) == 3, "kept as soon as there is room"
 
 
 def test_probing_imports_no_mujoco() -> None:

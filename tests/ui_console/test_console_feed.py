@@ -11,8 +11,11 @@ from console_scenes import SCHEDULE
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
+from backbone.component.messages import Absence, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.health import HealthWord, MissionHealth
 from backbone.keys import Conversation
+from backbone.mission_picture import LAUNCHER
 from backbone.naming import Subsystem
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
@@ -20,11 +23,11 @@ from backbone.rc_manager.messages import AskSchedule, Lease, Leases, Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch
-from ui_console.console_events import ConsoleEvent, event_word
+from ui_console.console_events import ConsoleEvent, event_json, event_word
 from ui_console.console_model import ConsoleModel
 from ui_console.feed import PULSE_S
 from ui_console.observer import Observer
-from ui_console.views import AlarmKind
+from ui_console.views import AlarmKind, view_json
 
 Scene = Callable[["Stage"], Awaitable[None]]
 
@@ -130,6 +133,28 @@ def test_one_that_comes_late_hears_how_things_are_and_then_what_changes(stage: C
                 manager.tell("scout1", "saw something")
                 await on.until(lambda: "leases" in on.words() and on.model.log())
                 assert on.model.log()[-1].what == "saw something"
+
+    stage(scene)
+
+
+def test_what_the_bus_brings_is_printable_text_before_a_screen_sees_it(stage: Callable[[Scene], None]) -> None:
+    hostile = "\x1b]0;owned\x07\x1b[2J\rall is well\u202e"
+
+    async def scene(on: Stage) -> None:
+        async with on.beside(on.manager()) as manager, on.beside(on.robot("scout1")) as robot, on.beside(on.observer()):
+            await on.until(lambda: "components" in on.words())
+            story = StoryEvent(1.0, hostile, hostile, hostile, hostile)
+            manager.bus.publish(RC_MANAGER, Conversation.LOG, story)
+            absent = [Absence(hostile, 1.0, hostile, hostile, "x" * 1_000_000)]
+            health = MissionHealth(HealthWord.FAILED, absent)
+            manager.bus.publish(LAUNCHER, Conversation.HEALTH, health)
+            robot.report(hostile)
+            said = {"story", "health"}
+            await on.until(lambda: said <= on.words() and "all is well" in on.model.view(2.0).robots[0].feedback)
+            shown = view_json(on.model.view(2.0)).decode()
+            assert shown.isprintable()
+            assert len(shown) < 100_000
+            assert all(event_json(event).decode().isprintable() for event in on.events)
 
     stage(scene)
 

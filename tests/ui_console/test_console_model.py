@@ -264,6 +264,9 @@ def test_packets_late_on_a_radio_are_an_alarm_each_time_there_are_more() -> None
         ([ComponentHeard(1.0, component("resource_pool/s", "scout", feedback="free, not safe after a"))],
          AlarmKind.UNSAFE),
         ([StopHeard(1.0, STOP)], AlarmKind.STOPPED),
+        ([ComponentHeard(1.0, component("backbone/rc_manager", "rc_manager",
+                                        feedback="the trace of the schedule stopped: No space left on device"))],
+         AlarmKind.NOT_RECORDED),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_an_alarm_while_it_is_so(events: list[ConsoleEvent], kind: AlarmKind) -> None:

@@ -7,10 +7,12 @@ are read from it, so what is shown is what ``check`` and ``up`` will read. To un
 from __future__ import annotations
 
 import bisect
+import contextlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
 
+from backbone.atomic_file import remove_leftover
 from backbone.dry_run import DryRun, dry_run
 from backbone.mission.document import read_bytes
 from backbone.mission.edit import Node, Path, outline, set_attribute
@@ -52,11 +54,13 @@ class Draft:
 
     @classmethod
     def opened(cls, source: str) -> Draft:
-        """Return what the file holds, with all that is wrong with it.
+        """Return what the file holds, with all that is wrong with it; what a killed save left beside it is gone.
 
         Raises:
             MissionInvalid: It cannot be read, or not even as XML.
         """
+        with contextlib.suppress(OSError):  # it can be opened all the same
+            remove_leftover(FilePath(source).resolve())
         report = Report(source)
         text = read_bytes(FilePath(source), report)
         if text is None:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import stat
-import tempfile
 from pathlib import Path
 
+from backbone.atomic_file import replace_file
 from backbone.errors import Refusal
 from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
@@ -51,30 +48,3 @@ def save(draft: Draft, path: Path, *, overwrite: bool = False) -> Draft:
     except OSError as error:
         raise NotSaved(f"{path}: {error.strerror or error}") from error
     return draft.kept(str(path))
-
-
-def replace_file(target: Path, text: bytes) -> None:
-    """Have a file hold these bytes: whoever reads it meanwhile sees all of the old or all of the new; its mode stays.
-
-    Raises:
-        OSError: The system refused; the file is as it was.
-    """
-    descriptor, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        mode = stat.S_IMODE(target.stat().st_mode) if target.exists() else 0o666 & ~_umask()
-        os.chmod(name, mode)
-        os.replace(name, target)
-    except BaseException:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(name)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

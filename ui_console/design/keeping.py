@@ -11,13 +11,13 @@ from pathlib import Path
 
 import msgspec
 
+from backbone.atomic_file import remove_leftover, replace_file
 from backbone.errors import Refusal
 from backbone.mission.document import MAX_BYTES
 from backbone.mission.edit import outline
 from backbone.mission.report import MissionInvalid
 from ui_console.design.draft import Draft
 from ui_console.design.effects import Step
-from ui_console.design.file import replace_file
 
 FORMAT = 1
 MOST_BYTES = 4 * MAX_BYTES  # two texts in Base64 and what is around them
@@ -61,6 +61,8 @@ class DraftFile:
         Raises:
             DraftUnreadable: It is no draft.
         """
+        with contextlib.suppress(OSError):  # what there is can be read all the same
+            remove_leftover(self.path)
         try:
             if not self.path.exists():
                 return None

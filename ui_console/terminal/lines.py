@@ -15,6 +15,7 @@ from ui_console.views import (
     Certainty,
     ComponentRow,
     ConsoleView,
+    HealthView,
     HostView,
     LinkView,
     LogRow,
@@ -38,6 +39,8 @@ NODE_MARKS = {
     NodeState.LOST: ("!", "bold red"),
 }
 ALARM_STYLES = {Severity.ALARM: "bold red", Severity.WARNING: "yellow", Severity.NOTICE: "cyan"}
+_HEALTH_STYLES = {"ok": "green", "degraded": "bold yellow", "failed": "bold red"}
+HEALTH_COLUMNS = 60  # chosen: half a wide terminal; the alarms show the rest
 BUSY_CPU = 0.8  # chosen: from here on a host's load is shown in yellow
 NAME_COLUMNS = 10
 SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
@@ -137,6 +140,8 @@ def status_text(view: ConsoleView, speed_rad_s: float | None, hint: str) -> Text
     own = view.own
     style = "bold white on red" if own.stop else "bold black on green" if own.is_held else "bold"
     parts = [Text(f" {own.status} ", style=style)]
+    if view.health is not None:
+        parts.append(_health(view.health))
     if hint:
         parts.append(Text(hint, style="bold yellow"))
     unseen = [alarm for alarm in view.alarms if not alarm.acknowledged_by]
@@ -152,6 +157,12 @@ def status_text(view: ConsoleView, speed_rad_s: float | None, hint: str) -> Text
             _video(video.age_s, video.rate_hz, video.is_stale) for video in view.videos if video.robot == own.robot
         ]
     return Text(" · ").join(parts)
+
+
+def _health(health: HealthView) -> Text:
+    first = f": {health.lines[0]}" if health.lines else ""
+    cut = f"{first[: HEALTH_COLUMNS - 1]}…" if len(first) > HEALTH_COLUMNS else first
+    return Text(f"mission {health.word}{cut}", style=_HEALTH_STYLES[health.word])
 
 
 def _video(age_s: float, rate_hz: float, is_stale: bool) -> Text:

@@ -116,11 +116,11 @@ class WebHub:
         """
         now_s = self.clock.now_s()
         line = f"{who} {offence.line}"
-        log.warning("%s", line)
         key = f"{AlarmKind.VISITOR}:{offence.fault}:{who}"
         self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, offence.remedy, key)
         if now_s >= self._told_s.get(offence.fault, -TOLD_EVERY_S) + TOLD_EVERY_S:
             self._told_s[offence.fault] = now_s
+            log.warning("%s", line)
             if self.observer.state is LifeState.READY:
                 self.observer.tell("web", line)
 
@@ -208,6 +208,7 @@ class WebHub:
             "requests": team.requests(),
             "timeline": team.timeline(now_s),
             "hosts": team.hosts(now_s),
+            "health": team.health(now_s),
             "parameters": team.parameters(),
             "components": team.components(),
             "log": team.log(),

@@ -11,6 +11,7 @@ import msgspec
 
 from backbone.bus.interface import Clock
 from backbone.errors import LinkError, Refusal
+from backbone.printable import printable_all
 from ui_console.console_events import (
     Attention,
     CommandApplied,
@@ -159,7 +160,7 @@ class Operator:
             self.is_there = event.is_there
             self._hands.attention_changed()
             return
-        self.model.apply(event)
+        self.model.apply(printable_all(event))
         if not isinstance(event, PictureSeen | CommandApplied):
             self.refresh(self._hands.clock.now_s())
 

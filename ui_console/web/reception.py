@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sized
 from contextlib import asynccontextmanager
+from functools import partial
 from ssl import SSLContext
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.datastructures import Headers
@@ -17,14 +18,12 @@ from websockets.http11 import Request, Response
 from backbone.errors import Refusal
 from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Fault, Hello, IntentT, Offence, Visitor, Welcome
 from ui_console.web.outbox import Outbox
+from ui_console.web.porch import CLOSE_WITHIN_S, OPEN_WITHIN_S, Porch
 from ui_console.web.site import SOCKET_PATH, Answer, Site, is_own_page
 
-OPEN_WITHIN_S = 5.0  # chosen: a request is a few lines
 PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
 READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
-CLOSE_WITHIN_S = 1.0  # chosen: who does not say goodbye is cut off
 MOST_OPERATORS = 32  # chosen: more browsers than a team has people
-MOST_STRANGERS = 16  # chosen: who has shown no token yet; apart, so that they never take an operator's place
 MOST_UNREAD = 8  # messages read ahead of what is obeyed
 SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
 FATAL_CODES = {
@@ -97,7 +96,6 @@ class Reception(Generic[GuestT, IntentT]):
         understand: Callable[[bytes | str], Hello | IntentT],
     ) -> None:
         self._house, self._doorkeeper, self._site, self._understand = house, doorkeeper, site, understand
-        self._strangers = 0
 
     @asynccontextmanager
     async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
@@ -111,17 +109,22 @@ class Reception(Generic[GuestT, IntentT]):
         Raises:
             CannotListen: The address cannot be had.
         """
-        async with await self._listen(host, port, encryption) as server:
-            yield server
+        porch = Porch(encryption, self._house.offended)
+        async with await self._listen(host, port, porch) as server:
+            try:
+                yield server
+            finally:
+                server.close()
+                porch.close()
 
-    async def _listen(self, host: str, port: int, encryption: SSLContext | None) -> Server:
-        is_encrypted = encryption is not None
+    async def _listen(self, host: str, port: int, porch: Porch) -> Server:
         try:
             return await serve(
-                self._meet,
+                partial(self._meet, porch),
                 host,
                 port,
-                process_request=self._answer,
+                process_request=partial(self._answer, porch),
+                create_connection=cast(Any, porch.gate),
                 compression=None,
                 server_header=None,
                 open_timeout=OPEN_WITHIN_S,
@@ -131,37 +134,33 @@ class Reception(Generic[GuestT, IntentT]):
                 max_size=MAX_MESSAGE_BYTES,
                 max_queue=MOST_UNREAD,
                 write_limit=SEND_AHEAD_BYTES,
-                ssl=encryption,
-                ssl_handshake_timeout=OPEN_WITHIN_S if is_encrypted else None,
-                ssl_shutdown_timeout=CLOSE_WITHIN_S if is_encrypted else None,
             )
         except OSError as error:
             raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
 
-    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+    def _answer(self, porch: Porch, connection: ServerConnection, request: Request) -> Response | None:
         """Return the file asked for; None: it is the page's socket."""
+        porch.asked(connection)
         if request.path.partition("?")[0] != SOCKET_PATH:
             return _response(self._site.answer(request.path, request.headers.get("If-None-Match", "")))
         if not is_own_page(request.headers.get("Origin", ""), request.headers.get("Host", "")):
             remedy = "Close that page; only this server's own may connect."
             self._house.offended(_who(connection), Offence(Fault.ORIGIN, "shows a page of another site", remedy))
             return connection.respond(403, "A page of another site may not connect.\n")
-        if len(self._house.guests) >= MOST_OPERATORS or self._strangers >= MOST_STRANGERS:
-            line = f"found {len(self._house.guests)} guests and {self._strangers} strangers there"
-            self._house.offended("a browser", Offence(Fault.CROWD, line, "Close some pages."))
-            return connection.respond(503, "Too many are connected.\n")
         return None
 
-    async def _meet(self, connection: ServerConnection) -> None:
+    async def _meet(self, porch: Porch, connection: ServerConnection) -> None:
         """Serve one connection to its end."""
         visitor = Visitor(self._doorkeeper, self._understand, _now_s())
-        self._strangers += 1
-        try:
-            welcome = await self._wait_welcome(connection, visitor)
-        finally:
-            self._strangers -= 1
-        if welcome is not None:
-            await self._serve(connection, visitor, welcome)
+        welcome = await self._wait_welcome(connection, visitor)
+        if welcome is None:
+            return
+        if len(self._house.guests) >= MOST_OPERATORS:
+            line = f"found {len(self._house.guests)} guests there, which is the most"
+            await self._refuse(connection, welcome.user, Offence(Fault.CROWD, line, "Close some pages."))
+            return
+        porch.admit(connection)
+        await self._serve(connection, visitor, welcome)
 
     async def _wait_welcome(self, connection: ServerConnection, visitor: Visitor[IntentT]) -> Welcome | None:
         try:

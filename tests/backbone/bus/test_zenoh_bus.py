@@ -27,6 +27,12 @@ SERVER, ASKER = "backbone/server", "ui_console/asker"
 CLOCK = MissionClock.started_now()
 
 
+class Letter(Message, frozen=True):
+    """A message of any length."""
+
+    text: str
+
+
 async def within(work: Awaitable[Any], what: str, limit_s: float = DEADLINE_S) -> Any:
     try:
         async with asyncio.timeout(limit_s):
@@ -188,15 +194,15 @@ async def test_an_answer_that_cannot_be_written_is_a_bug_of_the_answerer() -> No
 
 async def test_a_large_message_passes_whole() -> None:
     async def answer(asked: Envelope[Any]) -> Message:
-        return Stop(asked.body.reason[::-1])
+        return Letter(asked.body.text[::-1])
 
     endpoint = free_endpoint()
     text = "0123456789" * 700_000
     async with hub_at(endpoint), joined(endpoint, SERVER, ASKER) as (server, asker):
-        server.serve(SERVER, Stop, answer)
+        server.serve(SERVER, Letter, answer)
         server.declare_alive(SERVER)
         await until_alive(asker, SERVER)
-        assert (await asker.ask(SERVER, Stop(text), Stop, within_s=DEADLINE_S)).reason == text[::-1]
+        assert (await asker.ask(SERVER, Letter(text), Letter, within_s=DEADLINE_S)).text == text[::-1]
 
 
 async def test_a_hub_that_dies_and_returns_is_noticed_and_everything_declared_stands_again() -> None:
@@ -307,3 +313,51 @@ async def test_an_opening_that_is_cancelled_closes_its_session() -> None:
             assert await asyncio.to_thread(gone.wait, DEADLINE_S), "the session that opened after all was not closed"
     finally:
         await asyncio.to_thread(hub.close)
+
+
+class CountedSession:
+    """A session that counts the publishers that stand."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._of = session
+        self.standing = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._of, name)
+
+    def declare_publisher(self, at: str, **how: Any) -> CountedPublisher:
+        self.standing += 1
+        return CountedPublisher(self, self._of.declare_publisher(at, **how))
+
+
+class CountedPublisher:
+    def __init__(self, session: CountedSession, publisher: zenoh.Publisher) -> None:
+        self._session, self._of = session, publisher
+
+    def put(self, payload: bytes) -> None:
+        self._of.put(payload)
+
+    def undeclare(self) -> None:
+        self._session.standing -= 1
+        self._of.undeclare()
+
+
+async def test_who_publishes_under_ever_new_addresses_does_not_grow() -> None:
+    """As a framegrabber does for each ARC that holds it: every visit of a console has one of its own."""
+    endpoint = free_endpoint()
+    async with hub_at(endpoint), joined(endpoint, ASKER) as [listener]:
+        heard: list[str] = []
+        listener.subscribe("resource_pool/*", Conversation.FRAMES, Stop, lambda one: heard.append(one.body.reason))
+        session = CountedSession(zenoh_bus.open_session(client_config(endpoint)))
+        bus = ZenohBus("hostile", SERVER, CLOCK, session)  # type: ignore[arg-type]
+        try:
+            for number in [*range(300), 0]:
+                bus.publish(f"resource_pool/arc-{number}", Conversation.FRAMES, Stop(str(number)))
+            assert session.standing == zenoh_bus.MOST_PUBLISHERS
+            async with asyncio.timeout(DEADLINE_S):
+                while len(heard) < 301:
+                    bus.publish("resource_pool/arc-0", Conversation.FRAMES, Stop("again"))
+                    await CLOCK.sleep_s(0.05)
+            assert heard[:301] == [*map(str, range(300)), "0"]
+        finally:
+            await bus.close()

@@ -17,6 +17,7 @@ from backbone.bus.interface import Bus
 from backbone.component.component import OtherIncarnation
 from backbone.component.heartbeat import Vitals
 from backbone.component.launch import Launch
+from backbone.component.logs import log_path
 from backbone.component.messages import Stop, Stopping
 from backbone.creator.messages import (
     AlreadyHere,
@@ -28,7 +29,6 @@ from backbone.creator.messages import (
 )
 from backbone.creator.process_keeper import LAST_LINES, ProcessKeeper, last_lines
 from backbone.creator.silence import LOOK_EVERY_S
-from backbone.creator.zygote_process import log_path
 from backbone.naming import Subsystem
 
 FIRST_PID = 1001  # of an InProcessZygote

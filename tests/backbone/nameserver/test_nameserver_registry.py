@@ -201,7 +201,10 @@ def test_a_list_is_incomplete_while_a_token_stands_for_somebody_unknown() -> Non
     assert not registry.components("", "", 5.0).complete
     assert registry.is_unknown("resource_pool/scout1")
     registry.introduction_failed("resource_pool/scout1")
-    assert registry.components("", "", 5.0).complete
+    listed = registry.components("", "", 5.0)
+    assert listed.complete
+    assert listed.unknown == ["resource_pool/scout1"]
+    assert registry.components("backbone", "", 5.0).unknown == []
 
 
 def test_an_answer_that_comes_after_the_death_is_no_news() -> None:

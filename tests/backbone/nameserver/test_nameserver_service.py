@@ -228,8 +228,10 @@ def test_a_strangers_token_does_not_end_the_hub(local_mission: Any) -> None:
             stranger = network.join("resource_pool/stranger", VirtualClock())
             for odd in ("a/b/c", "resource_pool/scout1/a.b", "x/y", "resource_pool/Ünfug/-.1"):
                 stranger.declare_alive(odd)
-            await VirtualClock().sleep_s(0.5)
+            await VirtualClock().sleep_s(2.5)
             assert names(await listed(network)) == ["nameserver"]
+            counted = await stranger.ask(ADDRESS, AskStatistics(), Statistics, within_s=1)
+            assert counted.values["introductions_unanswered"] == 0  # nobody can answer there: it is not even asked
             await stranger.close()
 
     run_virtual(main())
@@ -249,3 +251,16 @@ def test_the_nameserver_tells_what_it_counted_and_decided(local_mission: Any, be
     assert told[0].startswith("registered as resource_pool/scout1 on a")
     assert told[1].startswith("appeared on a")
     assert story.events[0].cause.startswith("resource_pool/scout1#")
+
+
+def test_a_hub_that_cannot_note_that_it_began_waits_as_after_a_restart(tmp_path: Path, beside: Any) -> None:
+    (tmp_path / "run").touch()  # no folder can be made there
+
+    async def main() -> None:
+        network = LocalNetwork()
+        async with beside(nameserver(network, str(tmp_path / "run" / "mission"))):
+            assert not (await listed(network)).complete
+            await VirtualClock().sleep_s(3.0)
+            assert (await listed(network)).complete
+
+    run_virtual(main())

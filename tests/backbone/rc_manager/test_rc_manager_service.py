@@ -81,6 +81,7 @@ class PlainRc(Component[Any]):
         self.last_epoch = 0
         self.log: list[tuple[str, str]] = []
         self.hangs = False
+        self.tells: Callable[[RcState], RcState] = lambda state: state
 
     async def answer(self, asked: Envelope[Any]) -> Message:
         if self.hangs:
@@ -101,7 +102,9 @@ class PlainRc(Component[Any]):
                 return Disconnected(self.last_epoch)
             case AskRc():
                 holders = [Holder(arc, epoch, 0.0, 0.0) for arc, epoch in self.holders.items()]
-                return RcState(self.name, self.launch.type, self.sharable, 1.0, holders, self.last_epoch, 0, 0)
+                return self.tells(
+                    RcState(self.name, self.launch.type, self.sharable, 1.0, holders, self.last_epoch, 0, 0)
+                )
         return await super().answer(asked)
 
 
@@ -474,3 +477,18 @@ def test_every_decision_is_in_the_trace(pool: Any) -> None:
     assert lines[0]["ev"] == "meta"
     assert {line["id"] for line in lines if line["ev"] == "rc"} == {resource.name for resource in HARDWARE}
     assert lines[-1]["ev"] == "end"
+
+
+@pytest.mark.parametrize("trace", ["/dev/full", "/dev/null/trace.jsonl"])
+def test_a_trace_that_cannot_be_written_is_told_and_grants_go_on(local_mission: Any, beside: Any, trace: str) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, beside, Path(trace)) as here, here.beside(here.manager()) as manager:
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            assert one.is_open
+            assert "1 of 1 ARCs run; the trace of the schedule stopped: " in manager.feedback
+            told = [event.what for event in manager.story.of("rc_manager")]
+            assert sum("the trace of the schedule stopped" in what for what in told) == 1
+
+    run_virtual(main())

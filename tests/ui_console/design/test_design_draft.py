@@ -358,6 +358,14 @@ def test_somebody_elses_change_is_not_overwritten_unasked(tmp_path: Path) -> Non
     assert save(draft, file, overwrite=True).text == file.read_bytes()
 
 
+def test_what_a_killed_save_left_is_gone_when_the_file_is_opened_again(tmp_path: Path) -> None:
+    file = tmp_path / "mission.xml"
+    save(Draft.new(str(file)), file)
+    (tmp_path / ".mission.xml.saving").write_bytes(b"half a mission")
+    Draft.opened(str(file))
+    assert [one.name for one in tmp_path.iterdir()] == ["mission.xml"]
+
+
 def test_a_folder_that_is_not_there_refuses_and_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(NotSaved, match="No such file"):
         save(Draft.new("a.xml"), tmp_path / "no" / "a.xml")

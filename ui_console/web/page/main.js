@@ -45,6 +45,7 @@ function heard(message) {
   if (changes.now_s !== undefined) find("clock").textContent = seconds(view.now_s);
   if (changes.own) showOwn(view.own);
   if (changes.robots || changes.own) cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
+  if (changes.health !== undefined) showHealth(view.health);
   if (changes.alarms) showAlarm(view.alarms);
   tables.show(view, changes);
 }
@@ -65,6 +66,15 @@ function showOwn(own) {
   find("take").disabled = own.is_asked;
   find("jump").disabled = !own.is_held;
   document.body.dataset.held = own.is_held ? own.robot : "";
+}
+
+function showHealth(health) {
+  const shown = find("health");
+  shown.hidden = health === null;
+  if (health === null) return;
+  shown.className = health.word;
+  shown.title = health.lines.join("\n");
+  set(shown, `mission ${[health.word, ...health.lines.slice(0, 1)].join(": ")}`);
 }
 
 function showAlarm(alarms) {

@@ -1,0 +1,120 @@
+"""Replacing a file in one step: every reader finds all of the old content or all of the new, also after a power cut.
+
+The new content is first written beside the file, under one fixed hidden name that its writer holds locked. A writer
+that is killed there leaves that one file, unlocked; the next writer uses it up, ``remove_leftover`` removes it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import stat
+from pathlib import Path
+
+_NO_FOLDER_SYNC = (errno.EINVAL, errno.ENOTSUP)
+"""File systems that keep no folders of their own, such as some network shares."""
+
+
+def replace_file(target: Path, content: bytes, *, is_lasting: bool = True) -> None:
+    """Have a file hold this content; its mode stays, a new file gets the usual one.
+
+    Args:
+        target: The file; its folder exists.
+        content: All of it.
+        is_lasting: True: it outlives a power cut from now on. False: for files that mean nothing after one.
+
+    Raises:
+        OSError: The system refused, or another process writes the file just now; its content is as it was.
+    """
+    beside = _beside(target)
+    descriptor = _claim(beside, os.O_CREAT)
+    try:
+        if target.exists():
+            os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
+        os.ftruncate(descriptor, 0)
+        write_all(descriptor, content)
+        if is_lasting:
+            os.fsync(descriptor)
+        os.replace(beside, target)
+    except BaseException:
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(beside)
+        raise
+    finally:
+        os.close(descriptor)
+    if is_lasting:
+        _sync_folder(target.parent)
+
+
+def remove_leftover(target: Path) -> bool:
+    """Remove the leftover of a writer of this file that was killed; return whether there was one.
+
+    Raises:
+        OSError: It is there and cannot be removed.
+    """
+    beside = _beside(target)
+    try:
+        descriptor = _claim(beside, 0)
+    except (FileNotFoundError, BlockingIOError):  # none, or its writer lives
+        return False
+    try:
+        os.unlink(beside)
+    finally:
+        os.close(descriptor)
+    return True
+
+
+def write_all(descriptor: int, content: bytes) -> None:
+    """Write all of the content, which one call to the system need not do.
+
+    Raises:
+        OSError: The system refused; a part may be written.
+    """
+    rest = memoryview(content)
+    while rest:
+        rest = rest[os.write(descriptor, rest) :]
+
+
+def _beside(target: Path) -> Path:
+    return target.with_name(f".{target.name}.saving")
+
+
+def _claim(path: Path, flags: int) -> int:
+    """Return a descriptor of the file at this path, held by this writer alone.
+
+    Raises:
+        BlockingIOError: Another writer holds it.
+    """
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_CLOEXEC | flags, 0o666)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if is_at(descriptor, path):
+                return descriptor
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)  # its writer was done with it before we held it: the name is free again
+
+
+def is_at(descriptor: int, path: Path) -> bool:
+    """Say whether the open file is the one at this path."""
+    try:
+        there = os.stat(path, follow_symlinks=False)
+    except FileNotFoundError:
+        return False
+    ours = os.fstat(descriptor)
+    return (there.st_dev, there.st_ino) == (ours.st_dev, ours.st_ino)
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in _NO_FOLDER_SYNC:
+            raise
+    finally:
+        os.close(descriptor)

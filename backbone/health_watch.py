@@ -1,0 +1,72 @@
+"""The launcher's look at its mission: what is absent since when, published on change and every second."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import Absence
+from backbone.health import LOOK_EVERY_S, SAY_EVERY_S, Health, MissionHealth, health
+from backbone.keys import Conversation
+from backbone.mission_picture import MissionPicture, look
+
+
+class HealthWatch:
+    """Looks at the mission every ``LOOK_EVERY_S`` and publishes its health under the launcher's address.
+
+    Args:
+        bus: The launcher's.
+        clock: The mission's time.
+        changed: Called when ``absences`` changes.
+        own: Returns what the launcher wants and misses.
+    """
+
+    def __init__(
+        self, bus: Bus, clock: Clock, changed: Callable[[], None], own: Callable[[], list[Absence]] = list
+    ) -> None:
+        self._bus, self._clock, self._changed, self._own = bus, clock, changed, own
+        self._picture = MissionPicture(bus.mission, clock.now_s(), {}, rate=clock.rate)
+        self._said: MissionHealth | None = None
+        self._said_s = 0.0
+
+    def absences(self) -> list[Absence]:
+        """Return what the look itself missed; reports of other owners are in their own states."""
+        return list(self._picture.missed)
+
+    @property
+    def picture(self) -> MissionPicture:
+        """The mission at the last look."""
+        return self._picture
+
+    async def run(self) -> None:
+        """Look and publish until cancelled; a look that waits for an answer delays no word about what is known."""
+        async with asyncio.TaskGroup() as loops:
+            loops.create_task(self._look_again_and_again())
+            while True:
+                self._say(self._health())
+                await self._clock.sleep_s(LOOK_EVERY_S / 2 * self._clock.rate)
+
+    async def _look_again_and_again(self) -> None:
+        while True:
+            missed = self.absences()
+            self._picture = await self._look()
+            if self.absences() != missed:
+                self._changed()
+            await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
+
+    async def _look(self) -> MissionPicture:
+        now_s, rate = self._clock.now_s(), self._clock.rate
+        return await look(self._bus, now_s, before=self._picture, rate=rate, schedule=False)
+
+    def _health(self) -> Health:
+        # The launcher's own state in the list is a look old: what it missed then may be back.
+        others = {at: state for at, state in self._picture.components.items() if at != self._bus.source}
+        missed = [*self._own(), *self._picture.missed]
+        return health(others, missed, self._clock.now_s(), self._clock.rate)
+
+    def _say(self, found: Health) -> None:
+        now_s, said = self._clock.now_s(), found.to_message()
+        if said != self._said or now_s - self._said_s >= SAY_EVERY_S * self._clock.rate:
+            self._said, self._said_s = said, now_s
+            self._bus.publish(self._bus.source, Conversation.HEALTH, said)

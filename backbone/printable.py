@@ -1,0 +1,90 @@
+r"""Text from the bus as text for people: nothing in it can command a terminal, a browser or a log.
+
+Rules of this file: pure. What ``str.isprintable`` refuses becomes a visible escape: control characters (ESC, CR, the
+8-bit CSI), format characters (bidirectional overrides), lone surrogates, line separators. A text that is too long is
+cut, with the number of characters that are missing.
+
+``printable_all`` is applied where news of a mission enters what faces people: the mission picture, ``why`` and
+``story``, and the feed of the consoles. Everything behind these may trust its texts.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, TypeVar, cast
+
+import msgspec
+
+MOST_CHARACTERS = 2000  # chosen: several times a component's longest feedback
+MOST_LINES = 200  # chosen: more than the end of a log that a refusal carries
+
+Value = TypeVar("Value")
+
+
+def printable(text: str, most: int = MOST_CHARACTERS) -> str:
+    r"""Return the text as one printable line of bounded length.
+
+    Example:
+        >>> printable("\x1b[2Jall is well\r")
+        '\\x1b[2Jall is well\\r'
+        >>> printable("aaaa", most=3)
+        'aaa… (1 more)'
+    """
+    if len(text) <= most and text.isprintable():
+        return text
+    shown = "".join(each if each.isprintable() else _escape(each) for each in text[:most])
+    return shown if len(text) <= most else f"{shown}… ({len(text) - most} more)"
+
+
+def printable_lines(text: str, most: int = MOST_CHARACTERS) -> str:
+    r"""Return the text with its lines kept, each of them printable.
+
+    Example:
+        >>> printable_lines("one\ntwo\tthree")
+        'one\ntwo    three'
+    """
+    if text.isprintable() and len(text) <= most:
+        return text
+    lines = text.split("\n")
+    shown = [printable(line.replace("\t", "    "), most) for line in lines[:MOST_LINES]]
+    return "\n".join([*shown, f"… ({len(lines) - MOST_LINES} lines more)"] if len(lines) > MOST_LINES else shown)
+
+
+def printable_all(value: Value) -> Value:
+    """Return the message, dataclass, list or dictionary with every text in it one printable line; itself if all are."""
+    return cast(Value, _clean(value))
+
+
+def _clean(value: Any) -> Any:
+    match value:
+        case str():
+            return printable(value) if type(value) is str else value  # words of an enumeration are our own
+        case msgspec.Struct():
+            changes = _changes(value, value.__struct_fields__)
+            return msgspec.structs.replace(value, **changes) if changes else value
+        case list() | tuple():
+            cleaned = [_clean(each) for each in value]
+            same = all(each is old for each, old in zip(cleaned, value, strict=True))
+            return value if same else tuple(cleaned) if isinstance(value, tuple) else cleaned
+        case Mapping():
+            pairs = [(_clean(key), _clean(each)) for key, each in value.items()]
+            same = all(key is old and each is value[old] for (key, each), old in zip(pairs, value, strict=True))
+            return value if same else dict(pairs)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        changes = _changes(value, (field.name for field in dataclasses.fields(value)))
+        return dataclasses.replace(value, **changes) if changes else value
+    return value
+
+
+def _changes(value: Any, names: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name in names:
+        before = getattr(value, name)
+        if (after := _clean(before)) is not before:
+            found[name] = after
+    return found
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape", "backslashreplace").decode("ascii")

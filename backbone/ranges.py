@@ -1,0 +1,156 @@
+"""Ranges: what each kind of number, name and text on the bus may be.
+
+Every field of every message has one of these types, so that the decoder refuses nonsense with
+``MalformedMessage`` before a component sees it. A test walks all message classes and fails for a field without.
+
+Rules of this file:
+
+* A number has both limits. ``NaN`` fails each comparison and so each lower limit, an infinity fails one of the two;
+  a number with one limit only would let one infinity pass.
+* A range is wide enough for every honest mission, and narrow enough that sums of such numbers stay exact. Where a
+  refusal at the place of use carries the better remedy (a run time of 0, a lease of 0), the range lets the value pass.
+* Names are matched against the one rule for names where a name is first said. Where it is only looked up or shown
+  its length is limited and no more: a pattern costs 0.3 µs a name, and one message may renew thousands of leases.
+
+Inside one process objects are handed over without decoding: nothing hostile speaks there, and type checks hold.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated, Any
+
+from msgspec import Meta, Struct
+
+from backbone.naming import MAX_NAME_LENGTH
+
+# ---------------------------------------------------------------------- how much
+MOST_ENTRIES = 65_536  # chosen: twice the leases of 10 000 ARCs on three RCs each
+MOST_FEW = 256  # chosen: tags, features, roles, steps of a path: the largest mission tried has 12
+MOST_STREAMS = 64  # chosen: one for each kind of packet; the largest mission has four
+MANY = Meta(max_length=MOST_ENTRIES)
+FEW = Meta(max_length=MOST_FEW)
+FEW_STREAMS = Meta(max_length=MOST_STREAMS)
+
+# ---------------------------------------------------------------------- words
+LONGEST_MENTION = 255  # chosen: four names with what joins them; the longest file name
+LONGEST_SOURCE = LONGEST_MENTION - 18  # what ``#<sequence>`` needs behind it
+LONGEST_LINE = 4_096  # chosen: far more than a person reads in one line
+LONGEST_TEXT = 262_144  # chosen: the names of 10 000 ARCs in one sentence
+LONGEST_DOCUMENT = 524_288  # chosen: the XML of a room with a thousand things
+
+Name = Annotated[str, Meta(max_length=MAX_NAME_LENGTH, pattern=r"^[a-z][a-z0-9_-]*\Z")]
+"""A legal name, see ``naming``."""
+NameOrNone = Annotated[str, Meta(max_length=MAX_NAME_LENGTH, pattern=r"^([a-z][a-z0-9_-]*)?\Z")]
+"""A legal name, or empty."""
+Address = Annotated[str, Meta(max_length=LONGEST_MENTION, pattern=r"^[a-z_]+(/[A-Za-z0-9_.-]+)+\Z")]
+"""``<subsystem>/<component>``, or that of a process or a token below it."""
+Mention = Annotated[str, Meta(max_length=LONGEST_MENTION)]
+"""A name, an address or an id that is looked up, compared or shown: an unknown one finds nothing."""
+Source = Annotated[str, Meta(max_length=LONGEST_SOURCE)]
+"""Who speaks: shorter than a mention, so that the id of a message, which others name as their cause, is one."""
+Line = Annotated[str, Meta(max_length=LONGEST_LINE)]
+"""One line for people or for the operating system: a reason, a path, a class."""
+Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
+"""Lines that a component composed."""
+Document = Annotated[str, Meta(max_length=LONGEST_DOCUMENT)]
+"""A whole file."""
+
+# ---------------------------------------------------------------------- bytes
+Payload = Annotated[bytes, Meta(max_length=4_096)]  # chosen: forty times the radio's longest packet
+StateVector = Annotated[bytes, Meta(max_length=524_288)]  # chosen: 65 536 numbers; three Scouts need 700
+Pixels = Annotated[memoryview, Meta(max_length=8_000_000)]  # chosen: a frame of 1080p in color is 6.2 MB
+
+# ---------------------------------------------------------------------- counts and ids
+EXACT = 2**53  # up to here a double, a JSON trace and JavaScript count exactly
+
+Epoch = Annotated[int, Meta(ge=0, le=EXACT)]
+"""Fencing number of a connection; ``most_epoch`` in ``rc_manager.messages`` says which are plausible now."""
+Count = Annotated[int, Meta(ge=0, le=EXACT)]
+"""How many, or which one of many that are numbered."""
+Number = Annotated[int, Meta(ge=-EXACT, le=EXACT)]
+"""An integer of which no more is known (a seed)."""
+Version = Annotated[int, Meta(ge=0, le=1_000_000)]  # chosen: a version grows by one with a release
+Pid = Annotated[int, Meta(ge=0, le=2**22)]  # Linux, PID_MAX_LIMIT; 0: none
+ExitCode = Annotated[int, Meta(ge=-255, le=255)]  # POSIX: a byte; Python: minus the signal
+Signal = Annotated[int, Meta(ge=1, le=64)]  # Linux, the real-time signals included
+Priority = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]  # the mission file's xs:int
+Rank = Annotated[int, Meta(ge=-1, le=MOST_ENTRIES)]  # place among the holders of one RC; -1: as it was
+PixelCount = Annotated[int, Meta(ge=0, le=8_192)]  # chosen: twice the width of a 4K picture
+PixelPlace = Annotated[int, Meta(ge=-8_192, le=8_192)]  # a region may begin outside the picture
+
+# ---------------------------------------------------------------------- times, seconds
+A_DAY_S = 86_400.0  # chosen: as the longest time of a mission file
+Instant = Annotated[float, Meta(ge=-A_DAY_S, le=1e12)]
+"""Mission time; negative: unknown, or before the mission began. Chosen: 1e12 s are still exact to 0.1 ms."""
+MachineTime = Annotated[float, Meta(ge=-1e12, le=1e12)]
+"""Time of a machine's clock; it may have begun after mission time 0."""
+Duration = Annotated[float, Meta(ge=0, le=A_DAY_S)]
+"""How long something takes or may take."""
+RunTime = Annotated[float, Meta(ge=0, le=A_DAY_S)]
+"""Shortest or longest time of a slice; 0 where it need not be said."""
+Period = Annotated[float, Meta(ge=0, le=A_DAY_S)]
+"""Of a stream, with its packet time, deadline and jitter."""
+Pause = Annotated[float, Meta(ge=-1, le=A_DAY_S)]
+"""A pause; negative: it never ends."""
+LONGEST_LEASE_S = 3_600.0  # chosen: 2 s at 1800 times the speed; --speed goes to 100
+LeaseSeconds = Annotated[float, Meta(ge=0, le=LONGEST_LEASE_S)]
+"""How long a hold lasts unless renewed, mission time."""
+Rate = Annotated[float, Meta(gt=0, le=1_000)]  # chosen: mission seconds a second; --speed goes to 100
+
+# ---------------------------------------------------------------------- measures
+Share = Annotated[float, Meta(ge=0, le=1)]
+"""Part of a whole."""
+Meters = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a thousand kilometres from the corner of the room
+Radians = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a heading may count turns
+WheelSpeed = Annotated[float, Meta(ge=-1e4, le=1e4)]  # chosen: a hundred times a Scout's; RCs clip
+Measure = Annotated[float, Meta(ge=-1e18, le=1e18)]
+"""A number whose meaning only its name tells: statistics, facts."""
+Whole = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
+"""An integer whose meaning only its name tells."""
+
+Facts = Annotated[dict[Mention, Text | Whole | Measure | bool], FEW]
+"""What a refusal tells programs."""
+
+# ---------------------------------------------------------------------- values of any kind
+Values = Annotated[dict[Mention, Any], MANY]
+"""Named values of any kind, as of a mission file; ``wildness`` says what in them may not pass."""
+DEEPEST = 24  # chosen: the description of a world is six deep
+
+
+def wildness(value: Any, depth: int = 0) -> str:
+    """Return what is wrong with a value of any kind, empty if nothing: only plain, finite, bounded things may pass.
+
+    The reader asks this of messages that have fields of any kind; all others hold by their types.
+
+    Example:
+        >>> wildness({"speed": [1, 2.5, None]}), wildness([float("nan")])
+        ('', 'a number of nan')
+    """
+    match value:
+        case None | bool() | Enum():
+            return ""
+        case float() if not -1e18 <= value <= 1e18:
+            return f"a number of {value}"
+        case int() if not -(2**63) <= value < 2**63:
+            return "an integer of more than 64 bits"
+        case int() | float():
+            return ""
+        case str() | bytes() | memoryview() if len(value) > LONGEST_DOCUMENT:
+            return f"{len(value)} characters in one value"
+        case str() | bytes() | memoryview():
+            return ""
+        case list() | tuple() | dict() if len(value) > MOST_ENTRIES:
+            return f"{len(value)} entries in one value"
+        case list() | tuple() | dict() if depth > DEEPEST:
+            return f"more than {DEEPEST} values inside each other"
+        case list() | tuple():
+            return next((wild for one in value if (wild := wildness(one, depth + 1))), "")
+        case dict():
+            inside = (part for item in value.items() for part in item)
+            return next((wild for one in inside if (wild := wildness(one, depth + 1))), "")
+        case Struct():
+            inside = (getattr(value, name) for name in value.__struct_fields__)
+            return next((wild for one in inside if (wild := wildness(one, depth + 1))), "")
+        case _:
+            return f"a value of type {type(value).__name__}"

@@ -1,0 +1,51 @@
+"""Credibility: whether an RC can be as it says.
+
+An RC that contradicts itself, its hardware or its grants is put aside alone: the RC manager plans nothing on it,
+says why, and asks it again until it makes sense. What it says is not taken over meanwhile.
+
+Rule of this file: pure; time is an argument. ``ranges`` held each number by itself before; here they are compared.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from backbone.dependency_database.messages import Resource
+from backbone.ranges import LONGEST_LEASE_S
+from backbone.rc_manager.messages import RcState, most_epoch
+
+SKEW = 2  # chosen: clocks of two hosts may differ, so an RC may be as far ahead as two RCs together
+
+
+def contradiction(state: RcState, resource: Resource, now_s: float, given: int | None = None) -> str:
+    """Return what in the state of an RC cannot be, for people; empty if all of it can.
+
+    Args:
+        state: As the RC says.
+        resource: As the mission file says.
+        now_s: Mission time.
+        given: Largest epoch given for this RC so far; None if an earlier RC manager may have given larger ones.
+    """
+    if state.name != resource.name:
+        return f"it calls itself {state.name}"
+    if not 0 <= state.capacity <= 1:
+        return f"it says that it can give {state.capacity} of its time"
+    if not 0 <= state.last_epoch <= SKEW * most_epoch(now_s):
+        return f"it says that it saw epoch {state.last_epoch}, which nobody can have given until now"
+    return _contradiction_of_holders(state, resource, now_s, given)
+
+
+def _contradiction_of_holders(state: RcState, resource: Resource, now_s: float, given: int | None) -> str:
+    if len(state.holders) > 1 and not resource.sharable:
+        return f"it says that {len(state.holders)} ARCs hold it, and is not sharable"
+    for arc, times in Counter(holder.arc for holder in state.holders).items():
+        if times > 1:
+            return f"it says that {arc} holds it {times} times"
+    for holder in state.holders:
+        if holder.epoch > state.last_epoch:
+            return f"it says that {holder.arc} holds it under epoch {holder.epoch}, after its last, {state.last_epoch}"
+        if given is not None and holder.epoch > given:
+            return f"it says that {holder.arc} holds it under epoch {holder.epoch}, which was never granted"
+        if not holder.lease_until_s <= now_s + SKEW * LONGEST_LEASE_S:
+            return f"it says that {holder.arc} holds it until {holder.lease_until_s:g} s"
+    return ""

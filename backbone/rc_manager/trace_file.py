@@ -1,0 +1,54 @@
+"""The file of the schedule trace: whole lines, in the order of the decisions, without a gap.
+
+A mission outlives its trace: at the first line that cannot be written the trace stops, with whole lines only, and says
+why. It does not go on later, because a judge would take what is missing for a fault of the scheduler.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+
+from backbone.atomic_file import write_all
+from backbone.rc_manager.trace import Line
+
+
+class TraceFile:
+    """Appends to the file at this path.
+
+    Args:
+        path: The file; empty: nothing is written.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._descriptor: int | None = None
+        self.stopped_by = ""
+        """What ended the trace before its time; empty: nothing did."""
+        if not path:
+            return
+        try:
+            self._descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            self.stopped_by = f"{path}: {error.strerror}"
+
+    def write(self, line: Line) -> bool:
+        """Append the line; return False if this very line ended the trace, see ``stopped_by``."""
+        if self._descriptor is None:
+            return True
+        end = os.fstat(self._descriptor).st_size
+        try:
+            write_all(self._descriptor, json.dumps(line).encode() + b"\n")
+        except OSError as error:
+            self.stopped_by = str(error.strerror)
+            with contextlib.suppress(OSError):  # no file but a device or pipe
+                os.ftruncate(self._descriptor, end)
+            self.close()
+            return False
+        return True
+
+    def close(self) -> None:
+        """Write no more; idempotent."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None

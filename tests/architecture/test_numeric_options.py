@@ -1,0 +1,58 @@
+"""Every numeric option of both command lines has a range; what is no number, infinite or beyond it is wrong usage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import pytest
+from typer.models import OptionInfo
+from typer.testing import CliRunner
+
+from backbone.cli import app as backbone_app
+from mission_control.experiments.cli import app as experiment_app
+from ui_console.cli import app as console_app
+
+MISSION_XML = str(Path(__file__).parents[2] / "mission.xml")
+APPS = {"scout-backbone": backbone_app, "scout-console": console_app, "experiment": experiment_app}
+ARGUMENTS = {"check": [MISSION_XML, "--dry-run"], "up": [MISSION_XML]}
+
+
+def numeric_options() -> Iterator[tuple[str, str, str, bool]]:
+    """Yield program, command, option and whether it is whole, for each numeric option."""
+    for program, app in APPS.items():
+        for command in app.registered_commands:
+            assert command.callback is not None
+            hints = get_type_hints(command.callback, include_extras=True)
+            for name, hint in hints.items():
+                kinds = set(_kinds(hint)) & {int, float}
+                option = next((each for each in get_args(hint) if isinstance(each, OptionInfo)), None)
+                if kinds and option is not None and not option.hidden:
+                    flag = (option.param_decls or (f"--{name.replace('_', '-')}",))[0]
+                    yield program, command.name or command.callback.__name__, flag, int in kinds
+
+
+def _kinds(hint: Any) -> Iterator[Any]:
+    yield hint
+    for inner in get_args(hint):
+        yield from _kinds(inner)
+
+
+OPTIONS = sorted(set(numeric_options()))
+
+
+def test_there_are_numeric_options() -> None:
+    assert len(OPTIONS) > 20
+
+
+@pytest.mark.parametrize("value", ["1e400", "nan", "inf", "-inf", "-1e12", "1e12"])
+@pytest.mark.parametrize(("program", "command", "option", "is_whole"), OPTIONS, ids=str)
+def test_a_number_out_of_its_range_is_wrong_usage(
+    program: str, command: str, option: str, is_whole: bool, value: str
+) -> None:
+    if is_whole and value in ("1e12", "-1e12"):
+        value = str(int(float(value)))
+    done = CliRunner().invoke(APPS[program], [command, *ARGUMENTS.get(command, []), option, value])
+    assert done.exit_code == 2, done.output
+    assert option.lstrip("-") in done.stderr or "experiment.condition" in done.stderr

@@ -1,0 +1,89 @@
+"""A file is replaced whole or not at all, and a writer that was killed leaves nothing for long."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from full_disk import disk_full_at
+
+from backbone import atomic_file
+from backbone.atomic_file import remove_leftover, replace_file
+
+KILLED_WHILE_SAVING = """
+import os, pathlib, signal, sys
+from backbone import atomic_file
+atomic_file.os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+atomic_file.replace_file(pathlib.Path(sys.argv[1]), b"never whole")
+"""
+
+
+def kill_while_saving(target: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", KILLED_WHILE_SAVING, str(target)], check=False)
+    assert done.returncode < 0, "it was not killed"
+
+
+def names(folder: Path) -> list[str]:
+    return sorted(one.name for one in folder.iterdir())
+
+
+def test_a_file_is_replaced_and_keeps_its_mode(tmp_path: Path) -> None:
+    target = tmp_path / "mission.xml"
+    replace_file(target, b"old")
+    target.chmod(0o640)
+    replace_file(target, b"new")
+    assert (target.read_bytes(), target.stat().st_mode & 0o777) == (b"new", 0o640)
+    assert names(tmp_path) == ["mission.xml"]
+
+
+def test_kills_while_saving_leave_one_file_which_the_next_save_uses_up(tmp_path: Path) -> None:
+    target = tmp_path / "mission.xml"
+    replace_file(target, b"old")
+    for _ in range(3):
+        kill_while_saving(target)
+    assert target.read_bytes() == b"old"
+    assert len(names(tmp_path)) == 2
+    replace_file(target, b"n")
+    assert (target.read_bytes(), names(tmp_path)) == (b"n", ["mission.xml"])
+
+
+def test_the_leftover_of_a_killed_save_is_removed_at_the_next_opening(tmp_path: Path) -> None:
+    target = tmp_path / "mission.xml"
+    kill_while_saving(target)
+    assert remove_leftover(target)
+    assert names(tmp_path) == []
+    assert not remove_leftover(target)
+
+
+def test_another_writer_at_work_is_neither_disturbed_nor_taken_for_a_leftover(tmp_path: Path) -> None:
+    target = tmp_path / "mission.xml"
+    beside = tmp_path / ".mission.xml.saving"
+    with beside.open("wb") as theirs:
+        fcntl.flock(theirs, fcntl.LOCK_EX)
+        with pytest.raises(BlockingIOError):
+            replace_file(target, b"ours")
+        assert not remove_leftover(target)
+        assert beside.exists()
+
+
+def test_a_disk_that_becomes_full_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    target = tmp_path / "mission.xml"
+    replace_file(target, b"old")
+    with disk_full_at(1000), pytest.raises(OSError, match="too large"):
+        replace_file(target, b"x" * 5000)
+    assert (target.read_bytes(), names(tmp_path)) == (b"old", ["mission.xml"])
+
+
+def test_the_file_and_then_its_folder_are_on_the_disk_when_it_returns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[str] = []
+    monkeypatch.setattr(
+        atomic_file.os, "fsync", lambda descriptor: synced.append(os.readlink(f"/proc/self/fd/{descriptor}"))
+    )
+    replace_file(tmp_path / "mission.xml", b"new")
+    assert synced == [str(tmp_path / ".mission.xml.saving"), str(tmp_path)]

@@ -1,0 +1,118 @@
+"""``up --detach`` ends with the launcher's own verdict, whatever its process still does."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+import uuid
+from pathlib import Path
+
+import psutil
+import pytest
+from running_mission import MARK, MISSION_XML, marked, wait_gone
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
+
+BIN = Path(sys.executable).parent
+GRABBER = "resource_pool.rcs.framegrabber:Framegrabber"
+TIMES = 20
+
+
+def mission_file(folder: Path, change: dict[str, str]) -> Path:
+    text = MISSION_XML.read_text()
+    for old, new in change.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    file = folder / "mission.xml"
+    file.write_text(text)
+    return file
+
+
+def environment(folder: Path, mark: str) -> dict[str, str]:
+    paths = [str(Path(__file__).parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "XDG_RUNTIME_DIR": str(folder), MARK: mark, "PYTHONPATH": os.pathsep.join(paths)}
+
+
+def command(folder: Path, mark: str, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(BIN / "scout-backbone"), *words],
+        env=environment(folder, mark),
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+    )
+
+
+def assert_up_says(exit_code: int, folder: Path, change: dict[str, str]) -> None:
+    mark = uuid.uuid4().hex
+    up = command(folder, mark, "up", str(mission_file(folder, change)), "--detach")
+    try:
+        assert up.returncode == exit_code, up.stderr
+        assert ("goes on as process" in up.stderr) == (exit_code == 0), up.stderr
+    finally:
+        if up.returncode == 0:
+            down = command(folder, mark, "down")
+            assert down.returncode == 0, down.stderr
+        left = wait_gone(mark, 10.0)
+        for process in left:
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+    assert not left
+
+
+FAILS = {GRABBER: "sample_components:Broken"}
+UNREACHABLE = {'address="127.0.0.1"': 'address="192.0.2.1"'}
+
+
+@pytest.mark.parametrize(
+    ("exit_code", "change"), [(0, {}), (6, FAILS), (4, UNREACHABLE)], ids=["comes up", "fails", "has no hub"]
+)
+def test_it_ends_with_how_the_mission_came_up(exit_code: int, change: dict[str, str], tmp_path: Path) -> None:
+    assert_up_says(exit_code, tmp_path, change)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(("exit_code", "change"), [(0, {}), (6, FAILS)], ids=["comes up", "fails"])
+def test_it_does_so_twenty_times_in_a_row(exit_code: int, change: dict[str, str], tmp_path: Path) -> None:
+    for _ in range(TIMES):
+        assert_up_says(exit_code, tmp_path, change)
+
+
+def test_a_launcher_that_is_killed_before_all_is_ready_is_a_failure(tmp_path: Path) -> None:
+    mark = uuid.uuid4().hex
+    up = subprocess.Popen(
+        [str(BIN / "scout-backbone"), "up", str(mission_file(tmp_path, {})), "--detach"],
+        env=environment(tmp_path, mark),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        launcher(up, mark).kill()
+        _, said = up.communicate(timeout=60)
+        assert up.returncode == 6, said
+        assert "ended without a verdict: SIGKILL" in said
+    finally:
+        up.kill()
+        up.wait()
+        for process in wait_gone(mark, 10.0):
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+
+
+def launcher(up: subprocess.Popen[str], mark: str) -> psutil.Process:
+    """Return the process that ``up --detach`` started, once its nameserver is there."""
+    assert up.stderr is not None
+    for line in up.stderr:
+        if "nameserver" in line:
+            break
+    deadline = time.monotonic() + 10.0
+    while time.monotonic() < deadline:
+        for process in marked(mark):
+            if process.ppid() == up.pid:
+                return process
+    raise AssertionError("no launcher")

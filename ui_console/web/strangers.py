@@ -1,0 +1,81 @@
+"""Who is at the door without a token: each newcomer finds room, at the cost of who has been silent for longest.
+
+Rules of this file: no socket, no clock; whoever is displaced is returned, not cut off.
+
+* Strangers take no operator's place, and there are never more of them than ``MOST_STRANGERS``.
+* One address, or one network of IPv6, has at most ``MOST_OF_AN_ADDRESS``: beyond that it displaces its own only.
+* If all places are taken, the address with the most strangers gives one up, so few make no room for many.
+* Of an address the first to go is who has asked for nothing yet, the oldest first.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from collections import Counter
+from typing import Generic, TypeVar
+
+MOST_OF_AN_ADDRESS = 64  # chosen: a page opens six connections at a time; a team behind one address ten pages
+MOST_STRANGERS = 128  # chosen: far below the 1024 descriptors a process usually has
+IPV6_NETWORK_BITS = 64  # what one household or host is given to choose its addresses from
+
+StrangerT = TypeVar("StrangerT")
+
+
+class Strangers(Generic[StrangerT]):
+    """Those at the door, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self._places: dict[StrangerT, str] = {}
+        self._silent: dict[StrangerT, None] = {}
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def came(self, who: StrangerT, address: str) -> StrangerT | None:
+        """Note a newcomer; return whom to cut off for it, who is forgotten; None: there is room.
+
+        Args:
+            who: The newcomer.
+            address: Where it is; empty: unknown.
+        """
+        place = place_of(address)
+        counts = Counter(self._places.values())
+        displaced = None
+        if counts[place] >= MOST_OF_AN_ADDRESS:
+            displaced = self._first_of(place)
+        elif len(self._places) >= MOST_STRANGERS:
+            displaced = self._first_of(counts.most_common(1)[0][0])
+        if displaced is not None:
+            self.gone(displaced)
+        self._places[who] = place
+        self._silent[who] = None
+        return displaced
+
+    def asked(self, who: StrangerT) -> None:
+        """Note that a stranger has asked for something that can be understood."""
+        self._silent.pop(who, None)
+
+    def gone(self, who: StrangerT) -> None:
+        """Forget a stranger: it has left, or is none any more."""
+        self._places.pop(who, None)
+        self._silent.pop(who, None)
+
+    def _first_of(self, place: str) -> StrangerT:
+        all_there = [who for who, at in self._places.items() if at == place]
+        return next((who for who in all_there if who in self._silent), all_there[0])
+
+
+def place_of(address: str) -> str:
+    """Return what counts as one address.
+
+    Example:
+        >>> place_of("192.0.2.7"), place_of("2001:db8::1:7"), place_of("fe80::1%eth0"), place_of("")
+        ('192.0.2.7', '2001:db8::/64', 'fe80::/64', '')
+    """
+    try:
+        parsed = ipaddress.ip_address(address.partition("%")[0])
+    except ValueError:
+        return address
+    if parsed.version == 4 or parsed.ipv4_mapped is not None:
+        return str(parsed if parsed.version == 4 else parsed.ipv4_mapped)
+    return str(ipaddress.ip_network((parsed, IPV6_NETWORK_BITS), strict=False))
