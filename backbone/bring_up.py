@@ -11,15 +11,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import ipaddress
 import logging
 import os
 import signal
-import socket
 import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -34,6 +31,7 @@ from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, Stop, Stopping
 from backbone.component.process import run_with_heartbeat
+from backbone.core_launches import UpOptions, core_launches, launcher_launch, service_launch
 from backbone.creator.messages import (
     READY_WITHIN_S,
     EndedBy,
@@ -42,23 +40,24 @@ from backbone.creator.messages import (
     Processes,
     ProcessFell,
     RestartPolicy,
-    creator_name,
 )
-from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
+from backbone.door import SECRET_NAME, secret_of
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health_watch import HealthWatch
 from backbone.mission.behavior_orders import behavior_orders
-from backbone.mission.model import Host, MissionDescription
+from backbone.mission.model import MissionDescription
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.operators import OperatorAction, tell_acted
+from backbone.other_hosts import OtherHosts, door_for_others
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, Start, StopComponent
+from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
+from backbone.preconditions import make_door, refuse_if_up
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -69,22 +68,8 @@ LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 CORE_POLICY = RestartPolicy(
     back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
 )  # chosen: a dead hub stops everybody, and leases outlast a restart of the RC manager only if its pause stays short
-FIRST_PORT, LAST_PORT = 20000, 32000  # chosen: below the ports the system hands out to outgoing connections
-
-
-@dataclass(frozen=True)
-class UpOptions:
-    """How a mission is run.
-
-    Attributes:
-        speed: Mission seconds per second of the machine.
-        trace: File for the schedule trace, or None.
-        for_s: Mission seconds after readiness until it ends by itself, or None: until told.
-    """
-
-    speed: float = 1.0
-    trace: Path | None = None
-    for_s: float | None = None
+MEET_TIME_S = 5.0  # chosen: the placer hears of a creator milliseconds after its token, on a busy machine later
+MEET_EACH_S = 0.1  # chosen: nobody notices this pause, and it is a hundred times what asking costs
 
 
 @dataclass
@@ -113,13 +98,6 @@ class Outcome:
         return self.ready_after_s is not None and self.failure is None and not killed
 
 
-class MissionAlreadyUp(Refusal):
-    """A mission of this name runs on this machine."""
-
-    code = "run.already_up"
-    remedy = "Take it down with 'scout-backbone down', or give this one another name."
-
-
 class Observer(Protocol):
     """Who watches a mission come up and go down."""
 
@@ -128,6 +106,9 @@ class Observer(Protocol):
 
     def done(self, step: str, took_s: float) -> None:
         """Take note that this step is done after these seconds of the machine."""
+
+    def announce(self, line: str) -> None:
+        """Show a person what to know or do now."""
 
     def connected(self, bus: Bus) -> None:
         """Listen to what the mission says; the hub is up, nothing else is."""
@@ -160,6 +141,8 @@ class Launcher(Component[NoParameters]):
         self._awaited: set[str] = set()
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
         self.outcome = Outcome()
+        self._others = OtherHosts(description, clock.now_s())
+        self._others_changed = asyncio.Event()
         keeper.on_fell = self._core_service_fell
         keeper.on_silent = self._core_service_silent
         keeper.on_changed = self.changed
@@ -169,6 +152,7 @@ class Launcher(Component[NoParameters]):
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
                 await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
+        self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
 
     async def serve(self) -> None:
         """Start the mission through the placer, then let it run; publish its health meanwhile."""
@@ -206,7 +190,7 @@ class Launcher(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return core services and components of the mission file that are missing, and what its look missed."""
+        """Return what is missing of the mission file: core services, components, machines; and what its look missed."""
         return [*self._own_absences(), *self._health_watch.absences()]
 
     def _own_absences(self) -> list[Absence]:
@@ -214,7 +198,7 @@ class Launcher(Component[NoParameters]):
         mission = [absence for wish in self._wishes if (absence := wish.absence()) is not None]
         if self.outcome.ready_after_s is None:
             mission.append(Absence(self._description.name, 0.0, "the mission is coming up", self._being_started()))
-        return [*core, *mission]
+        return [*core, *mission, *self._others.absences()]
 
     def _being_started(self) -> str:
         """Return which components the start waits for, and what they say they are doing."""
@@ -229,12 +213,41 @@ class Launcher(Component[NoParameters]):
             await self._stop_consoles()
         async with self._step("stop mission"):
             await self._stop_mission()
+        if self._others.offering:
+            async with self._step("stop creators of other hosts"):
+                await self._stop_other_hosts()
         async with self._step("stop core services"):
             for launch in reversed(core_launches(self._description, self.launch, self._options)):
                 self.outcome.ended.append(await self._keeper.end(launch.name, "the mission ends"))
 
     # ------------------------------------------------------------------ start
+    def _backbone_changed(self, address: str, stands: bool) -> None:
+        if self._others.token_changed(address, stands, self.clock.now_s()):
+            self.changed()
+        self._others_changed.set()
+
+    async def _wait_for_other_hosts(self) -> None:
+        """Return as soon as every declared machine has its creator in the mission."""
+        if self._others.missing:
+            self._observer.announce(
+                f"the mission's secret, for its other hosts: {Path(self.launch.run_directory) / SECRET_NAME}"
+            )
+        for host in self._others.missing:
+            self._observer.announce(
+                f"waiting for host {host}; copy the secret there and type: {self._others.command(host)}"
+            )
+        while self._others.missing:
+            await asyncio.gather(*(self._wait_for_host(host) for host in self._others.missing))
+
+    async def _wait_for_host(self, host: str) -> None:
+        async with self._step(f"host {host}"):
+            while host in self._others.missing:
+                self.report(f"waits for host {', '.join(self._others.missing)}")
+                self._others_changed.clear()
+                await self._others_changed.wait()
+
     async def _start_mission(self) -> None:
+        await self._wait_for_other_hosts()
         description = self._description
         hardware = [Start(c.type, c.name, c.parameters, c.host, process=c.process) for c in description.components]
         hardware += [Start(r.type, r.name, r.rc_parameters(), r.host, process=r.process) for r in description.resources]
@@ -271,9 +284,7 @@ class Launcher(Component[NoParameters]):
             wish = Wish(order.name, started=placed.done())
             self._wishes.append(wish)
             try:
-                stopped = await keep_placed(
-                    self.bus, self.clock, wish, order, component, on_placed=now_placed, on_changed=self.changed
-                )
+                stopped = await self._keep_placed(wish, order, component, now_placed)
             except Refusal as refusal:
                 placed.set_exception(refusal)
                 return
@@ -286,6 +297,21 @@ class Launcher(Component[NoParameters]):
                 await again.wait_there()
             finally:
                 again.close()
+
+    async def _keep_placed(
+        self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
+    ) -> str:
+        """Keep it placed; begin again for a moment while the placer may not have met the other machines' creators."""
+        until_s = time.monotonic() + (MEET_TIME_S if self._others.names else 0.0)
+        while True:
+            try:
+                return await keep_placed(
+                    self.bus, self.clock, wish, order, at, on_placed=now_placed, on_changed=self.changed
+                )
+            except NoHost:
+                if time.monotonic() >= until_s:
+                    raise
+            await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
 
     # ------------------------------------------------------------------ stop
     async def _stop_consoles(self) -> None:
@@ -322,6 +348,21 @@ class Launcher(Component[NoParameters]):
             return
         self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
 
+    async def _stop_other_hosts(self) -> None:
+        """Have the other machines end their creators and return when they did; a silent one ends all by itself."""
+        stops = (
+            self.bus.ask(offer, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
+            for offer in self._others.offering
+        )
+        await asyncio.gather(*stops, return_exceptions=True)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(STOP_TIME_S):
+                while self._others.offering:
+                    self._others_changed.clear()
+                    await self._others_changed.wait()
+        for offer in self._others.offering:
+            self._observer.announce(f"{offer} did not confirm its end; a machine that is cut off ends all by itself")
+
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
         self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
@@ -352,14 +393,17 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
     if options.trace is not None:
         run_files.require_writable(options.trace)
     directory = run_files.prepare(description.name)
-    clock = MissionClock(began_s, options.speed)
-    own = _launch(description, "launcher", "launcher", "", clock, directory)
-    observer.began("nameserver")
-    zygote = await Zygote.spawn_fresh(run_directory=str(directory))
     try:
-        return await _with_hub(zygote, own, clock, description, options, observer, began_s)
+        endpoint = make_door(description, directory)
+        clock = MissionClock(began_s, options.speed)
+        own = launcher_launch(description, endpoint, clock, directory)
+        observer.began("nameserver")
+        zygote = await Zygote.spawn_fresh(run_directory=str(directory))
+        try:
+            return await _with_hub(zygote, own, clock, description, options, observer, began_s)
+        finally:
+            await zygote.close()
     finally:
-        await zygote.close()
         run_files.remove(description.name)
 
 
@@ -373,9 +417,11 @@ async def _with_hub(
     began_s: float,
 ) -> Outcome:
     keeper = ProcessKeeper(zygote)
-    hub = _service_launch(own, "nameserver", "nameserver", description, {})
+    others = door_for_others(description)
+    hub = service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
     await keeper.start_hub(hub, CORE_POLICY)
-    bus = await ZenohBus.open_when_up(own.mission, own.address, clock, client_config(own.endpoint))
+    config = client_config(own.endpoint, secret_of(own.run_directory))
+    bus = await ZenohBus.open_when_up(own.mission, own.address, clock, config)
     observer.connected(bus)
     keeper.use(bus)
     await keeper.wait_ready(hub.name, START_TIME_S)
@@ -406,106 +452,6 @@ async def _with_hub(
             loop.remove_signal_handler(number)
         launcher.outcome.ended += await keeper.close()
     return launcher.outcome
-
-
-# ---------------------------------------------------------------------- orders
-def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:
-    """Return the launches of the core services after the nameserver, in the papers' order.
-
-    Hosts that are other machines start their creator themselves (``scout-backbone creator``).
-    """
-    types = [msgspec.to_builtins(component_type) for component_type in description.types]
-    resources = [msgspec.to_builtins(resource) for resource in description.resources]
-    trace = str(options.trace.absolute()) if options.trace else ""
-    parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
-        "component_database": lambda _: {"types": types},
-        "placer": lambda _: {},
-        "creator": lambda host: {"tags": list(host.tags), "preload": arc_modules(description.types)},
-        "dependency_database": lambda _: {"resources": resources},
-        "rc_manager": lambda _: {
-            **description.core_parameters("rc_manager"),
-            "mission": description.name,
-            "mission_priority": description.priority,
-            "trace": trace,
-        },
-    }
-    hosts = {host.name: host for host in description.hosts}
-    launches = []
-    for service in description.core:
-        here = is_this_machine(hosts[service.host]) or service.host == own.host
-        if service.type == "nameserver" or not here:
-            continue
-        name = creator_name(service.host) if service.type == "creator" else service.type
-        given = parameters[service.type](hosts[service.host])
-        launch = _service_launch(own, service.type, name, description, given)
-        launches.append(msgspec.structs.replace(launch, host=service.host))
-    return launches
-
-
-def refuse_if_up(mission: str) -> None:
-    """Return if no mission of this name runs on this machine.
-
-    Raises:
-        MissionAlreadyUp: One does.
-    """
-    try:
-        running = run_files.find(mission)
-    except run_files.MissionNotUp:
-        return
-    raise MissionAlreadyUp(
-        f"mission {mission} is up since before, launcher process {running.launcher_pid}", pid=running.launcher_pid
-    )
-
-
-def is_this_machine(host: Host) -> bool:
-    """Say whether the host's address is a loopback address."""
-    try:
-        return ipaddress.ip_address(host.address).is_loopback
-    except ValueError:
-        return host.address == "localhost"
-
-
-def _launch(
-    description: MissionDescription,
-    component_type: str,
-    name: str,
-    class_path: str,
-    clock: MissionClock,
-    directory: Path,
-) -> Launch:
-    return Launch(
-        mission=description.name,
-        subsystem=Subsystem.BACKBONE,
-        name=name,
-        type=component_type,
-        class_path=class_path,
-        host=description.hosts[0].name,
-        endpoint=f"tcp/{description.hosts[0].address}:{_free_port(description.hosts[0].address)}",
-        clock_origin_monotonic_s=clock.origin_monotonic_s,
-        clock_rate=clock.rate,
-        requester=LAUNCHER,
-        run_directory=str(directory),
-    )
-
-
-def _service_launch(
-    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, Any]
-) -> Launch:
-    class_path = next(t.class_path for t in description.types if t.name == component_type)
-    return msgspec.structs.replace(own, name=name, type=component_type, class_path=class_path, parameters=parameters)
-
-
-def _free_port(host_address: str) -> int:
-    """Return a port of this machine's address that nobody listens on; the hub keeps it over its restarts."""
-    start = FIRST_PORT + os.getpid() * 7 % (LAST_PORT - FIRST_PORT)
-    for port in chain(range(start, LAST_PORT), range(FIRST_PORT, start)):
-        with socket.socket() as probe:
-            try:
-                probe.bind((host_address, port))
-            except OSError:
-                continue
-            return port
-    raise LinkError(f"no free port between {FIRST_PORT} and {LAST_PORT}")
 
 
 async def end_mission(bus: Bus) -> None:

@@ -59,6 +59,14 @@ MissionName = Annotated[str | None, typer.Option("--mission", help="Name of the 
 Endpoint = Annotated[
     str | None, typer.Option("--connect", help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission.")
 ]
+SecretFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--secret-file",
+        envvar="SCOUT_SECRET_FILE",
+        help="File with the mission's secret, with --connect; '-' reads it from standard input.",
+    ),
+]
 NameOrCause = Annotated[
     str, typer.Argument(help="A name, an address, or a cause as stories show it: backbone/rc_manager#112.")
 ]
@@ -119,13 +127,33 @@ def run(work: Callable[[], Awaitable[int]]) -> None:
     raise typer.Exit(int(code))
 
 
-def visiting(mission: str | None, endpoint: str | None) -> AbstractAsyncContextManager[tuple[Any, Any]]:
+def visiting(
+    mission: str | None, endpoint: str | None, secret_file: Path | None
+) -> AbstractAsyncContextManager[tuple[Any, Any]]:
     """Return ``async with`` a bus to a mission that is up, and its clock."""
     from backbone import visit
 
     if endpoint is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
-    return visit.visiting(mission, endpoint, f"ui_console/cli-{os.getpid()}")
+    secret = read_secret_option(secret_file) if endpoint is not None else ""
+    return visit.visiting(mission, endpoint, f"ui_console/cli-{os.getpid()}", secret)
+
+
+def read_secret_option(secret_file: Path | None) -> str:
+    """Return the secret in that file, or typed unseen for ``-``; empty if none was named.
+
+    Raises:
+        NoSecret: There is none in it.
+    """
+    from getpass import getpass
+
+    from backbone.door import read_secret, read_secret_file
+
+    if secret_file is None:
+        return ""
+    if str(secret_file) != "-":
+        return read_secret_file(secret_file)
+    return read_secret(getpass("secret of the mission: ") if sys.stdin.isatty() else sys.stdin.readline())
 
 
 def read_or_exit(mission_file: Path) -> Any:
@@ -217,7 +245,7 @@ def up(
         from backbone.detached import up_detached
 
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
-    from backbone.bring_up import UpOptions
+    from backbone.core_launches import UpOptions
     from backbone.mission_console import bring_up_on_console
     from backbone.verdict import VerdictPipe
 
@@ -232,6 +260,7 @@ def status(
     watch: Annotated[bool, typer.Option("--watch", help="Keep showing it.")] = False,
     mission: MissionName = None,
     connect: Endpoint = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
 
@@ -241,19 +270,26 @@ def status(
         if connect is not None and mission is None:
             raise typer.BadParameter("--connect needs --mission NAME")
         source = f"ui_console/cli-{os.getpid()}"
-        return await show_status(mission, connect, source, Shown(as_json=as_json, watch=watch, width=_width()))
+        secret = read_secret_option(secret_file) if connect is not None else ""
+        return await show_status(mission, connect, source, Shown(as_json=as_json, watch=watch, width=_width()), secret)
 
     run(work)
 
 
 @app.command()
-def why(name: NameOrCause, as_json: AsJson = False, mission: MissionName = None, connect: Endpoint = None) -> None:
+def why(
+    name: NameOrCause,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
     """Say why a request waits or runs, why a component is where it is, until when."""
 
     async def work() -> int:
         from backbone.reasons import reasons_for
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             reasons = await reasons_for(bus, name, clock)
             show([json.dumps(reasons.to_json())] if as_json else reasons.lines(clock.now_s()))
         return ExitCode.DONE
@@ -262,13 +298,18 @@ def why(name: NameOrCause, as_json: AsJson = False, mission: MissionName = None,
 
 
 @app.command()
-def story(name: NameOrCause, mission: MissionName = None, connect: Endpoint = None) -> None:
+def story(
+    name: NameOrCause,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
     """Tell the events that touched a component, request or resource, with their causes."""
 
     async def work() -> int:
         from backbone.reasons import story_of
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
         for event in told.events:
             cause = f"   because of {event.cause}" if event.cause else ""
@@ -294,6 +335,7 @@ def start(
     ] = None,
     mission: MissionName = None,
     connect: Endpoint = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Start one more component through the placer."""
     parameters = dict(_parameter(given) for given in parameter or [])
@@ -305,7 +347,7 @@ def start(
         from backbone.placer.wishes import START_WITHIN_S
         from backbone.start_by_hand import completed
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             order, remark = await completed(bus, Start(type_, name, parameters, host))
             started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
             if remark:
@@ -320,14 +362,19 @@ def start(
 
 
 @app.command()
-def stop(name: str, mission: MissionName = None, connect: Endpoint = None) -> None:
+def stop(
+    name: str,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
     """Stop one component for good."""
 
     async def work() -> int:
         from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
             tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             show([f"{name} ended by {ended.by}"])
@@ -347,6 +394,7 @@ def set_(
     as_json: AsJson = False,
     mission: MissionName = None,
     connect: Endpoint = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Set priority, parent or a run time of whoever asks for resources, or any parameter; without a value show it."""
     if value is not None and as_json:
@@ -356,7 +404,7 @@ def set_(
         from backbone.attributes import attributes_of, change
         from backbone.operators import OperatorAction, login_name, tell_acted
 
-        async with visiting(mission, connect) as (bus, clock):
+        async with visiting(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
                 lines = await change(bus, name, parameter, _value(value), login_name())
                 tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {_value(value)!r}")
@@ -389,19 +437,20 @@ def creator(
     host: Annotated[str, typer.Option("--host", help="Name of this machine in the mission.")],
     connect: Annotated[str, typer.Option("--connect", help="The mission's hub, tcp/HOST:PORT.")],
     mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
+    secret_file: SecretFile = None,
     tag: Annotated[list[str] | None, typer.Option("--tag", help="What this machine has; repeatable.")] = None,
 ) -> None:
-    """Offer this machine to a mission until Ctrl-C: its placer may start components here."""
+    """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
 
     async def work() -> int:
-        from backbone.creator.offer import offer
+        from backbone.creator.kept_creator import Offered
+        from backbone.creator.offer import Offering
 
+        offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
+        is_file = secret_file is not None and str(secret_file) != "-"
         say(f"{host} is offered to mission {mission}; end with Ctrl-C")
-        fell = await offer(mission, connect, host, tag or [])
-        if fell is None:
-            return ExitCode.DONE
-        say(f"{fell.name} was given up: {fell.how}")
-        return ExitCode.MISSION_FAILED
+        await Offering(offered, say, secret_file if is_file else None).run()
+        return ExitCode.DONE
 
     run(work)
 

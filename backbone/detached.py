@@ -99,7 +99,10 @@ async def _ask(found: run_files.RunFile) -> bool:
     clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
     try:
         bus = await ZenohBus.open_when_up(
-            found.mission, f"ui_console/down-{os.getpid()}", clock, client_config(found.endpoint)
+            found.mission,
+            f"ui_console/down-{os.getpid()}",
+            clock,
+            client_config(found.endpoint, run_files.secret(found)),
         )
     except LinkError as error:
         say(f"the hub cannot be reached: {error}")

@@ -12,10 +12,11 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from backbone.bring_up import Outcome, UpOptions, run_mission
+from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import ExitCode, complaint_of
 from backbone.component.messages import StoryEvent
+from backbone.core_launches import UpOptions
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health import HealthWord, MissionHealth, line
 from backbone.keys import Conversation
@@ -55,6 +56,10 @@ class ConsoleObserver:
     def done(self, step: str, took_s: float) -> None:
         """Print the step with its time."""
         self.tell(f"  ✓ {step:<42} {took_s * 1000:7.0f} ms")
+
+    def announce(self, line: str) -> None:
+        """Print the line."""
+        self.tell(f"  {line}")
 
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people, and to the mission's health."""

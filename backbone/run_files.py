@@ -16,10 +16,12 @@ import msgspec
 import psutil
 
 from backbone.atomic_file import replace_file
+from backbone.door import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 
 FILE_NAME = "run.json"
+ENDED = ".ended-"  # a folder whose mission ends is hidden as .<mission>.ended-<pid of the zygote that removes it>
 TRIAL_BYTES = 1 << 16  # chosen: room for what a mission writes until all is ready, logs included
 START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports a process's start in hundredths, corrected by clock steps
 
@@ -102,6 +104,7 @@ def prepare(mission: str) -> Path:
         RunFolderUnusable: The system refused; the folder is away.
     """
     directory = run_directory(mission)
+    _remove_what_dead_zygotes_left(directory)
     try:
         (directory / "log").mkdir(mode=0o700, parents=True, exist_ok=True)
         directory.chmod(0o700)
@@ -178,10 +181,23 @@ def find(mission: str | None = None) -> RunFile:
     raise MissionNotUp(f"mission {mission!r} is not up; up: {names or 'none'}", mission=mission, missions=names)
 
 
+def secret(run_file: RunFile) -> str:
+    """Return what the mission's hub asks its clients for; empty: nothing."""
+    return secret_of(str(run_directory(run_file.mission)))
+
+
 def find_all() -> list[RunFile]:
     """Return the missions that are up on this machine, sorted by name."""
     found = (_read(folder / FILE_NAME) for folder in sorted(_directory().iterdir()) if is_legal(folder.name))
     return [run_file for run_file in found if run_file is not None and _is_fresh(run_file)]
+
+
+def _remove_what_dead_zygotes_left(directory: Path) -> None:
+    """Remove folders of earlier runs whose zygote was killed between hiding its folder and removing it."""
+    for hidden in directory.parent.glob(f".{directory.name}{ENDED}*"):
+        pid = hidden.name.rpartition(ENDED)[2]
+        if pid.isdecimal() and not psutil.pid_exists(int(pid)):
+            shutil.rmtree(hidden, ignore_errors=True)
 
 
 def _directory() -> Path:

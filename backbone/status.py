@@ -41,8 +41,13 @@ class Shown:
     width: int | None
 
 
-async def show_status(mission: str | None, endpoint: str | None, source: str, shown: Shown) -> ExitCode:
+async def show_status(
+    mission: str | None, endpoint: str | None, source: str, shown: Shown, secret: str = ""
+) -> ExitCode:
     """Print how a mission is and return the exit code: MISSION_FAILED if it has failed, else DONE.
+
+    Args:
+        secret: What the hub at the endpoint asks its clients for; empty: nothing.
 
     Raises:
         MissionNotUp: None of this name is up on this machine.
@@ -50,7 +55,7 @@ async def show_status(mission: str | None, endpoint: str | None, source: str, sh
     """
     found = run_files.find(mission) if endpoint is None else None
     try:
-        async with visiting(mission, endpoint, source) as (bus, clock):
+        async with visiting(mission, endpoint, source, secret) as (bus, clock):
             return await _show(bus, clock, found, shown)
     except LinkError as error:
         if found is None:

@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskTime, MissionTime
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
@@ -22,7 +23,7 @@ ASKED_TIMES = 5  # chosen: the quickest of a few answers is within a millisecond
 
 @contextlib.asynccontextmanager
 async def visiting(
-    mission: str | None, endpoint: str | None, source: str
+    mission: str | None, endpoint: str | None, source: str, secret: str = ""
 ) -> AsyncIterator[tuple[ZenohBus, MissionClock]]:
     """Open a bus to a mission, speaking as ``source``, and close it at the end.
 
@@ -30,6 +31,7 @@ async def visiting(
         mission: Name; may be None if just one is up on this machine.
         endpoint: Its hub elsewhere; needs the mission's name.
         source: Address that stands in every envelope.
+        secret: What the hub at the endpoint asks its clients for; empty: nothing.
 
     Raises:
         MissionNotUp: None of this name is up on this machine.
@@ -39,34 +41,46 @@ async def visiting(
     if endpoint is None:
         found = run_files.find(mission)
         clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
-        bus = await ZenohBus.open_when_up(found.mission, source, clock, client_config(found.endpoint))
+        bus = await ZenohBus.open_when_up(
+            found.mission, source, clock, client_config(found.endpoint, run_files.secret(found))
+        )
     else:
         assert mission is not None  # noqa: S101  the command line has seen to that
-        clock = await clock_elsewhere(mission, endpoint, source)
-        bus = await ZenohBus.open_when_up(mission, source, clock, client_config(endpoint))
+        clock = await clock_elsewhere(mission, endpoint, source, secret)
+        bus = await ZenohBus.open_when_up(mission, source, clock, client_config(endpoint, secret))
     try:
         yield bus, clock
     finally:
         await bus.close()
 
 
-async def clock_elsewhere(mission: str, endpoint: str, source: str) -> MissionClock:
+async def clock_elsewhere(mission: str, endpoint: str, source: str, secret: str = "") -> MissionClock:
     """Return a clock of this machine that shows the mission's time there.
 
     Raises:
         HubUnreachable: Nobody listens at the endpoint.
         LinkError: The nameserver there did not answer.
     """
-    bus = await ZenohBus.open_when_up(mission, source, MissionClock.started_now(), client_config(endpoint))
+    config = client_config(endpoint, secret)
+    bus = await ZenohBus.open_when_up(mission, source, MissionClock.started_now(), config)
     try:
-        readings = [await _reading(bus) for _ in range(ASKED_TIMES)]
+        return await mission_clock(bus)
     finally:
         await bus.close()
+
+
+async def mission_clock(bus: Bus) -> MissionClock:
+    """Return a clock of this machine that shows the time of the mission at the bus's hub.
+
+    Raises:
+        LinkError: The nameserver there did not answer.
+    """
+    readings = [await _reading(bus) for _ in range(ASKED_TIMES)]
     _, origin_s, rate = min(readings)
     return MissionClock(origin_s, rate)
 
 
-async def _reading(bus: ZenohBus) -> tuple[float, float, float]:
+async def _reading(bus: Bus) -> tuple[float, float, float]:
     """Return how long an answer took, and the monotonic origin and rate that follow from it."""
     asked_s = time.monotonic()
     answer = await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)

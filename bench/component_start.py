@@ -28,6 +28,7 @@ import uvloop
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
+from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import EndProcess, ProcessEnded, RestartPolicy, Spawn, Spawned
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
@@ -36,6 +37,7 @@ from backbone.placer.messages import ADDRESS as PLACER
 
 COMPONENTS = 20
 CREATOR = "backbone/creator-bench"
+LIGHT = ComponentType("light", "light_component:Light", Subsystem.RESOURCE_POOL)
 
 
 @asynccontextmanager
@@ -58,7 +60,11 @@ async def creator_up(folder: str) -> AsyncIterator[ZenohBus]:
         run_directory=str(Path(folder) / "run"),
     )
     creator = msgspec.structs.replace(
-        hub, name="creator-bench", type="creator", class_path="backbone.creator.service:Creator"
+        hub,
+        name="creator-bench",
+        type="creator",
+        class_path="backbone.creator.service:Creator",
+        parameters={"types": [msgspec.to_builtins(LIGHT)]},
     )
     zygote = await Zygote.spawn_fresh(run_directory=hub.run_directory)
     keeper = ProcessKeeper(zygote)

@@ -2,15 +2,18 @@
 
 The floor is the same path on bare zenoh-python: ``session.get`` and a queryable, both bridged to
 asyncio as the bus does it, with the same bytes. Calls alternate one by one, so both see the same
-machine. Prints one JSON line; ``ratio`` is bus p50 over bare p50.
+machine. They speak by the unix socket, as a mission on one machine does. Prints one JSON line; ``ratio`` is bus
+p50 over bare p50.
 """
 
 from __future__ import annotations
 
 import argparse
 import asyncio
+import tempfile
 import time
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
 import uvloop
@@ -20,6 +23,7 @@ from measuring import free_endpoint, helper, percentile, report, summary, wait_f
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.component.messages import SetParameter, Stop
+from backbone.door import socket_endpoint
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
 MISSION = "bench"
@@ -136,6 +140,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("role", nargs="?", default="all", choices=["all", "hub", "server"])
     parser.add_argument("endpoint", nargs="?", default="")
+    parser.add_argument("--tcp", action="store_true", help="by the door for other machines, not by the unix socket")
     parser.add_argument("--calls", type=int, default=2000, help="asked each way")
     chosen = parser.parse_args()
     if chosen.role == "hub":
@@ -143,9 +148,10 @@ def main() -> None:
     elif chosen.role == "server":
         uvloop.run(serve(chosen.endpoint))
     else:
-        endpoint = free_endpoint()
-        with helper(__file__, "hub", endpoint), helper(__file__, "server", endpoint):
-            uvloop.run(measure(endpoint, chosen.calls))
+        with tempfile.TemporaryDirectory(prefix="s-") as folder:
+            endpoint = free_endpoint() if chosen.tcp else socket_endpoint(Path(folder))
+            with helper(__file__, "hub", endpoint), helper(__file__, "server", endpoint):
+                uvloop.run(measure(endpoint, chosen.calls))
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import signal
 import tempfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -124,3 +125,10 @@ def local_mission() -> MissionNetwork:
 def beside() -> Callable[[Component[Any]], AbstractAsyncContextManager[Component[Any]]]:
     """Return ``async with beside(component)``: it lives from its readiness to the end of the block."""
     return run_beside
+
+
+@pytest.fixture
+def short_path() -> Iterator[Path]:
+    """Give a folder with a path short enough for a socket in it; ``tmp_path`` may be too long."""
+    with tempfile.TemporaryDirectory(prefix="s-") as folder:
+        yield Path(folder)

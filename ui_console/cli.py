@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import ExitCode, finite, run, say
+from backbone.cli import ExitCode, SecretFile, finite, read_secret_option, run, say
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -61,6 +61,15 @@ Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, t
 
 
 User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
+
+
+@dataclass(frozen=True)
+class _Where:
+    """Which mission a console joins."""
+
+    mission: str | None
+    connect: str | None
+    secret_file: Path | None
 
 
 @dataclass(frozen=True)
@@ -146,11 +155,13 @@ def attach(
     user: User = "",
     mission: Mission = None,
     connect: Connect = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Take over a robot, drive it, give it back."""
+    where = _Where(mission, connect, secret_file)
     script = script or ("-" if as_json else "")
     if profile is Profile.MONITOR:
-        run(lambda: _watch(mission, connect, user or _user(), as_json=as_json))
+        run(lambda: _watch(where, user or _user(), as_json=as_json))
     wished = {
         "robot": robot,
         "priority": priority,
@@ -158,10 +169,10 @@ def attach(
         "minimum_runtime_s": minimum_runtime,
     }
     if script:
-        run(lambda: _drive_by_script(mission, connect, wished, user or _user(), _Script(script, within)))
+        run(lambda: _drive_by_script(where, wished, user or _user(), _Script(script, within)))
     _need_a_terminal("attach", "--script FILE or --json")
     looks = _Looks(profile, user or _user(), is_bare=video_only, has_gamepad=gamepad)
-    run(lambda: _drive_by_hand(mission, connect, {**wished, "away_after_s": away_after}, looks))
+    run(lambda: _drive_by_hand(where, {**wished, "away_after_s": away_after}, looks))
 
 
 @app.command()
@@ -171,13 +182,15 @@ def monitor(
     user: User = "",
     mission: Mission = None,
     connect: Connect = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
+    where = _Where(mission, connect, secret_file)
     if once:
-        run(lambda: _look_once(mission, connect, user or _user()))
+        run(lambda: _look_once(where, user or _user()))
     if not as_json:
         _need_a_terminal("monitor", "--json")
-    run(lambda: _watch(mission, connect, user or _user(), as_json=as_json))
+    run(lambda: _watch(where, user or _user(), as_json=as_json))
 
 
 @app.command()
@@ -219,8 +232,10 @@ def serve(
     ] = AWAY_AFTER_S,
     mission: Mission = None,
     connect: Connect = None,
+    secret_file: SecretFile = None,
 ) -> None:
     """Serve the console, or with --design the mission designer, as a web page: for browsers, tablets and phones."""
+    where = _Where(mission, connect, secret_file)
     from ui_console.web.door import WrongOperator, passes_for, read_operator
 
     try:
@@ -237,7 +252,7 @@ def serve(
             say("--design serves a mission file; --mission and --connect are for missions that are up")
             raise typer.Exit(ExitCode.USAGE)
         run(lambda: _serve_design(design, passes, site))
-    run(lambda: _serve(mission, connect, passes, site))
+    run(lambda: _serve(where, passes, site))
 
 
 @app.command()
@@ -272,9 +287,7 @@ def _need_a_terminal(command: str, instead: str) -> None:
         raise typer.Exit(ExitCode.USAGE)
 
 
-async def _drive_by_script(
-    mission: str | None, connect: str | None, wished: dict[str, Any], user: str, given: _Script
-) -> int:
+async def _drive_by_script(where: _Where, wished: dict[str, Any], user: str, given: _Script) -> int:
     from ui_console.script import WrongScript, read_script
     from ui_console.scripted import ScriptDriver, feed_from
     from ui_console.teleoperation import Teleoperation
@@ -288,9 +301,9 @@ async def _drive_by_script(
     except WrongScript as wrong:
         say(f"{script}: {wrong}")
         return ExitCode.USAGE
-    launch, clock = await _launch(mission, connect, wished)
+    launch, clock, secret = await _launch(where, wished)
     driver = ScriptDriver(_write_line, steps, within_s=given.within_s)
-    bus = await _open_bus(launch, clock)
+    bus = await _open_bus(launch, clock, secret)
     console = Teleoperation(launch, bus, clock, show=driver.show, work=driver.drive, watches=False, user=user)
     if script == "-":
         feed_from(sys.stdin.fileno(), driver.feed)
@@ -299,14 +312,14 @@ async def _drive_by_script(
     return ExitCode.INTERRUPTED if interrupted() else driver.exit_code(console)
 
 
-async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[str, Any], looks: _Looks) -> int:
+async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -> int:
     from ui_console.gamepad import find_gamepad
     from ui_console.teleoperation import Teleoperation
     from ui_console.terminal import app as screens
     from ui_console.terminal.session import TerminalSession
 
     pad = find_gamepad() if looks.has_gamepad else None
-    launch, clock = await _launch(mission, connect, wished)
+    launch, clock, secret = await _launch(where, wished)
     sees = wished["kind"] == KINDS[Profile.TERMINAL] and looks.profile is Profile.TERMINAL
     session = TerminalSession(
         launch.name,
@@ -317,7 +330,7 @@ async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[
         sees=sees,
         gamepad=pad,
     )
-    bus = await _open_bus(launch, clock)
+    bus = await _open_bus(launch, clock, secret)
     see = session.see if sees else None
     console = Teleoperation(launch, bus, clock, show=session.show, see=see, keeps_arc=True, user=looks.user)
     _end_on_signals(console)
@@ -327,13 +340,13 @@ async def _drive_by_hand(mission: str | None, connect: str | None, wished: dict[
     return ExitCode.DONE
 
 
-async def _watch(mission: str | None, connect: str | None, user: str, *, as_json: bool) -> int:
+async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
     from backbone.component.component import NoParameters
     from ui_console.console_events import for_scripts
     from ui_console.observer import Observer
 
-    launch, clock = await _launch(mission, connect, {})
-    bus = await _open_bus(launch, clock)
+    launch, clock, secret = await _launch(where, {})
+    bus = await _open_bus(launch, clock, secret)
     if as_json:
 
         def show(event: ConsoleEvent) -> None:
@@ -353,17 +366,17 @@ async def _watch(mission: str | None, connect: str | None, user: str, *, as_json
     return ExitCode.DONE
 
 
-async def _look_once(mission: str | None, connect: str | None, user: str) -> int:
+async def _look_once(where: _Where, user: str) -> int:
     from backbone.component.component import NoParameters
     from ui_console.console_model import ConsoleModel
     from ui_console.observer import Observer
     from ui_console.team_model import TeamModel
     from ui_console.views import view_json
 
-    launch, clock = await _launch(mission, connect, {})
+    launch, clock, secret = await _launch(where, {})
     model = ConsoleModel(launch.name, user, TeamModel(launch.mission), sees=False)
     console: Observer[NoParameters] = Observer(
-        launch, await _open_bus(launch, clock), clock, show=model.apply, signs_in=False
+        launch, await _open_bus(launch, clock, secret), clock, show=model.apply, signs_in=False
     )
     interrupted = _end_on_signals(console)
 
@@ -382,7 +395,7 @@ async def _look_once(mission: str | None, connect: str | None, user: str) -> int
     return ExitCode.DONE
 
 
-async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, Pass], site: _Site) -> int:
+async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     import msgspec
 
     from ui_console.web.door import Doorkeeper
@@ -395,11 +408,11 @@ async def _serve(mission: str | None, connect: str | None, passes: Mapping[str, 
         say(f"{missing.name} is not installed; install scout-backbone[web]")
         return ExitCode.USAGE
     encryption = site.encryption
-    launch, clock = await _launch(mission, connect, {})
+    launch, clock, secret = await _launch(where, {})
     launch = msgspec.structs.replace(launch, name=f"web-{os.getpid()}")
 
     async def join(one_more: Launch) -> Any:
-        return await _open_bus(one_more, clock)
+        return await _open_bus(one_more, clock, secret)
 
     bus = await join(launch)
     hub = WebHub(launch, bus, clock, join, kind=site.kind, away_after_s=site.away_after_s)
@@ -486,8 +499,8 @@ def _user() -> str:
     return login_name()
 
 
-async def _launch(mission: str | None, connect: str | None, parameters: dict[str, Any]) -> tuple[Launch, Clock]:
-    """Return who this console is in the mission found, and that mission's clock."""
+async def _launch(where: _Where, parameters: dict[str, Any]) -> tuple[Launch, Clock, str]:
+    """Return who this console is in the mission found, that mission's clock, and the secret its hub asks for."""
     import socket
 
     from backbone import run_files
@@ -497,15 +510,16 @@ async def _launch(mission: str | None, connect: str | None, parameters: dict[str
     from backbone.visit import clock_elsewhere
 
     name = f"console-{os.getpid()}"
+    mission, connect = where.mission, where.connect
     if connect is None:
         found = run_files.find(mission)
-        mission, endpoint = found.mission, found.endpoint
+        mission, endpoint, secret = found.mission, found.endpoint, run_files.secret(found)
         clock, host = MissionClock(found.clock_origin_monotonic_s, found.clock_rate), found.host
     elif mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
     else:
-        endpoint, host = connect, socket.gethostname()
-        clock = await clock_elsewhere(mission, connect, f"{Subsystem.UI_CONSOLE}/{name}")
+        endpoint, host, secret = connect, socket.gethostname(), read_secret_option(where.secret_file)
+        clock = await clock_elsewhere(mission, connect, f"{Subsystem.UI_CONSOLE}/{name}", secret)
     launch = Launch(
         mission,
         Subsystem.UI_CONSOLE,
@@ -518,13 +532,13 @@ async def _launch(mission: str | None, connect: str | None, parameters: dict[str
         clock.rate,
         parameters,
     )
-    return launch, clock
+    return launch, clock, secret
 
 
-async def _open_bus(launch: Launch, clock: Clock) -> Any:
+async def _open_bus(launch: Launch, clock: Clock, secret: str) -> Any:
     from backbone.bus.zenoh_bus import ZenohBus, client_config
 
-    return await ZenohBus.open_when_up(launch.mission, launch.address, clock, client_config(launch.endpoint))
+    return await ZenohBus.open_when_up(launch.mission, launch.address, clock, client_config(launch.endpoint, secret))
 
 
 def _end_on_signals(console: Observer[Any]) -> Callable[[], bool]:

@@ -27,13 +27,14 @@ class SharedSession:
     Args:
         mission: Name of the mission.
         endpoint: Where the hub listens.
+        secret: What it asks its clients for; empty: nothing.
 
     Raises:
         HubUnreachable: Nobody listens there.
     """
 
-    def __init__(self, mission: str, endpoint: str) -> None:
-        self._session = open_session(client_config(endpoint))
+    def __init__(self, mission: str, endpoint: str, secret: str = "") -> None:
+        self._session = open_session(client_config(endpoint, secret))
         self._neighbors = LocalNetwork(mission)
 
     def join(self, source: str, clock: Clock) -> SharedBus:

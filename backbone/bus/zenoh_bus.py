@@ -32,6 +32,7 @@ from backbone.bus.interface import (
     Subscription,
 )
 from backbone.bus.speaker import Speaker, settle
+from backbone.door import USER
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (
@@ -86,16 +87,22 @@ def _transport() -> dict[str, Any]:
     }
 
 
-def _config(settings: dict[str, Any]) -> zenoh.Config:
+def _config(settings: dict[str, Any], auth: dict[str, Any]) -> zenoh.Config:
     quiet = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
-    return zenoh.Config.from_json5(json.dumps({"scouting": quiet, "transport": _transport(), **settings}))
+    transport = {**_transport(), "auth": auth}
+    return zenoh.Config.from_json5(json.dumps({"scouting": quiet, "transport": transport, **settings}))
 
 
 _RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}
 
 
-def client_config(endpoint: str) -> zenoh.Config:
-    """Return the settings of a component that talks through the hub at ``endpoint``."""
+def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
+    """Return the settings of a component that talks through the hub at ``endpoint``.
+
+    Args:
+        secret: Proved to the hub, without being sent; empty: the hub asks for none.
+    """
+    auth = {"usrpwd": {"user": USER, "password": secret}} if secret else {}
     return _config(
         {
             "mode": "client",
@@ -105,12 +112,17 @@ def client_config(endpoint: str) -> zenoh.Config:
                 "exit_on_failure": True,
                 "retry": _RETRY,
             },
-        }
+        },
+        auth,
     )
 
 
-def hub_config(listen: list[str], connect: list[str] | None = None) -> zenoh.Config:
-    """Return the settings of a hub that listens on these endpoints and joins the hubs at the others."""
+def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
+    """Return the settings of a hub that listens on these endpoints and joins the hubs at the others.
+
+    Args:
+        dictionary_file: Users and secrets of the clients it lets in; empty: it lets in all who reach it.
+    """
     settings: dict[str, Any] = {
         "mode": "router",
         "listen": {"endpoints": listen, "exit_on_failure": True},
@@ -118,7 +130,7 @@ def hub_config(listen: list[str], connect: list[str] | None = None) -> zenoh.Con
     }
     if connect:
         settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
-    return _config(settings)
+    return _config(settings, {"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {})
 
 
 def _is_hub(config: zenoh.Config) -> bool:

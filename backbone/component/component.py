@@ -42,6 +42,7 @@ from backbone.component.messages import (
     Story,
 )
 from backbone.component.story import StoryBook
+from backbone.door import secret_of
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
@@ -108,7 +109,8 @@ class Component(Generic[P]):
     @classmethod
     def open_bus(cls, launch: Launch, clock: Clock) -> Bus:
         """Return the bus the component will speak on: a client of the hub, unless the class is the hub."""
-        return ZenohBus.open(launch.mission, launch.address, clock, client_config(launch.endpoint))
+        config = client_config(launch.endpoint, secret_of(launch.run_directory))
+        return ZenohBus.open(launch.mission, launch.address, clock, config)
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.launch, self.bus, self.clock = launch, bus, clock

@@ -17,7 +17,7 @@ class Launch(Message, frozen=True):
         type: Component type as named in the mission file.
         class_path: ``package.module:Class``, a ``Component``.
         host: Name of the host it runs on.
-        endpoint: Where the hub listens.
+        endpoint: Where the hub listens. The secret it may ask for is in the run directory, never in here.
         clock_origin_monotonic_s: This machine's monotonic clock at mission time 0.
         clock_rate: Mission seconds per second of the machine.
         parameters: Values for the class's ``Parameters``.

@@ -38,6 +38,7 @@ from backbone.component.membership import (
     process_address,
 )
 from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
+from backbone.door import secret_of
 from backbone.wire import Envelope, Message
 
 
@@ -191,7 +192,7 @@ def run_shared_process(launch: Launch) -> int:
 
 
 async def _live(launch: Launch) -> None:
-    session = SharedSession(launch.mission, launch.endpoint)
+    session = SharedSession(launch.mission, launch.endpoint, secret_of(launch.run_directory))
     try:
         clock = MissionClock(launch.clock_origin_monotonic_s, launch.clock_rate)
         shared = SharedProcess(launch, session.join, clock, os.getpid())

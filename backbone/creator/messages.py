@@ -217,6 +217,20 @@ class AlreadyHere(Refusal):
     remedy = "Choose another name, or end the component that has it first."
 
 
+class UnlistedType(Refusal):
+    """The creator may not run this class: it was not launched with it in the list of the mission's types."""
+
+    code = "creator.unlisted_type"
+    remedy = "Declare the type in the mission file; core services are started by 'scout-backbone up' alone."
+
+
+class FixedTypes(Refusal):
+    """Which types a creator may run, and what it preloads, is settled by its launch."""
+
+    code = "creator.fixed_types"
+    remedy = "Change the types in the mission file, and bring the mission up again."
+
+
 class NotThePlacer(Refusal):
     """Processes are started and ended by the placer alone, so that its picture stays true."""
 
@@ -230,3 +244,8 @@ CreatorQuestion = Spawn | EndProcess | ListProcesses
 def creator_name(host: str) -> str:
     """Return the name of the creator on a host."""
     return f"creator-{host}"
+
+
+def offer_name(host: str) -> str:
+    """Return the name of the command that offers a host to a mission elsewhere, and keeps its creator."""
+    return f"offer-{host}"

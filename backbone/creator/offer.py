@@ -1,7 +1,8 @@
-"""Offer this machine to a mission elsewhere: run its creator here until told to stop.
+"""Offer this machine to a mission elsewhere: keep the mission's creator here until it is ordered to stop.
 
-The creator and all it starts are clients of the mission's hub. Where the hub is lost for good, or this
-process ends, whatever runs here ends too.
+The offer outlives the link. If the link to the hub is down for ``CUT_OFF_S``, the creator and all it started end;
+then the offer tries to reach the hub again, and begins a new creator with the mission's clock asked anew. It ends
+when the mission's launcher asks it to (``down``), or on a signal.
 """
 
 from __future__ import annotations
@@ -9,80 +10,262 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-from collections.abc import Iterable, Sequence
+import socket
+from collections.abc import Callable
+from dataclasses import replace
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, ClassVar
 
-from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
-from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
-from backbone.creator.messages import TYPE, ProcessFell, RestartPolicy, creator_name
-from backbone.creator.preload import arc_modules
-from backbone.creator.process_keeper import ProcessKeeper
-from backbone.creator.zygote import Zygote
+from backbone.component.messages import Absence
+from backbone.creator.kept_creator import KeepsCreator, KeptCreator, Offered
+from backbone.creator.messages import (
+    ListProcesses,
+    Processes,
+    ProcessFell,
+    offer_name,
+)
+from backbone.door import read_secret_file
+from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.naming import Subsystem, legal
-from backbone.visit import clock_elsewhere
+from backbone.visit import clock_elsewhere, mission_clock
+from backbone.wire import Envelope, Message
 
-READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
-REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
+OFFER_TYPE = "offer"
+CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), a killed hub at once and is back within 3 s
+SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, on a slow link by a tenth of a second
+ASK_AGAIN_S = 0.1  # chosen: a hub's nameserver answers that soon after the hub listens
+PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
+DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeated
 
 
-async def offer(mission: str, endpoint: str, host: str, tags: Sequence[str]) -> ProcessFell | None:
-    """Run the mission's creator of this host until SIGTERM or SIGINT; return how it fell, if it was given up.
+class Ending(StrEnum):
+    """Why an offer's life ended."""
+
+    ORDERED = "ordered to end"
+    CUT_OFF = "the link to the mission was lost"
+    OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
+
+
+class Offer(Component[NoParameters]):
+    """Keeps the creator of this machine, as long as the mission can be reached.
+
+    Attributes:
+        ending: Why it ended; meaningful after ``run``.
+    """
+
+    accepts: ClassVar[Any] = ListProcesses
+
+    def __init__(
+        self, launch: Launch, bus: Bus, clock: Clock, creator: KeepsCreator, on_ready: Callable[[], None]
+    ) -> None:
+        super().__init__(launch, bus, clock)
+        self._creator, self._on_ready = creator, on_ready
+        creator.on_fell, creator.on_changed = self._creator_fell, self.changed
+        self._link_up, self._link_fell = asyncio.Event(), asyncio.Event()
+        self.ending = Ending.ORDERED
+
+    async def connect(self) -> None:
+        """Have the creator running, or end meanwhile because the link is lost."""
+        self.start_task(self._watch_link(), "link")
+        await self._creator.start(self.bus, self.clock)
+
+    async def serve(self) -> None:
+        """Let it be known that the machine is in the mission."""
+        self._on_ready()
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Tell of the creator's process."""
+        if isinstance(asked.body, ListProcesses):
+            return Processes(self.launch.host, [], self._creator.processes())
+        return await super().answer(asked)
+
+    def absences(self) -> list[Absence]:
+        """Return the creator while it does not run or respond."""
+        return self._creator.absences()
+
+    async def drain(self) -> None:
+        """End the creator and all it started."""
+        await self._creator.close()
+
+    def _creator_fell(self, fell: ProcessFell) -> None:
+        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
+        self.changed()
+
+    async def _watch_link(self) -> None:
+        """End this life if the link stays down, or if the mission's time is another one when it is back."""
+        self.bus.watch_link(self._link_changed)
+        while True:
+            await self._link_fell.wait()
+            self._link_fell.clear()
+            try:
+                async with asyncio.timeout(CUT_OFF_S):
+                    await self._link_up.wait()
+            except TimeoutError:
+                self._end_as(Ending.CUT_OFF)
+                return
+            if await self._is_other_time():
+                self._end_as(Ending.OTHER_TIME)
+                return
+
+    def _link_changed(self, is_up: bool) -> None:
+        if is_up:
+            self._link_up.set()
+        else:
+            self._link_up.clear()
+            self._link_fell.set()  # and stays so until it is judged, however soon the link is back
+
+    async def _is_other_time(self) -> bool:
+        """Compare the clocks as soon as the nameserver answers, which a hub's link precedes."""
+        while self._link_up.is_set():
+            try:
+                again = await mission_clock(self.bus)
+            except LinkError:
+                await self.clock.sleep_s(ASK_AGAIN_S * self.clock.rate)
+            else:
+                return abs(again.now_s() - self.clock.now_s()) > SAME_TIME_S * self.clock.rate
+        return False
+
+    def _end_as(self, ending: Ending) -> None:
+        self.ending = ending
+        self.end(str(ending))
+
+
+class Offering:
+    """Offers a machine, life after life. Use it inside one event loop.
+
+    Args:
+        say: Called with lines for the person who typed the command.
+        secret_file: Read anew before each life: a new run of the mission has a new secret. None: it stays.
+    """
+
+    def __init__(self, offered: Offered, say: Callable[[str], None], secret_file: Path | None = None) -> None:
+        self._offered, self._say, self._secret_file = offered, say, secret_file
+        self._current: Offer | None = None
+        self._lives: asyncio.Task[None] | None = None
+        self._is_ordered_to_end = self._was_in_the_mission = False
+        self._said = ""
+
+    async def run(self) -> None:
+        """Offer the machine until the mission or a signal ends it.
+
+        Raises:
+            NameTaken: The mission has a creator of this host.
+            Refusal: The first creator could not be started.
+        """
+        self._lives = asyncio.create_task(self._live_again_and_again(), name="offer")
+        for number in (signal.SIGTERM, signal.SIGINT):
+            asyncio.get_running_loop().add_signal_handler(number, self.end)
+        try:
+            await self._lives
+        except asyncio.CancelledError:
+            if not self._is_ordered_to_end:
+                raise
+
+    def end(self) -> None:
+        """Have ``run`` return when nothing runs here any more."""
+        self._is_ordered_to_end = True
+        if self._current is not None:
+            self._current.end("by a signal")
+        elif self._lives is not None:
+            self._lives.cancel()
+
+    async def _live_again_and_again(self) -> None:
+        machine, pause_s = MissionClock.started_now(), PAUSE_FIRST_S
+        while True:
+            try:
+                offer = await self._live()
+            except LinkError as error:
+                self._say_once(f"{error}; trying again, end with Ctrl-C")
+            except Refusal as refusal:
+                if not self._was_in_the_mission:
+                    raise
+                self._say_once(f"{refusal}; trying again, end with Ctrl-C")
+            else:
+                if offer.ending is Ending.ORDERED:
+                    return
+                self._say_once(f"{offer.ending}: all that ran here has ended; trying to reach the mission again")
+                pause_s = PAUSE_FIRST_S
+            if self._is_ordered_to_end:
+                return
+            await machine.sleep_s(pause_s)
+            pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)
+
+    async def _live(self) -> Offer:
+        """Be one offer from the hub's first answer to its end."""
+        if self._secret_file is not None:
+            self._offered = replace(self._offered, secret=read_secret_file(self._secret_file))
+        offered = self._offered
+        await _dial(offered)
+        name = offer_name(offered.host)
+        source = f"{Subsystem.BACKBONE}/{name}"
+        try:
+            clock = await clock_elsewhere(offered.mission, offered.endpoint, source, offered.secret)
+            config = client_config(offered.endpoint, offered.secret)
+            bus = await ZenohBus.open_when_up(offered.mission, source, clock, config)
+        except HubUnreachable as error:
+            raise HubUnreachable(
+                f"a hub listens at {offered.endpoint} and does not let this machine in: the secret is missing or not "
+                "the mission's (--secret-file), or the hub is just starting"
+            ) from error
+        launch = _launch(offered, name, clock)
+        creator = KeptCreator(launch, offered)
+        offer = self._current = Offer(launch, bus, clock, creator, self._is_in_the_mission)
+        try:
+            await offer.run()
+        finally:
+            await creator.close()
+            self._current = None
+        return offer
+
+    def _is_in_the_mission(self) -> None:
+        self._was_in_the_mission = True
+        self._say_once(f"{self._offered.host} is in mission {self._offered.mission}")
+
+    def _say_once(self, line: str) -> None:
+        if line != self._said:
+            self._said = line
+            self._say(line)
+
+
+async def _dial(offered: Offered) -> None:
+    """Return when something listens at the endpoint; unlike opening a bus this can be interrupted.
 
     Raises:
-        HubUnreachable: Nobody listens at the endpoint.
-        StartFailed: The creator did not become ready; the end of its log is in the detail.
-        NameTaken: The mission has a creator of this host.
+        HubUnreachable: Nothing does.
     """
-    source = f"ui_console/offer-{os.getpid()}"
-    clock = await clock_elsewhere(mission, endpoint, source)
-    bus = await ZenohBus.open_when_up(mission, source, clock, client_config(endpoint))
-    directory = run_files.run_directory(f"{mission}-{legal(host)}")
-    zygote = await Zygote.spawn_fresh(run_directory=str(directory))
-    keeper = ProcessKeeper(zygote, clock)
-    ended: asyncio.Future[ProcessFell | None] = asyncio.get_running_loop().create_future()
-
-    def end(fell: ProcessFell | None = None) -> None:
-        if not ended.done() and (fell is None or fell.restart_in_s < 0):
-            ended.set_result(fell)
-
-    keeper.on_fell = end
-    for number in (signal.SIGTERM, signal.SIGINT):
-        asyncio.get_running_loop().add_signal_handler(number, end)
+    protocol, _, where = offered.endpoint.partition("/")
+    host, _, port = where.partition("?")[0].partition("#")[0].rpartition(":")
+    if protocol != "tcp" or not port.isdecimal():
+        return
     try:
-        keeper.use(bus)
-        answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
-        types = [counted.component_type for counted in answered.types]
-        launch = Launch(
-            mission=mission,
-            subsystem=Subsystem.BACKBONE,
-            name=creator_name(host),
-            type=TYPE,
-            class_path=_creator_class(types),
-            host=host,
-            endpoint=endpoint,
-            clock_origin_monotonic_s=clock.origin_monotonic_s,
-            clock_rate=clock.rate,
-            parameters={"tags": list(tags), "preload": arc_modules(types)},
-            requester=source,
-            run_directory=str(directory),
-        )
-        await keeper.start(launch, RestartPolicy(), READY_WITHIN_S)
-        return await ended
-    finally:
-        await keeper.close()
-        await bus.close()
-        await zygote.close()
+        async with asyncio.timeout(DIAL_TIME_S):
+            _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
+    except OSError as error:  # a timeout is one, too
+        raise HubUnreachable(f"no hub listens at {offered.endpoint}: {_reason(error)}") from error
+    writer.close()
 
 
-def _creator_class(types: Iterable[ComponentType]) -> str:
-    """Return the class of creators in this mission.
+def _reason(error: OSError) -> str:
+    if isinstance(error, socket.gaierror):
+        return "no such host"
+    return os.strerror(error.errno) if error.errno else "no answer"
 
-    Raises:
-        UnknownType: The mission has no type ``creator``.
-    """
-    found = [component_type.class_path for component_type in types if component_type.name == TYPE]
-    if not found:
-        raise UnknownType(f"the mission has no component type {TYPE!r}")
-    return found[0]
+
+def _launch(offered: Offered, name: str, clock: MissionClock) -> Launch:
+    return Launch(
+        mission=offered.mission,
+        subsystem=Subsystem.BACKBONE,
+        name=name,
+        type=OFFER_TYPE,
+        class_path="",
+        host=legal(offered.host),
+        endpoint=offered.endpoint,
+        clock_origin_monotonic_s=clock.origin_monotonic_s,
+        clock_rate=clock.rate,
+    )

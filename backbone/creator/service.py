@@ -17,10 +17,12 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
+from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
     CreatorQuestion,
     EndProcess,
+    FixedTypes,
     HostLoad,
     ListProcesses,
     NotThePlacer,
@@ -28,13 +30,16 @@ from backbone.creator.messages import (
     ProcessFell,
     Spawn,
     Spawned,
+    UnlistedType,
 )
 from backbone.creator.process_keeper import Forks, ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.keys import Conversation
+from backbone.naming import MAX_NAME_LENGTH, legal
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.wire import Envelope, Message, UnknownMessage
 
+LONGEST_CLASS_PATH = 200  # chosen: as much of a refused class path as a person reads
 LOAD_EACH_S = 1.0  # HostLoad: "once a second", of the machine
 
 
@@ -44,10 +49,12 @@ class CreatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     Attributes:
         tags: What this host has, for the placer's choice.
         preload: Modules its zygote imports at its start, so that components need not.
+        types: The mission's component types. It runs these, core services excepted, and no others.
     """
 
     tags: list[str] = []
     preload: list[str] = []
+    types: list[ComponentType] = []
 
 
 class Creator(Component[CreatorParameters]):
@@ -71,6 +78,8 @@ class Creator(Component[CreatorParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock, zygote: Forks | None = None) -> None:
         super().__init__(launch, bus, clock)
+        self._fixed = (self.parameters.types, self.parameters.preload)
+        self._allowed = {(t.name, t.class_path, t.subsystem) for t in self.parameters.types if not t.core}
         self._given = zygote or self._forked.pop(launch.address, None)
         self._load = (0.0, 0.0)
         self._spawned = self._ended = self._fell = 0
@@ -122,7 +131,13 @@ class Creator(Component[CreatorParameters]):
         return self._keeper.absences()
 
     def parameters_changed(self) -> None:
-        """Tell the placer of new tags at once."""
+        """Tell the placer of new tags at once.
+
+        Raises:
+            FixedTypes: Other types or modules than those of the launch; nothing is changed.
+        """
+        if (self.parameters.types, self.parameters.preload) != self._fixed:
+            raise FixedTypes(f"{self.name} keeps the types and modules it was launched with")
         self._publish_load()
 
     def statistics(self) -> dict[str, float]:
@@ -134,7 +149,24 @@ class Creator(Component[CreatorParameters]):
             "fell": float(self._fell),
         }
 
+    def _refuse_unlisted(self, order: Spawn) -> None:
+        """Return if the order is for a type of the mission, under names that lead to no other folder.
+
+        Raises:
+            UnlistedType: It is not.
+            IllegalName: The component's name or its process's is illegal.
+        """
+        if (order.type, order.class_path, order.subsystem) not in self._allowed:
+            raise UnlistedType(
+                f"{order.name[:MAX_NAME_LENGTH]}: {order.subsystem} {order.type[:MAX_NAME_LENGTH]} is not run as "
+                f"{order.class_path[:LONGEST_CLASS_PATH]} here"
+            )
+        legal(order.name)
+        if order.process:
+            legal(order.process)
+
     async def _spawn(self, order: Spawn) -> Spawned:
+        self._refuse_unlisted(order)
         launch = msgspec.structs.replace(
             self.launch,
             subsystem=order.subsystem,

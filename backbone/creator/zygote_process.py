@@ -39,6 +39,7 @@ from backbone.component.process import EXIT_BUG, run_process
 from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
 from backbone.ranges import ExitCode, Pid, Signal, Text
+from backbone.run_files import ENDED
 from backbone.wire import Message
 
 log = logging.getLogger(__name__)
@@ -358,7 +359,7 @@ class _ZygoteProcess:
         if not self._settings.run_directory:
             return None
         directory = Path(self._settings.run_directory)
-        hidden = directory.with_name(f".{directory.name}.ended-{self._own_pid}")
+        hidden = directory.with_name(f".{directory.name}{ENDED}{self._own_pid}")
         try:
             directory.rename(hidden)
         except FileNotFoundError:

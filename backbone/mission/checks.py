@@ -12,11 +12,12 @@ from collections.abc import Iterator
 
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.creator.messages import creator_name
+from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
 from backbone.mission.class_paths import class_path_fault
 from backbone.mission.core_checks import check_service_parameters
 from backbone.mission.document import Element
+from backbone.mission.model import is_loopback
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, told, told_names
 from backbone.mission.tables import (
@@ -53,7 +54,7 @@ def check(root: Element, report: Report) -> None:
         _check_resources(tables, report)
         check_behaviors(tables, report)
     _check_component_names(tables, report)
-    check_processes(tables, {*CORE_SERVICES, LAUNCHER, *(creator_name(host) for host in tables.hosts)}, report)
+    check_processes(tables, _reserved(tables), report)
 
 
 # ---------------------------------------------------------------------- hosts and core services
@@ -69,6 +70,25 @@ def _check_hosts(tables: Tables, report: Report) -> None:
             report.fault(
                 host.place_of("name"), "the name is too long for a creator's", f"{name} must fit {MAX_NAME_LENGTH}"
             )
+    _check_door(hosts, report)
+
+
+def _check_door(hosts: list[Element], report: Report) -> None:
+    """Report a first host that other machines cannot reach, and ports of hosts that run no hub."""
+    for host in hosts[1:]:
+        if host.text("port"):
+            report.fault(
+                host.place_of("port"),
+                f"host {host.text('name')} has a port, but runs no hub",
+                f"Remove it; the hub runs on the first host, {hosts[0].text('name')}",
+            )
+    others = [host.text("name") for host in hosts[1:] if host.text("address") and not is_loopback(host.text("address"))]
+    if others and is_loopback(hosts[0].text("address")):
+        report.fault(
+            hosts[0].place_of("address"),
+            f"no other machine reaches {told(hosts[0].text('address'))}, and {told_names(others)} must",
+            f"Write the address at which they reach {hosts[0].text('name')}",
+        )
 
 
 def _is_ip(address: str) -> bool:
@@ -132,7 +152,7 @@ def _main_host(tables: Tables) -> str:
 def _check_types(tables: Tables, report: Report) -> None:
     types = section(tables.root, "types")
     check_unique(types, "name", "type", report)
-    only_here = all(_is_loopback(host.text("address")) for host in tables.hosts.values())
+    only_here = all(is_loopback(host.text("address")) for host in tables.hosts.values())
     for component_type in types:
         _check_core_type(component_type, report)
         _check_needs(component_type, tables, report)
@@ -140,10 +160,6 @@ def _check_types(tables: Tables, report: Report) -> None:
         class_path = component_type.text("class")
         if only_here and re.fullmatch(r"\w+(\.\w+)*:\w+", class_path):
             _check_class(component_type, class_path, report)
-
-
-def _is_loopback(address: str) -> bool:
-    return address == "localhost" or (_is_ip(address) and ipaddress.ip_address(address).is_loopback)
 
 
 def _check_core_type(component_type: Element, report: Report) -> None:
@@ -344,7 +360,7 @@ def _check_network_id(resource: Element, ids: dict[int, Element], report: Report
 # ---------------------------------------------------------------------- names
 def _check_component_names(tables: Tables, report: Report) -> None:
     """Report names that two components would have: RCs, world, behaviors, their ARCs, core services."""
-    reserved = {LAUNCHER, *CORE_SERVICES, *(creator_name(host) for host in tables.hosts)}
+    reserved = _reserved(tables)
     first: dict[str, tuple[str, Place]] = {}
     for name, what, place in sorted(_components(tables), key=lambda component: component[2]):
         if not is_legal(name):
@@ -362,6 +378,12 @@ def _check_component_names(tables: Tables, report: Report) -> None:
                 else f"the {what} has the name {told(name)} of the {before} in line {there.line}"
             )
             report.fault(place, told_twice, "Give each component of the mission its own name")
+
+
+def _reserved(tables: Tables) -> set[str]:
+    """Return the names of the backbone's own components."""
+    names = {LAUNCHER, *CORE_SERVICES}
+    return names | {name(host) for host in tables.hosts for name in (creator_name, offer_name)}
 
 
 def _components(tables: Tables) -> Iterator[tuple[str, str, Place]]:

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import ipaddress
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+
+HUB_PORT = 7447  # Zenoh's own
+
+
+def is_loopback(address: str) -> bool:
+    """Say whether this IP address or name means the machine itself."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
 
 
 class _Part(BaseModel):
@@ -21,11 +32,18 @@ class Host(_Part):
         name: Name used elsewhere in the file.
         address: IP address or name the hub is reached at; ``127.0.0.1`` for this machine.
         tags: What it has (``gl``, ``serial``), for placement.
+        port: TCP port of the hub for other machines; of the first host only.
     """
 
     name: str
     address: str
     tags: tuple[str, ...] = ()
+    port: int = HUB_PORT
+
+    @property
+    def is_loopback(self) -> bool:
+        """True if the address means the machine 'up' is typed on, whatever machine that is."""
+        return is_loopback(self.address)
 
 
 class CoreService(_Part):
@@ -128,6 +146,11 @@ class MissionDescription(_Part):
     components: tuple[Component, ...]
     behaviors: tuple[Behavior, ...]
     source: str
+
+    @property
+    def other_hosts(self) -> tuple[Host, ...]:
+        """Machines besides the one that runs the nameserver; each offers itself by a command typed there."""
+        return tuple(host for host in self.hosts[1:] if not host.is_loopback)
 
     def core_parameters(self, service: str) -> dict[str, Any]:
         """Return what the file sets of a core service's parameters, of the first of this type."""

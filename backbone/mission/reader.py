@@ -10,7 +10,7 @@ from backbone.component_database.messages import ComponentType, Multiplicity
 from backbone.dependency_database.messages import Resource
 from backbone.mission.checks import check
 from backbone.mission.document import Element, parse, read_bytes
-from backbone.mission.model import ArcWish, Behavior, Component, CoreService, Host, MissionDescription
+from backbone.mission.model import HUB_PORT, ArcWish, Behavior, Component, CoreService, Host, MissionDescription
 from backbone.mission.report import Fault, MissionInvalid, Report
 from backbone.mission.room_files import room_text
 from backbone.mission.schema import apply_schema, schema_text, vocabulary
@@ -63,7 +63,12 @@ def _describe(root: Element, source: str) -> MissionDescription:
         name=root.text("name"),
         priority=int(root.text("priority")),
         hosts=tuple(
-            Host(name=host.text("name"), address=host.text("address"), tags=tuple(host.words("tags")))
+            Host(
+                name=host.text("name"),
+                address=host.text("address"),
+                tags=tuple(host.words("tags")),
+                port=int(host.text("port") or HUB_PORT),
+            )
             for host in section(root, "hosts")
         ),
         core=tuple(_core(root, list(tables.hosts))),

@@ -15,11 +15,14 @@ import os
 from pathlib import Path
 from typing import Any, assert_never
 
+import msgspec
+
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
-from backbone.component.component import Component, NoParameters
+from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import AskState, ComponentState
+from backbone.door import NoSecret, dictionary_of
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (
@@ -44,16 +47,43 @@ HUB_BEGAN = "hub-began"
 INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; its token is then all we know
 
 
-class Nameserver(Component[NoParameters]):
+class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of the nameserver.
+
+    Attributes:
+        listen: Endpoints at which the hub listens for other machines, besides the launch's own.
+    """
+
+    listen: list[str] = []
+
+
+class FixedDoor(Refusal):
+    """The hub listens where it listened at its start."""
+
+    code = "nameserver.fixed_door"
+    remedy = "Change address or port of the first host in the mission file, and bring the mission up again."
+
+
+class Nameserver(Component[NameserverParameters]):
     """Registers components by name and announces who appears and disappears."""
 
+    parameters_type = NameserverParameters
     accepts = NameserverQuestion
     registers = False
 
     @classmethod
     def open_bus(cls, launch: Launch, clock: Clock) -> Bus:
-        """Return the bus of the hub itself, which listens at the launch's endpoint."""
-        return ZenohBus.open(launch.mission, launch.address, clock, hub_config([launch.endpoint]))
+        """Return the bus of the hub itself, which listens at the launch's endpoint and for other machines.
+
+        Raises:
+            NoSecret: It would listen for other machines without asking them for a secret.
+        """
+        listen = [str(endpoint) for endpoint in launch.parameters.get("listen", [])]
+        dictionary_file = dictionary_of(launch.run_directory)
+        if listen and not dictionary_file:
+            raise NoSecret(f"the hub would listen at {', '.join(listen)} for everybody")
+        config = hub_config([launch.endpoint, *listen], dictionary_file=dictionary_file)
+        return ZenohBus.open(launch.mission, launch.address, clock, config)
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -69,6 +99,14 @@ class Nameserver(Component[NoParameters]):
         self.bus.watch_alive("*/*/*", self._claim_changed)
         self.bus.watch_alive("*/*", self._token_changed)
         self.bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._status_heard)
+
+    def parameters_changed(self) -> None:
+        """Refuse: an open hub does not change its endpoints.
+
+        Raises:
+            FixedDoor: Always.
+        """
+        raise FixedDoor(f"{self.name} listens at {self.launch.endpoint} and {self.launch.parameters.get('listen', [])}")
 
     async def serve(self) -> None:
         """Ask those who stand behind new tokens who they are."""

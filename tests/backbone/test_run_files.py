@@ -109,6 +109,20 @@ def test_a_mission_name_cannot_lead_out_of_the_folder() -> None:
         run_files.run_directory("../elsewhere")
 
 
+def test_folders_that_killed_zygotes_hid_are_removed_at_the_next_beginning() -> None:
+    directory = run_files.prepare("iros2001")
+    child = subprocess.Popen(["true"])
+    child.wait()
+    left, ending, others = (
+        directory.with_name(name)
+        for name in (f".iros2001.ended-{child.pid}", f".iros2001.ended-{os.getpid()}", f".m.ended-{child.pid}")
+    )
+    for hidden in (left, ending, others):
+        (hidden / "log").mkdir(parents=True)
+    run_files.prepare("iros2001")
+    assert [left.exists(), ending.exists(), others.exists()] == [False, True, True]
+
+
 def test_a_folder_that_takes_nothing_is_refused_before_anything_starts_and_is_away(runtime_directory: Path) -> None:
     with disk_full_at(1000), pytest.raises(RunFolderUnusable, match="iros2001: File too large"):
         run_files.prepare("iros2001")

@@ -19,6 +19,7 @@ import uvloop
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
+from backbone.component_database.messages import ComponentType
 from backbone.creator import process_table
 from backbone.creator.messages import (
     EndProcess,
@@ -38,6 +39,8 @@ from backbone.naming import Subsystem
 from backbone.placer.messages import ADDRESS as PLACER
 
 CREATOR = "backbone/creator-lab"
+KINDS = ("Quiet", "Parent", "Stubborn", "Late", "Broken", "Stumbling", "Leaver", "Missing")
+TYPES = [ComponentType(kind.lower(), f"sample_components:{kind}", Subsystem.RESOURCE_POOL) for kind in KINDS]
 CORE_POLICY = RestartPolicy(back_off_s=0.02, limit=20, window_s=60.0)
 POLICY = RestartPolicy(back_off_s=0.05, limit=2, window_s=60.0)
 
@@ -121,7 +124,11 @@ async def creator_host(directory: Path) -> AsyncIterator[CreatorHost]:
         run_directory=str(directory),
     )
     creator = msgspec.structs.replace(
-        hub, name="creator-lab", type="creator", class_path="backbone.creator.service:Creator"
+        hub,
+        name="creator-lab",
+        type="creator",
+        class_path="backbone.creator.service:Creator",
+        parameters={"types": [msgspec.to_builtins(one) for one in TYPES]},
     )
     zygote = await Zygote.spawn_fresh(run_directory=str(directory))
     keeper = ProcessKeeper(zygote)

@@ -23,6 +23,7 @@ import psutil
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.door import secret_of
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 READY_WITHIN_S = 60.0
@@ -106,7 +107,8 @@ class RunningMission:
     @contextlib.asynccontextmanager
     async def bus(self, source: str = "ui_console/tester") -> AsyncIterator[ZenohBus]:
         """Open a bus to the mission."""
-        opened = await ZenohBus.open_when_up(self.name, source, self.clock, client_config(self.endpoint))
+        config = client_config(self.endpoint, secret_of(str(self.directory)))
+        opened = await ZenohBus.open_when_up(self.name, source, self.clock, config)
         try:
             yield opened
         finally:

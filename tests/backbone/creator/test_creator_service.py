@@ -17,10 +17,12 @@ from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import ComponentState, SetParameter
 from backbone.component.messages import Parameters as ParametersAnswer
+from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
     EndedBy,
     EndProcess,
+    FixedTypes,
     HostLoad,
     ListProcesses,
     NotHere,
@@ -32,15 +34,19 @@ from backbone.creator.messages import (
     Spawn,
     Spawned,
     StartFailed,
+    UnlistedType,
 )
 from backbone.creator.service import Creator
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Resolve, Resolved
-from backbone.naming import Subsystem
+from backbone.naming import IllegalName, Subsystem
 from backbone.placer.messages import ADDRESS as PLACER
 
 CREATOR = "backbone/creator-lab"
+KINDS = ("Quiet", "Stubborn", "Late", "Leaver", "Failing", "Broken", "Forker")
+TYPES = [ComponentType(kind.lower(), f"in_process_zygote:{kind}", Subsystem.RESOURCE_POOL) for kind in KINDS]
+TYPES += [ComponentType("rc_manager", "backbone.rc_manager.service:RcManager", Subsystem.BACKBONE, core=True)]
 
 
 @dataclass
@@ -66,7 +72,8 @@ class Host:
 def order(kind: str, name: str, **more: Any) -> Spawn:
     policy = RestartPolicy(back_off_s=0.1, limit=1)
     given = {"policy": policy, "ready_within_s": 5.0, "requester": "ui_console/operator", **more}
-    return Spawn(Subsystem.RESOURCE_POOL, name, kind.lower(), f"in_process_zygote:{kind}", **given)
+    usual = Spawn(Subsystem.RESOURCE_POOL, name, kind.lower(), f"in_process_zygote:{kind}")
+    return msgspec.structs.replace(usual, **given)
 
 
 @pytest.fixture
@@ -85,7 +92,7 @@ def on_host(local_mission: Callable, beside: Callable) -> Callable[[Callable[[Ho
                 "",
                 0.0,
                 1.0,
-                {"tags": ["radio"]},
+                {"tags": ["radio"], "preload": [], "types": [msgspec.to_builtins(one) for one in TYPES]},
             )
             it = Host(InProcessZygote(network), network.join(PLACER, clock), network.join("ui_console/x", clock))
             it.stranger.subscribe(CREATOR, Conversation.TELEMETRY, HostLoad, lambda heard: it.loads.append(heard.body))
@@ -219,3 +226,57 @@ def test_new_tags_are_told_at_once(on_host: Callable) -> None:
 def test_orders_survive_the_wire() -> None:
     asked = order("Quiet", "scout1", parameters={"speed": 1.5, "names": ["a"]})
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(asked), type=Spawn) == asked
+
+
+UNLISTED = {
+    "a class of no type": order("Quiet", "scout1", class_path="os:system"),
+    "the class of another type": order("Quiet", "scout1", class_path="in_process_zygote:Late"),
+    "a type that the mission lacks": order("Quiet", "scout1", type="stranger"),
+    "another subsystem": order("Quiet", "scout1", subsystem=Subsystem.BACKBONE),
+    "a core service": Spawn(
+        Subsystem.BACKBONE,
+        "rc_manager-2",
+        "rc_manager",
+        "backbone.rc_manager.service:RcManager",
+        {"mission": "m", "trace": "/etc/cron.d/scout"},
+    ),
+}
+
+
+@pytest.mark.parametrize("asked", UNLISTED.values(), ids=UNLISTED)
+def test_a_creator_runs_no_class_but_those_of_the_missions_types(on_host: Callable, asked: Spawn) -> None:
+    async def body(host: Host) -> None:
+        with pytest.raises(UnlistedType):
+            await host.spawn(asked)
+        assert (await host.processes()).processes == []
+
+    on_host(body)
+
+
+@pytest.mark.parametrize("name", ["../../../etc/scout1", "scout1/../..", "", "Scout1", "s" * 200, "a\nb"])
+@pytest.mark.parametrize("field", ["name", "process"])
+def test_a_creator_runs_nothing_under_an_illegal_name(on_host: Callable, field: str, name: str) -> None:
+    async def body(host: Host) -> None:
+        asked = msgspec.structs.replace(order("Quiet", "scout1"), **{field: name})
+        if field == "process" and not name:  # a process of its own
+            return
+        with pytest.raises(IllegalName):
+            await host.spawn(asked)
+        assert (await host.processes()).processes == []
+
+    on_host(body)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        ("types", [msgspec.to_builtins(ComponentType("quiet", "os:system", Subsystem.RESOURCE_POOL))]),
+        ("preload", ["antigravity"]),
+    ],
+)
+def test_nobody_changes_what_a_creator_may_run(on_host: Callable, parameter: str, value: Any) -> None:
+    async def body(host: Host) -> None:
+        with pytest.raises(FixedTypes):
+            await host.placer.ask(CREATOR, SetParameter(parameter, value), ParametersAnswer, within_s=1.0)
+
+    on_host(body)

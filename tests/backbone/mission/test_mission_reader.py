@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
-from backbone.mission.model import MissionDescription
+from backbone.mission.model import HUB_PORT, MissionDescription
 from backbone.mission.reader import Fault, MissionInvalid, read_mission
 from backbone.naming import MAX_NAME_LENGTH
 from scout_model.description import WorldDescription
@@ -268,15 +268,19 @@ def test_a_creator_on_another_host_is_fine(tmp_path: Path) -> None:
     description = read_text(
         tmp_path,
         changed(
+            ('address="127.0.0.1"', 'address="192.0.2.1" port="7448"'),
             ("  </hosts>", '    <host name="attic" address="robot-attic.example.org"/>\n  </hosts>'),
             ("<core>", '<core><service type="creator" host="attic"/>'),
         ),
     )
     assert [service.host for service in description.core if service.type == "creator"] == ["base", "attic"]
+    assert (description.hosts[0].port, description.hosts[1].port) == (7448, HUB_PORT)
+    assert [host.name for host in description.other_hosts] == ["attic"]
 
 
 def test_classes_on_other_machines_are_not_looked_for_here(tmp_path: Path) -> None:
     text = changed(
+        ('address="127.0.0.1"', 'address="192.0.2.1"'),
         ("  </hosts>", '    <host name="attic" address="192.0.2.7"/>\n  </hosts>'),
         ("<core>", '<core><service type="creator" host="attic"/>'),
         ('name="watch" class="backbone.component.component:Component"', 'name="watch" class="only_there.watch:Watch"'),

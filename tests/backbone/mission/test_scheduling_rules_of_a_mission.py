@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from backbone.bring_up import UpOptions, core_launches
 from backbone.component.launch import Launch
+from backbone.core_launches import UpOptions, core_launches
 from backbone.dry_run import dry_run
 from backbone.mission.core_checks import descriptions
 from backbone.mission.model import MissionDescription

@@ -1,0 +1,120 @@
+"""The door of a mission: the endpoints its hub listens at, and the secret that clients prove.
+
+On one machine the hub listens on a unix socket in the mission's run folder, which only the mission's user can
+enter; no port is open. A mission with other machines listens on a TCP port too, and then asks every client for the
+secret in the run folder. The secret stands in that file alone: no message, argument or log holds it
+(docs/decisions/0016-the-door-of-a-mission.md).
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from pathlib import Path
+
+from backbone.errors import Refusal
+
+SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
+LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
+USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
+SECRET_BYTES = 32  # chosen: nobody guesses 256 bits
+LONGEST_SECRET_FILE = 4096  # chosen: a file longer than this holds something else
+
+
+class SocketPathTooLong(Refusal):
+    """The system allows no unix socket with a path that long."""
+
+    code = "run.socket_path"
+    remedy = "Give the mission a shorter name, or set XDG_RUNTIME_DIR to a folder with a shorter path."
+
+
+class NoSecret(Refusal):
+    """The secret of a mission with several machines is missing or unreadable."""
+
+    code = "run.secret"
+    remedy = "Name a file that holds the mission's secret with --secret-file; 'scout-backbone up' prints its place."
+
+
+def socket_endpoint(directory: Path) -> str:
+    """Return where a hub listens whose files lie in that folder.
+
+    Raises:
+        SocketPathTooLong: No socket can have that path.
+    """
+    path = directory.absolute() / SOCKET_NAME
+    length = len(os.fsencode(path))
+    if length > LONGEST_SOCKET_PATH:
+        raise SocketPathTooLong(f"{path} has {length} bytes, and {LONGEST_SOCKET_PATH} are possible", length=length)
+    return f"unixsock-stream/{path}"
+
+
+def tcp_endpoint(address: str, port: int) -> str:
+    """Return where a hub listens for other machines.
+
+    Example:
+        >>> tcp_endpoint("192.0.2.7", 7447), tcp_endpoint("2001:db8::7", 7447)
+        ('tcp/192.0.2.7:7447', 'tcp/[2001:db8::7]:7447')
+    """
+    return f"tcp/[{address}]:{port}" if ":" in address else f"tcp/{address}:{port}"
+
+
+def new_secret() -> str:
+    """Return a secret that nobody has seen."""
+    return secrets.token_hex(SECRET_BYTES)
+
+
+def keep_secret(directory: Path, secret: str) -> Path:
+    """Put the secret into the folder, readable by this user alone, and return its file.
+
+    The file is at the same time the dictionary of users by which the hub judges its clients.
+    """
+    path = directory / SECRET_NAME
+    path.unlink(missing_ok=True)
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
+        file.write(f"{USER}:{secret}\n")
+    return path
+
+
+def dictionary_of(directory: str) -> str:
+    """Return the file by which a hub of this folder judges its clients; empty: everybody who can enter may speak."""
+    path = Path(directory) / SECRET_NAME
+    return str(path) if directory and path.exists() else ""
+
+
+def secret_of(directory: str) -> str:
+    """Return the secret kept in that folder, empty if the mission has none."""
+    try:
+        return read_secret((Path(directory) / SECRET_NAME).read_text("ascii")) if directory else ""
+    except FileNotFoundError:
+        return ""
+
+
+def read_secret(text: str) -> str:
+    """Return the secret in the text of a secret file, or one that was typed.
+
+    Example:
+        >>> read_secret("scout:c0ffee")
+        'c0ffee'
+
+    Raises:
+        NoSecret: There is none.
+    """
+    secret = text.strip().removeprefix(f"{USER}:")
+    if not secret or not secret.isascii() or not secret.isprintable() or set(" :") & set(secret):
+        raise NoSecret("no secret is in it: it must be one word")
+    return secret
+
+
+def read_secret_file(path: Path) -> str:
+    """Return the secret in this file.
+
+    Raises:
+        NoSecret: There is none, or the file cannot be read.
+    """
+    try:
+        with path.open(encoding="ascii") as file:
+            return read_secret(file.read(LONGEST_SECRET_FILE))
+    except (OSError, UnicodeDecodeError) as error:
+        raise NoSecret(f"{path}: {error}") from error
+    except NoSecret as none:
+        raise NoSecret(f"{path}: {none.detail}") from None

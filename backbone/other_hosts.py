@@ -1,0 +1,91 @@
+"""The machines of a mission besides its first: which of them have their creator in the mission, and which lack it.
+
+Pure: liveliness tokens go in, absences come out. Nothing is started from here: a person, or the machine's own
+service manager, types the command on the machine that is missing.
+"""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+
+from backbone.component.messages import Absence
+from backbone.creator.messages import creator_name, offer_name
+from backbone.door import SECRET_NAME, tcp_endpoint
+from backbone.mission.model import Host, MissionDescription
+from backbone.naming import Subsystem, address
+
+
+def door_for_others(description: MissionDescription) -> str:
+    """Return the endpoint at which the mission's other machines reach its hub; empty if it has none."""
+    first = description.hosts[0]
+    return tcp_endpoint(first.address, first.port) if description.other_hosts else ""
+
+
+def command_on(host: Host, description: MissionDescription) -> str:
+    """Return what is typed on that machine to offer it to the mission; ``secret`` is a copy of the mission's."""
+    words = ["scout-backbone", "creator", "--host", host.name, "--connect", door_for_others(description)]
+    words += ["--mission", description.name, *(word for tag in host.tags for word in ("--tag", tag))]
+    return shlex.join([*words, "--secret-file", SECRET_NAME])
+
+
+@dataclass
+class _Absent:
+    since_s: float
+    cause: str
+
+
+class OtherHosts:
+    """Which other machines of a mission are there.
+
+    Args:
+        description: The mission.
+        now_s: Mission time from which on they are missed.
+    """
+
+    def __init__(self, description: MissionDescription, now_s: float) -> None:
+        self._commands = {host.name: command_on(host, description) for host in description.other_hosts}
+        self._creators = {address(Subsystem.BACKBONE, creator_name(host)): host for host in self._commands}
+        self._offers = {address(Subsystem.BACKBONE, offer_name(host)) for host in self._commands}
+        self._absent = {host: _Absent(now_s, "it was not offered to the mission yet") for host in self._commands}
+        self._offering: set[str] = set()
+
+    @property
+    def names(self) -> list[str]:
+        """Their names, in the order of the mission file."""
+        return list(self._commands)
+
+    @property
+    def missing(self) -> list[str]:
+        """Those without a creator in the mission now."""
+        return [host for host in self._commands if host in self._absent]
+
+    @property
+    def offering(self) -> list[str]:
+        """Addresses of the commands that keep these machines' creators, as far as they are there."""
+        return sorted(self._offering)
+
+    def command(self, host: str) -> str:
+        """Return what is typed on that machine."""
+        return self._commands[host]
+
+    def token_changed(self, changed: str, stands: bool, now_s: float) -> bool:
+        """Take note of a component's liveliness token; say whether a machine came or went by it."""
+        if changed in self._offers:
+            (self._offering.add if stands else self._offering.discard)(changed)
+        host = self._creators.get(changed)
+        if host is None or stands is (host not in self._absent):
+            return False
+        if stands:
+            del self._absent[host]
+        else:
+            self._absent[host] = _Absent(now_s, "its creator is gone: it ended, or the link to that machine is cut")
+        return True
+
+    def absences(self) -> list[Absence]:
+        """Return the machines that are missing, with the remedy for each."""
+        return [
+            Absence(host, absent.since_s, absent.cause, "waits for its creator", f"type there: {command}")
+            for host, command in self._commands.items()
+            if (absent := self._absent.get(host)) is not None
+        ]

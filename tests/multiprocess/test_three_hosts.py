@@ -1,0 +1,198 @@
+"""A mission on three machines: brought up by what ``up`` prints, cut, healed, bereft of a host, taken down."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from namespaces import hosts_on_a_switch
+from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hosts
+
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.messages import AskState, ComponentState
+from backbone.door import secret_of, socket_endpoint
+from backbone.mission_picture import LAUNCHER
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
+
+HEALED_WITHIN_S = 5.0
+FENCE_S = 7.0  # 2 s until a cut shows, 3 s until the offer ends what it runs, 1.5 s to end it, and a moment
+GONE_WITHIN_S = 5.0
+
+
+def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_leaves_nothing(tmp_path: Path) -> None:
+    with mission_on_three_hosts(tmp_path) as mission:
+        there = mission.components()
+        assert (there["scout1"]["host"], there["scout2"]["host"]) == ("near", "far")
+        assert any("✓ host near" in line for line in mission.up.lines), mission.story()
+        for host in mission.hosts.values():
+            secret = (mission.hosts["near"].folder / "secret").read_text().partition(":")[2].strip()
+            for process in host.processes():
+                assert secret not in " ".join(process.cmdline())
+            for log in host.runtime_folder.glob("scout-backbone/*/log/*.log"):
+                assert secret not in log.read_text()
+        assert secret not in str(mission.components())
+        assert secret not in "\n".join(mission.up.lines)
+
+
+def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwhile(tmp_path: Path) -> None:
+    with machines(tmp_path) as mission:
+        mission.type_what_up_prints("near")
+        mission.wait("near is there", lambda: any("✓ host near" in line for line in mission.up.lines), 30.0)
+        state = asyncio.run(state_of_the_launcher(mission))
+        [far] = [absent for absent in state.absent if absent.name == "far"]
+        assert (far.doing, far.vital) == ("waits for its creator", False)
+        assert "scout-backbone creator --host far --connect tcp/" in far.remedy
+        assert "near" not in {absent.name for absent in state.absent}
+        launcher = mission.components()["launcher"]
+        assert launcher["feedback"] == "waits for host far", mission.story()
+        assert mission.up.process.poll() is None
+        assert mission.type_on_base("scout-backbone", "down", "--mission", NAME).returncode == 0
+        assert mission.up.process.wait(20) == 6
+        assert mission.offers["near"].process.wait(10) == 0, mission.story()
+        mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
+
+
+def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(tmp_path: Path) -> None:
+    with mission_on_three_hosts(tmp_path) as mission:
+        before = {name: c["pid"] for name, c in mission.components().items() if c["host"] == "far"}
+        hub = mission.components()["nameserver"]["pid"]
+        os.kill(hub, signal.SIGKILL)
+        took_s = mission.wait("all is there again", mission.is_whole, 10.0)
+        print(f"hub killed: whole after {took_s:.1f} s")
+        there = mission.components()
+        assert there["nameserver"]["pid"] != hub
+        assert {name: there[name]["pid"] for name in before if name in there} == before, mission.story()
+
+
+def test_ctrl_c_ends_an_offer_at_any_time(tmp_path: Path) -> None:
+    with machines(tmp_path) as mission:
+        mission.type_what_up_prints("near")
+        base = mission.hosts["base"]
+        mission.type_what_up_prints("far")
+        for pause_s in (0.0, 0.3, 0.6, 1.0, 2.0):
+            time.sleep(pause_s)
+            offer = mission.offers["far"].process
+            offer.send_signal(signal.SIGINT)
+            try:
+                assert offer.wait(8) in (0, 130, -signal.SIGINT), mission.story()  # the last one: Python still began
+            except subprocess.TimeoutExpired:
+                pytest.fail(f"Ctrl-C after {pause_s} s\n{mission.story()}")
+            mission.wait("nothing runs on far", lambda: not mission.hosts["far"].processes(), GONE_WITHIN_S)
+            mission.type_what_up_prints("far")
+        assert base.processes()
+
+
+def test_a_host_without_the_secret_stays_outside_and_says_so(tmp_path: Path) -> None:
+    with machines(tmp_path) as mission:
+        mission.type_what_up_prints("near")
+        (mission.hosts["far"].folder / "wrong").write_text("scout:c0ffee\n")
+        for more in ([], ["--secret-file", "wrong"]):
+            connect = f"tcp/{mission.hosts['base'].address}:7447"
+            words = ["scout-backbone", "creator", "--host", "far", "--connect", connect, "--mission", NAME, *more]
+            offer = mission.go_on_with("far", words)
+            mission.wait("it says why", lambda o=offer: any("does not let" in line for line in o.lines), 20.0)
+            assert "creator-far" not in mission.components()
+            offer.process.send_signal(signal.SIGTERM)
+            assert offer.process.wait(8) == 0
+
+
+def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_by_its_secret(tmp_path: Path) -> None:
+    with mission_on_three_hosts(tmp_path) as mission:
+        mission.hosts["base"].die()
+        near, far = mission.hosts["near"], mission.hosts["far"]
+        offers = {offer.process.pid for offer in mission.offers.values()}
+
+        def is_gone() -> bool:
+            return {p.pid for host in (near, far) for p in host.processes()} <= offers
+
+        mission.wait("all that the mission started is gone", is_gone, GONE_WITHIN_S)
+        assert all(offer.process.poll() is None for offer in mission.offers.values())
+        mission.type_up()
+        mission.wait("up waits for the hosts", mission.asks_for_the_secret, 30.0)
+        for host in ("near", "far"):  # the offers go on: a copy of the new run's secret is all they need
+            mission.copy_the_secret_to(host)
+        mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 60.0)
+
+
+def test_two_copies_on_two_machines_are_seen(tmp_path: Path) -> None:
+    """The watch over copies, which finds none elsewhere, finds those that are there."""
+    with hosts_on_a_switch(tmp_path, "near", "far") as hosts:
+        copy = tmp_path / "watcher"
+        shutil.copy(shutil.which("sleep") or "", copy)
+        with Copies(hosts) as copies:
+            sleeping = [host.start([str(copy), "1"], dict(os.environ)) for host in hosts.values()]
+            for process in sleeping:
+                process.wait()
+        assert set(copies.longest_s) == {"watcher"}
+        assert 0.5 < copies.longest_s["watcher"] < 2.0
+
+
+async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
+    """Ask the launcher through the unix socket, which no namespace hides from this machine's root."""
+    folder = mission.hosts["base"].runtime_folder / "scout-backbone" / NAME
+    config = client_config(socket_endpoint(folder), secret_of(str(folder)))
+    bus = await ZenohBus.open_when_up(NAME, "ui_console/tester", MissionClock.started_now(), config)
+    try:
+        return await bus.ask(LAUNCHER, AskState(), ComponentState, within_s=5.0)
+    finally:
+        await bus.close()
+
+
+@pytest.mark.parametrize(
+    "cut_s",
+    [
+        0.5,
+        2.5,
+        4.0,
+        5.0,
+        pytest.param(30.0, marks=pytest.mark.slow),
+        pytest.param(60.0, marks=pytest.mark.slow),
+    ],
+)
+def test_a_link_cut_heals(tmp_path: Path, cut_s: float) -> None:
+    with mission_on_three_hosts(tmp_path) as mission, Copies(mission.hosts) as copies:
+        far = mission.hosts["far"]
+        far.cut()
+        time.sleep(cut_s)
+        if cut_s > FENCE_S:
+            offer = mission.offers["far"].process.pid
+            assert {p.pid for p in far.processes()} == {offer}, "what ran on the machine that was cut off still runs"
+        far.heal()
+        took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
+        print(f"cut of {cut_s} s: whole {took_s:.1f} s after healing, copies {dict(copies.longest_s)}")
+        assert took_s < HEALED_WITHIN_S, mission.story()
+        time.sleep(2.0)
+        assert all(longest_s < FENCE_S for longest_s in copies.longest_s.values()), copies.longest_s
+        assert mission.is_whole(), mission.story()
+
+
+@pytest.mark.parametrize("away_s", [1.0, pytest.param(20.0, marks=pytest.mark.slow)])
+def test_a_host_that_dies_and_is_back_gets_its_components_again(tmp_path: Path, away_s: float) -> None:
+    with mission_on_three_hosts(tmp_path) as mission, Copies(mission.hosts) as copies:
+        mission.hosts["far"].die()
+        time.sleep(away_s)
+        mission.type_what_up_prints("far")
+        took_s = mission.wait("the mission is whole again", mission.is_whole, 60.0)
+        print(f"dead for {away_s} s: whole {took_s:.1f} s after it is back, copies {dict(copies.longest_s)}")
+        assert took_s < HEALED_WITHIN_S, mission.story()
+        assert mission.components()["scout2"]["host"] == "far"
+
+
+def test_a_detached_up_waits_too_and_returns_when_all_is_ready(tmp_path: Path) -> None:
+    with machines(tmp_path, "--detach") as mission:
+        for host in ("near", "far"):
+            assert mission.up.process.poll() is None
+            mission.type_what_up_prints(host)
+        assert mission.up.process.wait(60) == 0, mission.story()
+        mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 5.0)
+        assert mission.type_on_base("scout-backbone", "down", "--mission", NAME).returncode == 0, mission.story()
+        assert [offer.process.wait(10) for offer in mission.offers.values()] == [0, 0]
+        mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
