@@ -40,6 +40,7 @@ from backbone.creator.messages import (
     Processes,
     ProcessFell,
     RestartPolicy,
+    StartFailed,
 )
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
@@ -301,16 +302,18 @@ class Launcher(Component[NoParameters]):
     async def _keep_placed(
         self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
     ) -> str:
-        """Keep it placed; begin again for a moment while the placer may not have met the other machines' creators."""
-        until_s = time.monotonic() + (MEET_TIME_S if self._others.names else 0.0)
+        """Keep it placed; begin anew while another machine is missing, or may not have met the placer yet."""
+        until_s = time.monotonic() + MEET_TIME_S
         while True:
             try:
                 return await keep_placed(
                     self.bus, self.clock, wish, order, at, on_placed=now_placed, on_changed=self.changed
                 )
-            except NoHost:
-                if time.monotonic() >= until_s:
+            except (NoHost, StartFailed):
+                if not self._others.names or (not self._others.missing and time.monotonic() >= until_s):
                     raise
+            if self._others.missing:
+                until_s = time.monotonic() + MEET_TIME_S
             await self.clock.sleep_s(MEET_EACH_S * self.clock.rate)
 
     # ------------------------------------------------------------------ stop
