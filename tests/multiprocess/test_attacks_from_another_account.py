@@ -73,8 +73,8 @@ async def stop_scout3(bus: Bus) -> StopState:
 
 
 def lives(status: dict[str, Any]) -> dict[str, tuple[int, int]]:
-    """Return process and restarts of everything but ARCs and visitors."""
-    lasting = [c for c in status["components"] if c["subsystem"] != "ui_console" and c["requester"] != "mission"]
+    """Return process and restarts of everything but visitors and ARCs, which come a moment after all is ready."""
+    lasting = [c for c in status["components"] if c["subsystem"] != "ui_console" and c["type"] != "capture"]
     return {c["name"]: (c["pid"], c["restarts"]) for c in lasting}
 
 
