@@ -27,6 +27,9 @@ from backbone.wire import Message
 
 TYPE = "creator"
 READY_WITHIN_S = 10.0  # chosen: silence, not time: a starting process that imports, renders or waits for others beats
+CUT_OFF_ENDS_WITHIN_S = (
+    7.0  # chosen: a link counts as cut after 2 s, a cut-off host ends all after 3 s, which takes 2 s
+)
 START_MOST_S = 180.0  # chosen: a start that shows signs of life for so long and is not ready never will be
 
 

@@ -14,8 +14,9 @@ Rules:
 * A host whose creator died has lost its components (creators take them along). Those that are pinned wait until
   that creator is back.
 * An order to stop is remembered, so that owners that compare wish and fact do not start the component again.
-* A host that was only cut off comes back with components that were placed elsewhere or stopped
-  meanwhile. These are ended there: no name runs twice for long.
+* A host that fell silent may only be cut off, and runs on for a while. What it ran is *fenced*: it is started
+  elsewhere only when that host has ended it by itself, or is back and tells what it runs.
+* A host that was cut off comes back with components that were stopped meanwhile. These are ended there.
 
 A start whose creator dies before it answered stays in the book: it goes to another host, or waits
 for that creator to come back, and its asker is answered then.
@@ -150,6 +151,7 @@ class PlacementBook:
         self._numbers: dict[str, int] = {}
         self._left_behind: set[tuple[str, str]] = set()
         self._stopped: dict[str, str] = {}
+        self._fences: dict[str, tuple[str, float]] = {}
 
     # ------------------------------------------------------------------ looking
     def record(self, name: str) -> Record:
@@ -193,6 +195,14 @@ class PlacementBook:
         record = self.record(name)
         revived = [replace(view, alive=True) for view in self.hosts()]
         return not revived or any(not obstacle(view, record.spawn.tags, record.pin) for view in revived)
+
+    def fenced_until_s(self, name: str, now_s: float) -> float | None:
+        """Return until when a host that fell silent may still run this name; None: no host does."""
+        host, until_s = self._fences.get(name, ("", 0.0))
+        if host and until_s > now_s and not self.is_alive(host):
+            return until_s
+        self._fences.pop(name, None)
+        return None
 
     def stopped(self) -> dict[str, str]:
         """Return the names that were ordered to stop and not started since, with the reason."""
@@ -329,8 +339,12 @@ class PlacementBook:
             if record.phase is Phase.WAITING and not record.unwanted
         ]
 
-    def creator_down(self, host: str, now_s: float) -> list[Instruction]:
-        """Take note that a host's creator died, and with it all it ran."""
+    def creator_down(self, host: str, now_s: float, fence_s: float = 0.0) -> list[Instruction]:
+        """Take note that a host's creator died, and with it all it ran.
+
+        Args:
+            fence_s: Mission seconds for which the host may still run it, if nobody saw it die.
+        """
         if not self.is_alive(host):
             return []
         known = self._hosts[host]
@@ -341,6 +355,8 @@ class PlacementBook:
                 continue
             name = record.spawn.name
             self._left_behind.add((host, name))
+            if fence_s > 0:
+                self._fences[name] = (host, now_s + fence_s)
             if record.phase is Phase.STARTING:
                 continue  # whoever waits for it finds out and decides
             if record.phase is Phase.RUNNING and record.spawn.policy.restart and not record.unwanted:

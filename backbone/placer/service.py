@@ -25,6 +25,7 @@ from backbone.component.messages import Absence, ComponentState, LifeState
 from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
 from backbone.creator.messages import (
+    CUT_OFF_ENDS_WITHIN_S,
     START_MOST_S,
     EndedBy,
     EndProcess,
@@ -213,6 +214,7 @@ class Placer(Component[NoParameters]):
             Refusal: It does not run; the record is left STARTING, or RUNNING and suspect if its fate is unknown.
         """
         name = record.spawn.name
+        await self._unfenced(record)
         for tries_left in reversed(range(SPAWN_TRIES)):
             await self._choose(record)
             if record.phase is not Phase.STARTING:  # a host that was only cut off brought it back
@@ -237,6 +239,16 @@ class Placer(Component[NoParameters]):
             self.story.note(name, f"is ready on {record.host}, pid {pid}")
             break
         return _started(record)
+
+    async def _unfenced(self, record: Record) -> None:
+        """Return when no host that fell silent can run the component any more, or it came back with its host."""
+        name = record.spawn.name
+        while record.phase is Phase.STARTING and not record.unwanted:
+            until_s = self._book.fenced_until_s(name, self.clock.now_s())
+            if until_s is None:
+                return
+            record.doing = "waits until the host that fell silent has ended it"
+            await self._news_or(until_s)
 
     async def _choose(self, record: Record) -> None:
         """Give the component a host unless it came back; wait a while if only a creator's return can give it one.
@@ -392,7 +404,7 @@ class Placer(Component[NoParameters]):
                 self._tell_news()
             case Disappeared(address=gone) if gone.startswith(_creator("")):
                 host = gone.removeprefix(_creator(""))
-                self._do(lambda: self._carry_out(self._book.creator_down(host, self.clock.now_s())))
+                self._do(lambda: self._lost_sight_of(host))
             case Disappeared(address=gone):
                 self._do(lambda: self._carry_out(self._book.component_disappeared(gone)))
 
@@ -476,7 +488,12 @@ class Placer(Component[NoParameters]):
         there = {creator.host for creator in found.components}
         for host in self._book.hosts():
             if host.name not in there:
-                self._carry_out(self._book.creator_down(host.name, self.clock.now_s()))
+                self._lost_sight_of(host.name)
+
+    def _lost_sight_of(self, host: str) -> None:
+        """Take note that a creator's token fell without a word: on this host it died, another may be cut off."""
+        fence_s = 0.0 if host == self.launch.host else CUT_OFF_ENDS_WITHIN_S * self.clock.rate
+        self._carry_out(self._book.creator_down(host, self.clock.now_s(), fence_s))
 
     def _begin_meeting(self, creator: ComponentState) -> None:
         if self._newest.get(creator.host) != creator.pid or creator.host not in self._meeting:

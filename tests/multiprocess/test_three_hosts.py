@@ -17,13 +17,14 @@ from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hos
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, ComponentState
+from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
 from backbone.door import secret_of, socket_endpoint
 from backbone.mission_picture import LAUNCHER
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 
 HEALED_WITHIN_S = 5.0
-FENCE_S = 7.0  # 2 s until a cut shows, 3 s until the offer ends what it runs, 1.5 s to end it, and a moment
+SEEN_TWICE_S = 0.5  # the watch looks at one machine after the other: what moved between two looks is seen twice
 GONE_WITHIN_S = 5.0
 
 
@@ -162,7 +163,7 @@ def test_a_link_cut_heals(tmp_path: Path, cut_s: float) -> None:
         far = mission.hosts["far"]
         far.cut()
         time.sleep(cut_s)
-        if cut_s > FENCE_S:
+        if cut_s > CUT_OFF_ENDS_WITHIN_S:
             offer = mission.offers["far"].process.pid
             assert {p.pid for p in far.processes()} == {offer}, "what ran on the machine that was cut off still runs"
         far.heal()
@@ -170,7 +171,7 @@ def test_a_link_cut_heals(tmp_path: Path, cut_s: float) -> None:
         print(f"cut of {cut_s} s: whole {took_s:.1f} s after healing, copies {dict(copies.longest_s)}")
         assert took_s < HEALED_WITHIN_S, mission.story()
         time.sleep(2.0)
-        assert all(longest_s < FENCE_S for longest_s in copies.longest_s.values()), copies.longest_s
+        assert all(longest_s < SEEN_TWICE_S for longest_s in copies.longest_s.values()), copies.longest_s
         assert mission.is_whole(), mission.story()
 
 

@@ -19,6 +19,7 @@ from backbone.component.messages import Absence, AskState, AskStatistics, AskSto
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded, UnknownType
 from backbone.component_database.service import ComponentDatabase
 from backbone.creator.messages import (
+    CUT_OFF_ENDS_WITHIN_S,
     CreatorQuestion,
     EndedBy,
     EndProcess,
@@ -428,6 +429,33 @@ async def lose_host_a(one: Mission, end: Callable[[str], Awaitable[None]]) -> No
     await one.clock.sleep_s(3.0)
     assert await one.placements() == {"w": "b", "scout1": "a"}
     assert one.creators["a"].spawns == ["scout1"]
+
+
+@on("a", "b")
+async def test_what_a_silent_host_may_still_run_is_started_elsewhere_only_when_it_cannot(one: Mission) -> None:
+    """A host that is cut off runs on for some seconds; a second copy beside it is never started."""
+    await one.start("watcher", "w1", host="")
+    await one.start("watcher", "w2", host="")
+    assert await one.placements() == {"w1": "a", "w2": "b"}
+    one.cut_off("b")
+    await one.clock.sleep_s(CUT_OFF_ENDS_WITHIN_S - 1.0)
+    assert one.creators["a"].spawns == ["w1"]
+    assert (await one.absent())[0].doing == "waits until the host that fell silent has ended it"
+    await one.creators["b"].kill_child("w2")
+    await one.clock.sleep_s(2.0)
+    assert one.creators["a"].spawns == ["w1", "w2"]
+
+
+@on("a", "b")
+async def test_a_host_that_is_back_before_that_keeps_what_it_runs(one: Mission) -> None:
+    await one.start("watcher", "w1", host="")
+    await one.start("watcher", "w2", host="")
+    one.cut_off("b")
+    await one.clock.sleep_s(4.0)
+    one.reconnect("b")
+    await one.clock.sleep_s(10.0)
+    assert await one.placements() == {"w1": "a", "w2": "b"}
+    assert one.creators["a"].spawns + one.creators["b"].spawns == ["w1", "w2"]
 
 
 @on("a")
