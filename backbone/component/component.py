@@ -14,6 +14,7 @@ import logging
 import os
 import types
 from collections.abc import Coroutine
+from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
@@ -46,7 +47,7 @@ from backbone.door import secret_of
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import Register, Registered
+from backbone.nameserver.messages import NameTaken, Register, Registered
 from backbone.naming import claim_address
 from backbone.wire import Envelope, Message, UnknownMessage
 
@@ -55,6 +56,7 @@ log = logging.getLogger(__name__)
 MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
 REGISTER_WITHIN_S = 10.0  # chosen: a hub that is being restarted on a busy machine is back long before
 CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for its spectators; people see no difference
+REGISTER_AGAIN_S = 0.1  # chosen: the nameserver forgets a name without a claim after a second
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
 
@@ -287,17 +289,29 @@ class Component(Generic[P]):
         """Make the name this process's own; its claim stands from here on, so a death before readiness is seen too."""
         if not self.registers:
             return
-        state = self.component_state()
-        await ask_until_answered(
-            self.bus,
-            self.clock,
-            NAMESERVER,
-            Register(state),
-            Registered,
-            each_s=REGISTER_EACH_S,
-            within_s=REGISTER_WITHIN_S,
-        )
+        state, until_s = self.component_state(), self.clock.now_s() + REGISTER_WITHIN_S * self.clock.rate
+        while True:
+            try:
+                await ask_until_answered(
+                    self.bus,
+                    self.clock,
+                    NAMESERVER,
+                    Register(state),
+                    Registered,
+                    each_s=REGISTER_EACH_S,
+                    within_s=REGISTER_WITHIN_S,
+                )
+                break
+            except NameTaken as taken:
+                if not self._is_of_the_dead(taken) or self.clock.now_s() >= until_s:
+                    raise
+            await self.clock.sleep_s(REGISTER_AGAIN_S * self.clock.rate)
         self.bus.declare_alive(claim_address(state.address, state.host, state.pid))
+
+    def _is_of_the_dead(self, taken: NameTaken) -> bool:
+        """Say whether the name is that of a process of this host that was killed before its claim stood."""
+        pid = taken.facts.get("pid", 0)
+        return taken.facts.get("host") == self.launch.host and bool(pid) and not Path(f"/proc/{pid}").exists()
 
     async def _live_and_say_so(self) -> None:
         try:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,8 @@ from backbone.nameserver.messages import (
     Disappeared,
     ListComponents,
     NameTaken,
+    Register,
+    Registered,
     Resolve,
     Resolved,
     UnknownName,
@@ -119,6 +123,27 @@ def test_a_second_of_the_same_name_ends_with_the_refusal_and_is_never_heard_of(l
             assert heard == []
             resolved = await bus.ask(ADDRESS, Resolve("scout1"), Resolved, within_s=1)
             assert (resolved.component.host, resolved.component.state) == ("a", LifeState.READY)
+
+    run_virtual(main())
+
+
+def test_a_name_whose_process_was_killed_before_its_claim_stood_is_waited_for(local_mission: Any) -> None:
+    """A creator that was killed while a mission came up ended the mission: its successor found its name taken."""
+
+    async def main() -> None:
+        async with local_mission() as network:
+            dead = subprocess.Popen([sys.executable, "-c", ""])
+            dead.wait()
+            former = network.join("resource_pool/scout1", VirtualClock())
+            state = ComponentState("resource_pool/scout1", "probe", "a", dead.pid, LifeState.CONNECTING, 0.0)
+            await former.ask(ADDRESS, Register(state), Registered, within_s=1.0)
+            await former.close()
+            successor = probe(network, host="a")
+            life = asyncio.create_task(successor.run())
+            await VirtualClock().sleep_s(3.0)
+            assert successor.state is LifeState.READY
+            successor.end("enough")
+            await life
 
     run_virtual(main())
 
