@@ -130,10 +130,11 @@ def test_a_second_of_the_same_name_ends_with_the_refusal_and_is_never_heard_of(l
 def test_a_name_whose_process_was_killed_before_its_claim_stood_is_waited_for(local_mission: Any) -> None:
     """A creator that was killed while a mission came up ended the mission: its successor found its name taken."""
 
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+
     async def main() -> None:
         async with local_mission() as network:
-            dead = subprocess.Popen([sys.executable, "-c", ""])
-            dead.wait()
             former = network.join("resource_pool/scout1", VirtualClock())
             state = ComponentState("resource_pool/scout1", "probe", "a", dead.pid, LifeState.CONNECTING, 0.0)
             await former.ask(ADDRESS, Register(state), Registered, within_s=1.0)
