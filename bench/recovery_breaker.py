@@ -22,6 +22,8 @@ from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from trace_judge import judge
 
+from backbone.creator.process_table import is_stopped
+
 WATCHERS = frozenset({"watch-scout1-capture", "watch-scout2-capture"})
 HARDWARE = ("radio", "scout1", "scout2", "scout3", "video1")
 ROWS: dict[str, tuple[str, ...]] = {
@@ -101,6 +103,8 @@ class Breaker:
     def attend(self, fault: Fault) -> None:
         """Let a stopped process go on when its time has come; see whether what is no component was replaced."""
         now_s = time.monotonic()
+        if fault.lifted_s == math.inf and fault.victim.endswith("zygote") and not is_stopped(fault.pid):
+            fault.lifted_s = now_s  # its parent continued it
         if fault.lifted_s == math.inf and now_s >= fault.at_s + STOPS_S[fault.name]:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(fault.pid, signal.SIGCONT)
