@@ -223,9 +223,13 @@ class Watching(Declared):
         super().__init__(owner, lambda: owner.network.watchers.remove(self))
         self.pattern, self.listener = pattern, listener
 
+    def concerns(self, address: str) -> bool:
+        """Say whether the listener asked about this address."""
+        return _matches(self.pattern, address)
+
     def tell(self, address: str, alive: bool) -> None:
         """Tell the listener in a step of its own, if it asked about this address."""
-        if _matches(self.pattern, address):
+        if self.concerns(address):
             asyncio.get_running_loop().call_soon(self._hand_over, address, alive)
 
     def _hand_over(self, address: str, alive: bool) -> None:

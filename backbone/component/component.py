@@ -116,6 +116,8 @@ class Component(Generic[P]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.launch, self.bus, self.clock = launch, bus, clock
+        self.pid = os.getpid()
+        """Its process. A simulation, where many components share one, sets another."""
         self.parameters: P = cast(P, _convert(launch.parameters, self.parameters_type))
         self.story = StoryBook(launch.address, clock)
         self.feedback = ""
@@ -256,7 +258,7 @@ class Component(Generic[P]):
             launch.address,
             launch.type,
             launch.host,
-            os.getpid(),
+            self.pid,
             self._state,
             self._since_s,
             self.feedback,

@@ -88,7 +88,7 @@ class SharedProcess:
 
     def __init__(self, launch: Launch, join: Callable[[str, Clock], Bus], clock: Clock, pid: int) -> None:
         self.address = process_address(launch.host, launch.process, pid)
-        self._launch, self._join, self._clock = launch, join, clock
+        self._launch, self._join, self._clock, self._pid = launch, join, clock, pid
         self._members: dict[int, _Member] = {}
         self._lives: dict[int, asyncio.Task[None]] = {}
         self._end = asyncio.Event()
@@ -123,6 +123,11 @@ class SharedProcess:
     def end(self, _reason: str = "") -> None:
         """Have all members leave in good order; ``run`` returns when that is done."""
         self._end.set()
+
+    def members(self) -> dict[str, Component[Any]]:
+        """Return the components that live here now, by name."""
+        living = [self._members[life] for life in self._lives]
+        return {member.launch.name: member.component for member in living if member.component is not None}
 
     # ------------------------------------------------------------------ questions
     async def _answer(self, asked: Envelope[Any]) -> Message:
@@ -178,6 +183,7 @@ class SharedProcess:
         except BaseException:
             await bus.close()
             raise
+        component.pid = self._pid
         member.component = component
         await component.run()
 

@@ -116,6 +116,7 @@ class ProcessKeeper:
         zygote: Forks the processes; the keeper takes over its ``on_exit``, and leaves its closing to the caller.
         clock: For back-off and deadlines, which are in seconds of the machine; None: the machine's own.
         read_vitals: Looks at a process, given the mission's folder and the pid; see ``heartbeat.read_vitals``.
+        pid: The keeper's own process, which is part of each incarnation it starts; 0: this one.
 
     Attributes:
         on_fell: Called when a process ended unexpectedly.
@@ -124,7 +125,9 @@ class ProcessKeeper:
         on_bug: Called with what must not happen.
     """
 
-    def __init__(self, zygote: Forks, clock: Clock | None = None, read_vitals: ReadVitals = read_vitals) -> None:
+    def __init__(
+        self, zygote: Forks, clock: Clock | None = None, read_vitals: ReadVitals = read_vitals, pid: int = 0
+    ) -> None:
         self.on_fell: Callable[[ProcessFell], None] = _ignore
         self.on_silent: Callable[[str, float], None] = _ignore_silence
         self.on_changed: Callable[[], None] = lambda: None
@@ -146,7 +149,7 @@ class ProcessKeeper:
         self._shared_alarm: asyncio.Task[None] | None = None
         self._talks: dict[int, set[asyncio.Task[None]]] = {}
         self._is_closing = False
-        self._lives = 0
+        self._lives, self._pid = 0, pid or os.getpid()
         zygote.on_exit = self._exited
 
     def use(self, bus: Bus) -> None:
@@ -465,7 +468,7 @@ class ProcessKeeper:
     def _begin_life(self, kept: _Kept, forked: asyncio.Future[int] | None) -> None:
         self._lives += 1
         launch = kept.launch
-        incarnation = f"{launch.host}.{os.getpid()}.{self._lives}"
+        incarnation = f"{launch.host}.{self._pid}.{self._lives}"
         launch = kept.launch = msgspec.structs.replace(launch, incarnation=incarnation)
         if launch.process:
             self._do_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))

@@ -15,6 +15,7 @@ import psutil
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
+from backbone.component.heartbeat import read_vitals
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.component_database.messages import ComponentType
@@ -32,7 +33,7 @@ from backbone.creator.messages import (
     Spawned,
     UnlistedType,
 )
-from backbone.creator.process_keeper import Forks, ProcessKeeper
+from backbone.creator.process_keeper import Forks, ProcessKeeper, ReadVitals
 from backbone.creator.zygote import Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
@@ -76,30 +77,38 @@ class Creator(Component[CreatorParameters]):
     _zygote: Forks
     _keeper: ProcessKeeper
 
-    def __init__(self, launch: Launch, bus: Bus, clock: Clock, zygote: Forks | None = None) -> None:
+    def __init__(
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        zygote: Forks | None = None,
+        read_vitals: ReadVitals = read_vitals,
+    ) -> None:
         super().__init__(launch, bus, clock)
         self._fixed = (self.parameters.types, self.parameters.preload)
         self._allowed = {(t.name, t.class_path, t.subsystem) for t in self.parameters.types if not t.core}
         self._given = zygote or self._forked.pop(launch.address, None)
-        self._load = (0.0, 0.0)
+        self._read_vitals = read_vitals
+        self._load = (0.0, 0.0, 1)
         self._spawned = self._ended = self._fell = 0
 
     async def connect(self) -> None:
         """Watch for readiness; get a zygote if this process could not fork one."""
         self._zygote = self._given or await Zygote.spawn_fresh(preload=self.parameters.preload)
         self._zygote.on_lost = lambda: self.tell(self.name, "lost its zygote and with it everything it ran")
-        self._keeper = ProcessKeeper(self._zygote, self.clock)
+        self._keeper = ProcessKeeper(self._zygote, self.clock, self._read_vitals, self.pid)
         self._keeper.on_fell = self._component_fell
         self._keeper.on_silent = self._component_silent
         self._keeper.on_changed = self._processes_changed
         self._keeper.on_bug = self.fail
         self._keeper.use(self.bus)
-        self._measure()
+        self._load = self.measure()
 
     async def serve(self) -> None:
         """Publish the host's load."""
         while True:
-            self._measure()
+            self._load = self.measure()
             self._publish_load()
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
@@ -205,12 +214,13 @@ class Creator(Component[CreatorParameters]):
         self._publish_load()
         self.changed()
 
-    def _measure(self) -> None:
-        self._load = (psutil.cpu_percent() / 100.0, psutil.virtual_memory().percent / 100.0)
+    def measure(self) -> tuple[float, float, int]:
+        """Return the busy share of all cores, the used share of memory, and the number of cores."""
+        return psutil.cpu_percent() / 100.0, psutil.virtual_memory().percent / 100.0, psutil.cpu_count() or 1
 
     def _publish_load(self) -> None:
-        cpu, memory = self._load
-        load = HostLoad(self.launch.host, self.parameters.tags, cpu, memory, psutil.cpu_count() or 1, self._count())
+        cpu, memory, cores = self._load
+        load = HostLoad(self.launch.host, self.parameters.tags, cpu, memory, cores, self._count())
         self.bus.publish(self.address, Conversation.TELEMETRY, load)
 
     def _count(self) -> int:

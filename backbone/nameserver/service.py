@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 from pathlib import Path
 from typing import Any, assert_never
 
@@ -95,7 +94,7 @@ class Nameserver(Component[NameserverParameters]):
     async def connect(self) -> None:
         """Register itself and watch every token from the first one on."""
         self._registry.registered(self.component_state(), self.clock.now_s())
-        self._registry.claim_changed(self.address, self.launch.host, os.getpid(), stands=True)
+        self._registry.claim_changed(self.address, self.launch.host, self.pid, stands=True)
         self.bus.watch_alive("*/*/*", self._claim_changed)
         self.bus.watch_alive("*/*", self._token_changed)
         self.bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._status_heard)
