@@ -14,7 +14,7 @@ Rules:
 * Every ordered start is answered by exactly one ``ReportReady`` or ``ReportStartFailed``, every ordered
   end by exactly one ``ReportEnded``, and only when nothing of the process is left.
 * The first start that fails by itself (an exit code above 0, silence) is not repeated: its owner decides. One that
-  a signal ended from outside is begun again like any other.
+  was ended from outside (a signal, a stop) is begun again, whatever the policy: its owner still waits for it.
 * A ready process that is silent for longer than its policy allows hangs: it is killed, then restarted. So there is
   never a second copy of a process that was only paused.
 """
@@ -304,7 +304,7 @@ class Supervision:
         """Decide what follows from the end of its process."""
         one.pid, one.last_end, one.last_code, one.deadline_s, one.silent_s = 0, how, returncode, NEVER_S, 0.0
         was_answered, is_ordered = one.start_answered, one.end is not None and one.end.ordered
-        came_from_outside = returncode <= 0 and one.end is None and one.policy.restart and not one.is_abandoned
+        came_from_outside = returncode <= 0 and one.end is None and not one.is_abandoned
         if not was_answered and came_from_outside:
             return [self._fall(one, how, now_s)]
         answers: list[Instruction] = [] if was_answered else [ReportStartFailed(one.name, how)]
@@ -327,7 +327,7 @@ class Supervision:
         one.end, one.failure = None, ""
         if one.absent_since_s < 0:
             one.absent_since_s = now_s
-        if not policy.restart:
+        if not policy.restart and one.start_answered:
             del self._all[one.name]
             return ReportFell(one.name, how, -1.0)
         failing = len(past) >= policy.limit

@@ -83,7 +83,8 @@ class RandomHistories(RuleBasedStateMachine):
                 case ReportFell(name=name, restart_in_s=restart_in_s, failing=failing):
                     policy = self.policies[name]
                     assert name not in self.live
-                    assert (restart_in_s >= 0) == policy.restart, "what is wanted is restarted however it ended"
+                    is_wanted = policy.restart or name in self.starts_open
+                    assert (restart_in_s >= 0) == is_wanted, "what is wanted is restarted however it ended"
                     assert restart_in_s <= (policy.failing_pause_s if failing else policy.back_off_most_s)
                     self.failing[name] = failing
                 case ReportSilent(name=name):
@@ -93,7 +94,7 @@ class RandomHistories(RuleBasedStateMachine):
 
     def count_restart(self, name: str) -> None:
         policy = self.policies[name]
-        assert policy.restart
+        assert policy.restart or name in self.starts_open
         times = self.restarts.setdefault(name, [])
         times.append(self.now_s)
         within = [at_s for at_s in times if at_s > self.now_s - policy.window_s]
@@ -396,3 +397,15 @@ def test_a_name_in_use_is_refused_with_its_pid() -> None:
 
 def test_signals_without_a_name_are_described_by_number() -> None:
     assert describe(-99) == "killed by signal 99"
+
+
+@pytest.mark.parametrize("returncode", [0, -9, -15])
+def test_a_start_that_is_ended_from_outside_is_begun_again_also_without_restart(returncode: int) -> None:
+    """Its owner still waits for the answer; a refusal would tell it that the component cannot run."""
+    supervision = Supervision()
+    supervision.start_ordered("arc", RestartPolicy(restart=False), 20.0, 1.0)
+    supervision.forked("arc", 7, 1.1)
+    (fell, _) = supervision.exited(7, returncode, 1.2)
+    assert isinstance(fell, ReportFell)
+    assert fell.restart_in_s >= 0
+    assert Fork("arc") in supervision.woken(1.2 + fell.restart_in_s)
