@@ -38,6 +38,7 @@ from backbone.creator.messages import (
     RestartPolicy,
     Spawn,
     Spawned,
+    StartFailed,
     creator_name,
 )
 from backbone.creator.messages import TYPE as CREATOR
@@ -224,6 +225,11 @@ class Placer(Component[NoParameters]):
             try:
                 spawned = await self.bus.ask(_creator(record.host), spawn, Spawned, within_s=SPAWN_WITHIN_S)
                 pid = spawned.pid
+            except StartFailed as refusal:
+                if self._book.is_alive(record.host) or not tries_left:
+                    raise
+                self.story.note(name, f"was ended with {record.host}: {refusal.detail}")
+                continue
             except LinkError as error:
                 self.story.note(name, f"was ordered on {record.host} without an answer: {error}")
                 fate, pid = await self._fate_of_spawn(record)

@@ -15,7 +15,16 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, AskState, AskStatistics, AskStory, ComponentState, Statistics, Story
+from backbone.component.messages import (
+    Absence,
+    AskState,
+    AskStatistics,
+    AskStory,
+    ComponentState,
+    LifeState,
+    Statistics,
+    Story,
+)
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded, UnknownType
 from backbone.component_database.service import ComponentDatabase
 from backbone.creator.messages import (
@@ -242,6 +251,21 @@ async def test_a_loaded_host_gets_fewer(one: Mission) -> None:
     one.creators["b"].tell_load(cpu=0.0)
     await one.clock.sleep_s(0.1)
     assert {(await one.start("watcher")).host for _ in range(4)} == {"b"}
+
+
+@on("a", "b")
+async def test_a_start_that_a_leaving_creator_gives_up_goes_to_another_host(one: Mission) -> None:
+    """A creator that ends politely ends what is starting there too; that says nothing against the component."""
+    leaving = one.creators["a"]
+    leaving.spawn_s, leaving.fails = 0.5, ["watcher-1"]
+    one.creators["b"].tell_load(cpu=0.9)
+    await one.clock.sleep_s(0.1)
+    starting = asyncio.create_task(one.start("watcher"))
+    await one.clock.sleep_s(0.2)
+    assert leaving.spawns == ["watcher-1"]
+    state = msgspec.structs.replace(leaving.component_state(), state=LifeState.DRAINING)
+    leaving.bus.publish(leaving.address, Conversation.STATUS, state)
+    assert (await starting).host == "b"
 
 
 @on("a", "b")
