@@ -26,7 +26,7 @@ from backbone.dependency_database.messages import AskResources, Resource, Resour
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import Appeared, Disappeared
+from backbone.nameserver.messages import Appeared, Disappeared, NameTaken
 from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
@@ -348,7 +348,7 @@ class RcManager(Component[RcManagerParameters]):
 
     # ------------------------------------------------------------------ RCs that do not run yet
     async def _have_running(self, rcs: Iterable[str]) -> None:
-        """Start those RCs through the placer that do not run; return when all answer.
+        """Start those RCs through the placer that do not run; return when all answer, or the placer works on them.
 
         Raises:
             Refusal: One of them cannot be started.
@@ -364,8 +364,10 @@ class RcManager(Component[RcManagerParameters]):
         order = Start(resource.type, resource.name, resource.rc_parameters(), resource.host, process=resource.process)
         try:
             await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+        except NameTaken:  # it was started before and is missing now: a request waits until it is back
+            self.story.note(resource.name, "is being started by the placer")
         except Refusal:
-            if not await self._meet_rc(resource.name):  # somebody else had it started at the same time
+            if not await self._meet_rc(resource.name):
                 raise
         finally:
             del self._starts[resource.name]

@@ -20,7 +20,10 @@ from backbone.component.launch import Launch
 from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.keys import Conversation
+from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import Start
 from backbone.rc_manager.messages import (
     ADDRESS,
     BEAT_EVERY_S,
@@ -490,5 +493,30 @@ def test_a_trace_that_cannot_be_written_is_told_and_grants_go_on(local_mission: 
             assert "1 of 1 ARCs run; the trace of the schedule stopped: " in manager.feedback
             told = [event.what for event in manager.story.of("rc_manager")]
             assert sum("the trace of the schedule stopped" in what for what in told) == 1
+
+    run_virtual(main())
+
+
+def test_a_request_for_an_rc_that_the_placer_brings_back_waits_for_it(pool: Any) -> None:
+    """Its host was lost, say: the placer has it in its book and starts it as soon as it can."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            placer = here.network.join(PLACER, here.clock)
+
+            async def answer(asked: Envelope[Any]) -> Message:
+                raise NameTaken(f"{asked.body.name} is waiting on no host yet")
+
+            placer.serve(PLACER, Start, answer)
+            here.rcs["left"].end("its host is lost")
+            await here.clock.sleep_s(0.5)
+            arc = await here.arc("arc")
+            assert (await arc.ask_for(request("arc", "left", "radio"))).rcs
+            await here.clock.sleep_s(5.0)
+            assert not arc.is_open
+            await here.rc(HARDWARE[0])
+            await here.clock.sleep_s(1.0)
+            assert arc.is_open
+            await placer.close()
 
     run_virtual(main())
