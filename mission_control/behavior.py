@@ -68,6 +68,7 @@ REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
 START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
 ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
+START_PATIENCE_S = 10.0  # chosen: a host that comes back, or a creator, is whole again within half of it
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
 
 
@@ -297,7 +298,10 @@ class Behavior(Component[B], Generic[B]):
 
     def absences(self) -> list[Absence]:
         """Return children and ARC that are wanted and missing, and children it goes on without."""
-        wishes = [*self._wishes.values(), *([self.arc.wish] if self.arc is not None else [])]
+        wishes = [
+            *self._wishes.values(),
+            *([self.arc.wish] if self.arc is not None and self._keeping is not None else []),
+        ]
         absent = [absence for wish in wishes if (absence := wish.absence()) is not None]
         return [*absent, *self._abandoned.values()]
 
@@ -363,7 +367,7 @@ class Behavior(Component[B], Generic[B]):
             may_say_not_now=type(self).not_now is not Behavior.not_now,
         )
         try:
-            await arc.keep(self.clock, need.kind, parameters, on_changed=self.changed)
+            await arc.keep(self.clock, need.kind, parameters, patience_s=START_PATIENCE_S, on_changed=self.changed)
         except Refusal as refusal:
             self.report(f"no ARC: {refusal}")
             self.finish(BehaviorStatus.FAILURE, _why(refusal))
@@ -409,6 +413,7 @@ class Behavior(Component[B], Generic[B]):
         if keeping is None or self.arc is None:
             return
         await _end_task(keeping)
+        self.changed()
         try:
             await self.arc.release(f"{self.name} is done")
         except LinkError as error:  # the ARC watches its owner's token and ends with it
@@ -445,7 +450,14 @@ class Behavior(Component[B], Generic[B]):
         order, at = self._nodes[name].order(self.path), address(Subsystem.MISSION_CONTROL, name)
         try:
             stopped = await keep_placed(
-                self.bus, self.clock, wish, order, at, on_placed=self._child_placed, on_changed=self.changed
+                self.bus,
+                self.clock,
+                wish,
+                order,
+                at,
+                on_placed=self._child_placed,
+                on_changed=self.changed,
+                patience_s=START_PATIENCE_S,
             )
         except Refusal as refusal:
             self.tell(name, f"could not be started: {refusal}")
@@ -524,7 +536,7 @@ class Behavior(Component[B], Generic[B]):
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
         decision = await self.child_finished(name, status, payload)
         self.story.note(name, f"{decision} after {status}")
-        if decision is Decision.NEXT and "code" in payload:  # it could not do its work; its work itself did not fail
+        if decision is not Decision.RETRY and "code" in payload:  # it could not do its work; its work did not fail
             remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
             cause = str(payload.get("detail", "it failed"))
             self._abandoned[name] = Absence(name, self.clock.now_s(), cause, remedy=remedy)

@@ -210,6 +210,7 @@ class ArcClient:
         parameters: dict[str, Any],
         *,
         rests: bool = False,
+        patience_s: float = 0.0,
         on_changed: Callable[[], None] = lambda: None,
     ) -> None:
         """Claim the ARC, and claim it again whenever it is gone, until cancelled.
@@ -222,26 +223,33 @@ class ArcClient:
             parameters: Made by ``claim_parameters``.
             rests: The ARC was started with these parameters before and rests: it is only told that time is wanted
                 again, unless it is gone.
+            patience_s: For so long the very first start is tried again after a refusal, seconds of the machine: a host
+                that is just coming back, or an ARC of an earlier life, may be the reason.
             on_changed: Called when ``wish.absence()`` may have changed.
 
         Raises:
             Refusal: The ARC could not be started or its request can never be served.
         """
         is_there = rests and await self._wake()
+        give_up_s = clock.now_s() + patience_s * clock.rate
         while True:
             if not is_there:
-                await self._start_anew(clock, kind, parameters, on_changed)
+                await self._start_anew(clock, kind, parameters, on_changed, give_up_s)
             is_there = False
             self.wish.placed()
             on_changed()
             companion = Companion(self._bus, self.address)
-            agreeing = asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree")
+            watching = [
+                asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree"),
+                asyncio.create_task(self._note_absence(companion, clock, on_changed), name=f"{self.arc}:absence"),
+            ]
             try:
                 await companion.wait_gone()
             finally:
                 companion.close()
-                agreeing.cancel()
-                await asyncio.gather(agreeing, return_exceptions=True)
+                for task in watching:
+                    task.cancel()
+                await asyncio.gather(*watching, return_exceptions=True)
             self.wish.missing("it ended while it was wanted", clock.now_s())
             on_changed()
             await self._lost()
@@ -380,7 +388,7 @@ class ArcClient:
         return True
 
     async def _start_anew(
-        self, clock: Clock, kind: str, parameters: dict[str, Any], on_changed: Callable[[], None]
+        self, clock: Clock, kind: str, parameters: dict[str, Any], on_changed: Callable[[], None], give_up_s: float
     ) -> None:
         """Start the ARC; one that an earlier life of the owner left behind is ended first."""
         while True:
@@ -388,11 +396,13 @@ class ArcClient:
                 return await self.start(kind, parameters)
             except NameTaken as refusal:
                 cause = f"one from before has its name: {refusal.detail}"
+                self.wish.missing(cause, clock.now_s())
+                on_changed()
                 await self._end_leftover()
             except (LinkError, CreatorSilent) as error:
                 cause = f"claimed without an answer: {error}"
             except Refusal as refusal:
-                if not self.wish.started:
+                if not self.wish.started and clock.now_s() >= give_up_s:
                     raise
                 cause = f"it was refused: {refusal.detail}"
             log.info("%s: %s", self.arc, cause)
@@ -408,6 +418,17 @@ class ArcClient:
                 await self._bus.ask(self.address, Stop("left from before"), Stopping, within_s=REPLY_TIME_S)
         except LinkError as error:
             log.info("%s: ended without an answer: %s", self.arc, error)
+
+    async def _note_absence(self, companion: Companion, clock: Clock, on_changed: Callable[[], None]) -> None:
+        """Miss the ARC from the moment at which it is out of sight, also while that may be this process's own link."""
+        await companion.wait_risen(1)
+        while True:
+            await companion.wait_hidden()
+            self.wish.missing("it cannot be reached", clock.now_s())
+            on_changed()
+            await companion.wait_there()
+            self.wish.placed()
+            on_changed()
 
     async def _agree_after_absence(self, companion: Companion) -> None:
         """Ask what the ARC holds whenever it is back in sight: notices may have been missed meanwhile."""

@@ -44,6 +44,11 @@ class Companion:
         while not self._token:
             await self._changed.wait()
 
+    async def wait_hidden(self) -> None:
+        """Return when its token does not stand, for whatever reason; at once if it does not."""
+        while self._token:
+            await self._changed.wait()
+
     async def wait_risen(self, times: int) -> None:
         """Return when its token was seen to rise this many times: the first is its being there at all."""
         while self._risen < times:

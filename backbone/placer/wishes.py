@@ -80,6 +80,7 @@ async def keep_placed(
     address: str,
     on_placed: Callable[[Placement, bool], None] = lambda _placement, _was_there: None,
     on_changed: Callable[[], None] = lambda: None,
+    patience_s: float = 0.0,
 ) -> str:
     """Have the component placed, and placed again whenever it is missing; return why it was ordered to stop.
 
@@ -90,18 +91,21 @@ async def keep_placed(
         address: Of the component.
         on_placed: Called whenever it was started, with True if it was running from before.
         on_changed: Called when ``wish.absence()`` may have changed.
+        patience_s: For so long the very first start is tried again after a refusal, seconds of the machine: a host
+            that is just coming back may be the reason.
 
     Raises:
         Refusal: The very first start was refused: that is for the owner to judge.
     """
+    give_up_s = clock.now_s() + patience_s * clock.rate
     component, placer = Companion(bus, address), Companion(bus, PLACER)
     try:
         while True:
-            placement, was_there = await _start(bus, clock, wish, order, on_changed)
+            placement, was_there = await _start(bus, clock, wish, order, on_changed, give_up_s)
             wish.placed()
             on_placed(placement, was_there)
             on_changed()
-            missing = await _wait_missing(bus, clock, wish.name, component, placer)
+            missing = await _wait_missing(bus, clock, wish, component, placer, on_changed)
             if missing.facts.get("stopped"):
                 return missing.detail
             wish.missing("it was missing, and the placer did not have it", clock.now_s())
@@ -112,7 +116,7 @@ async def keep_placed(
 
 
 async def _start(
-    bus: Bus, clock: Clock, wish: Wish, order: Start, on_changed: Callable[[], None]
+    bus: Bus, clock: Clock, wish: Wish, order: Start, on_changed: Callable[[], None], give_up_s: float
 ) -> tuple[Placement, bool]:
     """Return the placement, and whether the component was running from before."""
     while True:
@@ -126,7 +130,7 @@ async def _start(
         except (LinkError, CreatorSilent) as error:
             cause = str(error)
         except Refusal as refusal:
-            if not wish.started:
+            if not wish.started and clock.now_s() >= give_up_s:
                 raise
             cause = refusal.detail
         else:
@@ -138,23 +142,31 @@ async def _start(
         await clock.sleep_s(pause_s * clock.rate)
 
 
-async def _wait_missing(bus: Bus, clock: Clock, name: str, component: Companion, placer: Companion) -> NotPlaced:
-    """Return the placer's word that it does not have the component."""
+async def _wait_missing(
+    bus: Bus, clock: Clock, wish: Wish, component: Companion, placer: Companion, on_changed: Callable[[], None]
+) -> NotPlaced:
+    """Return the placer's word that it does not have the component; one that cannot be reached is missed meanwhile."""
     compared_with = placer.times_risen
     while True:
+        if component.is_there and wish.absence() is not None:
+            wish.placed()
+            on_changed()
         await _first_of(
             component.wait_gone(),
             placer.wait_risen(max(compared_with, 1) + 1),
             clock.sleep_s(COMPARE_EVERY_S * clock.rate),
         )
+        if not component.is_there:
+            wish.missing("it cannot be reached: it is being restarted, or its link is cut", clock.now_s())
+            on_changed()
         await placer.wait_there()
         compared_with = placer.times_risen
         try:
-            await bus.ask(PLACER, AskPlacement(name), Placement, within_s=REPLY_TIME_S)
+            await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S)
         except NotPlaced as refusal:
             return refusal
         except LinkError as error:
-            log.info("the placer does not answer about %s: %s", name, error)
+            log.info("the placer does not answer about %s: %s", wish.name, error)
             await clock.sleep_s(PAUSE_FIRST_S * clock.rate)
             continue
         if not component.is_there:  # its creator or the placer works on it: compare again, not at once

@@ -502,6 +502,7 @@ def test_an_aborting_parent_ends_the_other_children_and_fails_with_the_reason(pl
         placer.components["a"].finish(BehaviorStatus.FAILURE, {"code": "x"})
         await placer.wait(lambda: set(placer.components) == {"top"})
         assert (top.status, top.payload) == (BehaviorStatus.FAILURE, {"child": "a", "code": "x"})
+        assert [absence.name for absence in top.absences()] == ["a"], "a tree that gave up is not healthy"
 
     placer_world(scene)
 
@@ -514,6 +515,22 @@ def test_a_claim_that_can_never_be_served_fails_the_child_and_the_parent_hears_w
         await placer.wait(lambda: top.finished)
         [(child, status, payload)] = top.finished
         assert (child, status, payload["code"]) == ("leaf", BehaviorStatus.FAILURE, "placer.no_host")
+
+    placer_world(scene)
+
+
+def test_a_claim_that_is_refused_for_a_moment_is_made_again(placer_world: Run) -> None:
+    """Its host was just coming back, say; the first claim of a life is no last word."""
+
+    async def scene(placer: FakePlacer) -> None:
+        placer.refusals["capture"] = NoHost("its creator is gone")
+        top = await root(placer, node("top", arc=ARC))
+        await placer.clock.sleep_s(2.0)
+        assert [absence.name for absence in top.absences()] == ["top-capture"]
+        del placer.refusals["capture"]
+        await placer.clock.sleep_s(10.0)
+        assert top.status is BehaviorStatus.RUNNING
+        assert top.absences() == []
 
     placer_world(scene)
 

@@ -1,0 +1,86 @@
+"""What an owner reports of its ARC: missing from the moment at which it cannot be reached."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.local_bus import LocalNetwork
+from backbone.nameserver.messages import NameTaken
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import Ended, Start, Started, StopComponent
+from backbone.wire import Envelope, Message
+from resource_pool.arc_client import ArcClient, Resumed, Suspended, Suspending
+
+CLOCK = VirtualClock()
+ARC = "resource_pool/owner-drive"
+
+
+class Owner:
+    """Takes note of nothing."""
+
+    async def arc_resumed(self, notice: Resumed) -> None: ...
+
+    async def arc_suspending(self, notice: Suspending) -> None: ...
+
+    async def arc_suspended(self, notice: Suspended) -> None: ...
+
+
+class PlayedPlacer:
+    """Starts the ARC, which is a token, unless one from before has its name; that one takes long to end."""
+
+    def __init__(self, network: LocalNetwork, *, leftover: bool = False) -> None:
+        self.bus, self.arc, self.leftover = network.join(PLACER, CLOCK), network.join(ARC, CLOCK), leftover
+        self.bus.serve(PLACER, Start | StopComponent, self.answer)
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        if isinstance(asked.body, StopComponent):
+            await CLOCK.sleep_s(20.0)
+            self.leftover = False
+            return Ended(asked.body.name, "asking")  # type: ignore[arg-type]
+        if self.leftover:
+            raise NameTaken("it is starting")
+        self.token = self.arc.declare_alive(ARC)
+        return Started(ARC, "h1", 1, [])
+
+
+def test_an_arc_is_missed_while_it_cannot_be_reached() -> None:
+    async def main() -> None:
+        network = LocalNetwork()
+        placer, bus = PlayedPlacer(network), network.join("mission_control/owner", CLOCK)
+        arc = ArcClient(bus, "owner-drive", Owner())
+        keeping = asyncio.create_task(arc.keep(CLOCK, "drive", {}))
+        await CLOCK.sleep_s(1.0)
+        assert arc.wish.absence() is None
+        placer.token.close()
+        await CLOCK.sleep_s(0.1)
+        assert arc.wish.absence() is not None
+        placer.token = placer.arc.declare_alive(ARC)
+        await CLOCK.sleep_s(0.1)
+        assert arc.wish.absence() is None
+        await _end(keeping, bus, placer.bus, placer.arc)
+
+    run_virtual(main())
+
+
+def test_an_arc_whose_name_is_taken_is_missed_while_its_predecessor_is_being_ended() -> None:
+    async def main() -> None:
+        network = LocalNetwork()
+        placer, bus = PlayedPlacer(network, leftover=True), network.join("mission_control/owner", CLOCK)
+        arc = ArcClient(bus, "owner-drive", Owner())
+        keeping = asyncio.create_task(arc.keep(CLOCK, "drive", {}))
+        await CLOCK.sleep_s(1.0)
+        assert arc.wish.absence() is not None
+        await CLOCK.sleep_s(30.0)
+        assert arc.wish.absence() is None
+        await _end(keeping, bus, placer.bus, placer.arc)
+
+    run_virtual(main())
+
+
+async def _end(keeping: asyncio.Task[None], *buses: Any) -> None:
+    keeping.cancel()
+    await asyncio.gather(keeping, return_exceptions=True)
+    for bus in buses:
+        await bus.close()
