@@ -460,7 +460,7 @@ def simulate(
     seeds: Annotated[int, typer.Option("--seeds", min=1, max=MOST_SEEDS, help="How many missions.")] = 100,
     first: Annotated[int, typer.Option("--first", min=0, max=LARGEST_SEED, help="Seed of the first.")] = 0,
     chaos: Annotated[
-        bool, typer.Option("--chaos", help="Lose, delay and double messages, cut off and kill components.")
+        bool, typer.Option("--chaos", help="Lose and delay messages; pause, end and starve processes; cut links.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

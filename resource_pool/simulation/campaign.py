@@ -13,13 +13,18 @@ from dataclasses import dataclass
 
 import msgspec
 
-from resource_pool.simulation.faults import Fault
+from resource_pool.simulation.faults import Fault, Hang, Kill, MessageFault
 from resource_pool.simulation.laws import Broken, story_of
 from resource_pool.simulation.mission_run import MissionRun, run_mission
 from resource_pool.simulation.shrink import smallest
+from resource_pool.simulation.supervised_mission import run_supervised
+from resource_pool.simulation.supervision_faults import SupervisionFault
 
 BATCH = 10  # chosen: two seconds of work, so that progress is seen and the first broken law soon ends it all
 ALONE = 2 * BATCH  # chosen: fewer are done before other processes have started
+
+
+AnyFault = Fault | SupervisionFault
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +32,7 @@ class Count:
     """What was seen in some runs.
 
     Attributes:
-        runs: How many there were.
+        runs: How many seeds there were; each means a pool mission and a supervised one.
         happenings: Things that happened in them.
         grants: Grants in them.
         packets: Packets on the air.
@@ -57,6 +62,7 @@ class Finding:
 
     Attributes:
         seed: Of the mission.
+        supervised: Whether it is the supervised mission of this seed, or its pool mission.
         chaos: Whether anything went wrong on purpose.
         broken: The law, in the run with the fewest faults.
         faults: As few faults as still break it.
@@ -65,15 +71,17 @@ class Finding:
     """
 
     seed: int
+    supervised: bool
     chaos: bool
     broken: Broken
-    faults: tuple[Fault, ...]
+    faults: tuple[AnyFault, ...]
     faults_before: int
     story: tuple[str, ...]
 
     def lines(self) -> Iterator[str]:
         """Yield the report for people."""
-        yield f"seed {self.seed}{' --chaos' if self.chaos else ''} breaks the law {self.broken}"
+        mission = "supervised" if self.supervised else "pool"
+        yield f"seed {self.seed}{' --chaos' if self.chaos else ''}, {mission} mission, breaks the law {self.broken}"
         if self.chaos:
             yield f"{len(self.faults)} of {self.faults_before} faults are enough for it:"
             yield from (f"  {fault}" for fault in self.faults)
@@ -113,6 +121,7 @@ class Outcome:
             told["broken"] = {
                 "law": finding.broken.law,
                 "seed": finding.seed,
+                "supervised": finding.supervised,
                 "chaos": finding.chaos,
                 "at_s": finding.broken.at_s,
                 "what": finding.broken.what,
@@ -154,14 +163,15 @@ def simulate(
 
 def find(seed: int, *, chaos: bool) -> Finding | None:
     """Return which law the mission of this seed breaks, with as few faults as possible; None if it breaks none."""
-    run = _run_quietly(seed, chaos)
-    if run.broken is None:
+    runs = ((supervised, _run_quietly(seed, supervised, chaos)) for supervised in (False, True))
+    supervised, run = next(((supervised, run) for supervised, run in runs if run.broken is not None), (False, None))
+    if run is None or run.broken is None:
         return None
     law, least, faults_before = run.broken.law, run, len(run.faults)
 
-    def breaks(faults: Sequence[Fault]) -> bool:
+    def breaks(faults: Sequence[AnyFault]) -> bool:
         nonlocal least
-        tried = _run_quietly(seed, chaos, faults)
+        tried = _run_quietly(seed, supervised, chaos, faults)
         if tried.broken is None or tried.broken.law != law:
             return False
         least = tried
@@ -170,7 +180,7 @@ def find(seed: int, *, chaos: bool) -> Finding | None:
     smallest(run.faults, breaks)
     broken = least.broken or run.broken
     story = tuple(str(happening) for happening in story_of(broken, least.happenings))
-    return Finding(seed, chaos, broken, least.faults, faults_before, story)
+    return Finding(seed, supervised, chaos, broken, least.faults, faults_before, story)
 
 
 def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[Count, int | None]]:
@@ -200,23 +210,29 @@ def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[Count, int | None]:
     """Run missions until one breaks a law; return what was seen, and its seed."""
     counted = Count()
     for seed in batch:
-        run = _run_quietly(seed, chaos)
-        counted += _count(run)
-        if run.broken is not None:
-            return counted, seed
+        counted += Count(1)
+        for supervised in (False, True):
+            run = _run_quietly(seed, supervised, chaos)
+            counted += _count(run)
+            if run.broken is not None:
+                return counted, seed
     return counted, None
 
 
-def _run_quietly(seed: int, chaos: bool, faults: Sequence[Fault] | None = None) -> MissionRun:
+def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyFault] | None = None) -> MissionRun:
     """Run the mission without the log: components speak of every fault, and what matters is in the audit."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:
-        return run_mission(seed, chaos=chaos, faults=faults)
+        if supervised:
+            struck = None if faults is None else [each for each in faults if isinstance(each, SupervisionFault)]
+            return run_supervised(seed, chaos=chaos, faults=struck)
+        said = None if faults is None else [each for each in faults if isinstance(each, MessageFault | Kill | Hang)]
+        return run_mission(seed, chaos=chaos, faults=said)
     finally:
         logging.disable(before)
 
 
 def _count(run: MissionRun) -> Count:
     words = [happening.what for happening in run.happenings]
-    return Count(1, len(words), words.count("grant"), words.count("packet"), len(run.faults))
+    return Count(0, len(words), words.count("grant"), words.count("packet"), len(run.faults))

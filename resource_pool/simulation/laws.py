@@ -33,7 +33,7 @@ from backbone.rc_manager.messages import LEASE_S
 from backbone.rc_manager.priority import higher
 from resource_pool.simulation.audit import Happening
 from resource_pool.simulation.faults import LONGEST_DELAY_S, LONGEST_HANG_S
-from resource_pool.simulation.shape import MissionShape, OwnerShape
+from resource_pool.simulation.shape import MissionShape
 
 SAFE, FREED = "S", "freed"
 FREED_WITHIN_S = 0.5  # chosen: an RC ends one hold after the other, each within 0.4 s; the next is not connected before
@@ -41,6 +41,7 @@ RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time in which a los
 SOON_BACK_S = 0.6  # chosen: with the time it needs to ask everybody it renews before any lease is over
 UNDISTURBED_S = 4.0  # chosen: two leases
 RC_MANAGER = "rc_manager"
+Path = tuple[tuple[str, int], ...]
 CALM_DELAY_S = (
     1.5  # chosen: in the calm a notice takes no time, a death is seen at once, an owner is missed in half a second
 )
@@ -70,15 +71,24 @@ class Broken:
         return f"{self.law}, at {self.at_s:.4f} s: {self.what}"
 
 
-def first_broken(shape: MissionShape, happenings: Sequence[Happening], *, all_arrived: bool = False) -> Broken | None:
+def first_broken(
+    shape: MissionShape,
+    happenings: Sequence[Happening],
+    *,
+    all_arrived: bool = False,
+    longest_s: float = 0.0,
+    others: Sequence[Path] = (),
+) -> Broken | None:
     """Return the law that was broken first, or None if all hold.
 
     Args:
         shape: The mission.
         happenings: All that happened, in order.
         all_arrived: True if no message was lost, late or doubled.
+        longest_s: By how much longer than usual beliefs may be wrong, because processes were paused or cut off.
+        others: Paths of decision processes beside the owners, which always want time.
     """
-    judge = _Judge(shape, all_arrived)
+    judge = _Judge(shape, all_arrived, longest_s, others)
     for happening in happenings:
         for broken in judge.judge(happening):
             return broken
@@ -115,8 +125,8 @@ class _Belief:
 
 
 class _Judge:
-    def __init__(self, shape: MissionShape, all_arrived: bool) -> None:
-        self._shape, self._all_arrived = shape, all_arrived
+    def __init__(self, shape: MissionShape, all_arrived: bool, longest_s: float, others: Sequence[Path]) -> None:
+        self._shape, self._all_arrived, self._longest_s, self._others = shape, all_arrived, longest_s, others
         self._struck_s = -math.inf
         self._to_keep: set[tuple[str, str, int]] = set()
         self._keep_until_s = -math.inf
@@ -291,14 +301,14 @@ class _Judge:
         calm_s = self._calm_s
         for doubt, since_s in self._doubts.items():
             if doubt[0] == FREED:
-                if now_s > since_s + FREED_WITHIN_S:
+                if now_s > since_s + FREED_WITHIN_S + self._longest_s:
                     _, arc, rc, epoch = doubt
                     what = f"{arc} is called free since {since_s:.4f} s and holds {rc} under epoch {epoch}"
                     yield Broken(FREED, now_s, what, (arc, rc))
                 continue
-            due_s = since_s + STORM_DELAY_S
+            due_s = since_s + STORM_DELAY_S + self._longest_s
             if calm_s is not None:
-                due_s = min(due_s, max(since_s, calm_s + RECOVERY_S) + CALM_DELAY_S)
+                due_s = min(due_s, max(since_s, calm_s + RECOVERY_S + self._longest_s) + CALM_DELAY_S)
             if now_s > due_s:
                 one, other = doubt
                 what = f"{one} and {other} have not agreed on who holds what since {since_s:.4f} s"
@@ -311,14 +321,14 @@ class _Judge:
             return  # it lets RCs stand idle for those that may not start yet
         wanting = [owner for owner in self._shape.owners if owner.name in self._wanting]
         for owner in wanting:
-            rivals = [other for other in wanting if other is not owner and self._is_above(other, owner)]
-            if rivals or self._granted.get(owner.name, -1.0) >= self._wanting[owner.name]:
+            paths = [*(other.path for other in wanting if other is not owner), *self._others]
+            if (
+                any(higher(path, owner.path) for path in paths)
+                or self._granted.get(owner.name, -1.0) >= self._wanting[owner.name]
+            ):
                 continue
             if self._gates.get(owner.arc):
                 continue
             since_s = self._wanting[owner.name]
             what = f"{owner.name} has wanted time since {since_s:.4f} s, got none, and nobody is above it"
             yield Broken("progress", now_s, what, (owner.name, owner.arc))
-
-    def _is_above(self, one: OwnerShape, other: OwnerShape) -> bool:
-        return higher(one.path, other.path)

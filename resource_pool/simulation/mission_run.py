@@ -36,6 +36,7 @@ from resource_pool.simulation.laws import Broken, first_broken
 from resource_pool.simulation.played_hosts import PlayedHosts, PlayedPlacer, Role
 from resource_pool.simulation.shape import BRING_UP_S, MISSION, MissionShape, draw_shape
 from resource_pool.simulation.simulated_owner import SimulatedOwner
+from resource_pool.simulation.supervision_faults import SupervisionFault
 from resource_pool.simulation.unreliable_network import UnreliableNetwork
 
 
@@ -52,7 +53,7 @@ class MissionRun:
     """
 
     shape: MissionShape
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault | SupervisionFault, ...]
     happenings: tuple[Happening, ...]
     digest: str
     broken: Broken | None

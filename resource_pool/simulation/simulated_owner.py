@@ -17,6 +17,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.rc_manager.messages import PathNode
 from backbone.wire import Envelope, Message
@@ -102,6 +103,11 @@ class SimulatedOwner(Component[OwnerParameters]):
             raise NotMyArc(f"{self.name} claims nothing", arc=notice_arc(notice))
         return await self._arc.handle(notice)
 
+    def absences(self) -> list[Absence]:
+        """Return its ARC if it wants it and misses it."""
+        absence = self._arc.wish.absence() if self._arc is not None else None
+        return [absence] if absence is not None else []
+
     # ------------------------------------------------------------------ told by the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
         """Keep that the RCs are there."""
@@ -132,6 +138,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         # From here on what was granted is not used any more, whatever is still told about it.
         self._audit.note(self.name, "releases", arc=arc.arc)
         self._arc = None
+        self.changed()
         await self._until_said(lambda: arc.release("had enough"))
 
     async def _have_moods(self, arc: ArcClient) -> None:
@@ -171,7 +178,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         )
         while True:
             try:
-                await arc.keep(self.clock, given.kind, parameters)
+                await arc.keep(self.clock, given.kind, parameters, on_changed=self.changed)
             except Refusal as refusal:
                 self._audit.note(self.name, "claim refused", arc=arc.arc, code=code_of(refusal))
             await self.clock.sleep_s(AGAIN_S)

@@ -6,6 +6,8 @@ import pytest
 
 from resource_pool.simulation.faults import Fault, Kill, MessageFault
 from resource_pool.simulation.mission_run import run_mission
+from resource_pool.simulation.supervised_mission import run_supervised
+from resource_pool.simulation.supervision_faults import Cut, End, SupervisionFault
 
 FOUND: dict[str, tuple[int, list[Fault]]] = {
     "an RC whose renewal came too late lets go, and the RC manager must hear of it": (
@@ -89,3 +91,26 @@ def test_these_missions_still_suffer_what_they_were_found_with() -> None:
     """A message has its name from how many went before it; once most names have changed, the cases prove nothing."""
     whole = [set(run_mission(seed, chaos=True, faults=faults).faults) == set(faults) for seed, faults in FOUND.values()]
     assert sum(whole) > len(whole) / 2
+
+
+SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {
+    "an ARC that is ended from outside at its first start is begun again, and its behavior does not fail": (
+        1,
+        [End(3.1, "tree1-leaf1", "killed"), End(3.1, "tree1-leaf1-drive", "killed", 0.005)],
+    ),
+    "a component that runs where nobody reaches it is named as absent": (
+        0,
+        [Cut(2.7, "behavior1", 19.7), End(3.3, "nameserver", "politely")],
+    ),
+    "a behavior whose first claim is refused while its host comes back does not fail for good": (
+        1,
+        [Cut(3.1, "h2", 8.0), End(6.0, "tree1-leaf1", "killed")],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", SUPERVISED)
+def test_what_was_found_in_supervised_missions_does_not_come_back(what: str) -> None:
+    seed, faults = SUPERVISED[what]
+    run = run_supervised(seed, chaos=True, faults=faults)
+    assert run.broken is None, f"{what}: {run.broken}"

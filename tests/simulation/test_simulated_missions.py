@@ -78,7 +78,7 @@ def test_a_campaign_counts_what_it_saw() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
+@pytest.mark.timeout(3600)
 def test_2000_missions_with_message_loss_and_kills_keep_the_laws() -> None:
     outcome = simulate(0, 2000, chaos=True, tell=print)
     assert outcome.finding is None, "\n".join(outcome.finding.lines())
