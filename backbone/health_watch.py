@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, ComponentState
+from backbone.errors import LinkError, Refusal
 from backbone.health import LOOK_EVERY_S, SAY_EVERY_S, Health, MissionHealth, health
 from backbone.keys import Conversation
-from backbone.mission_picture import MissionPicture, look
+from backbone.mission_picture import LOOK_TIME_S, MissionPicture, look
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.printable import printable_all
 
 
 class HealthWatch:
@@ -27,6 +32,7 @@ class HealthWatch:
     ) -> None:
         self._bus, self._clock, self._changed, self._own = bus, clock, changed, own
         self._picture = MissionPicture(bus.mission, clock.now_s(), {}, rate=clock.rate)
+        self._components: Mapping[str, ComponentState] = {}
         self._said: MissionHealth | None = None
         self._said_s = 0.0
 
@@ -43,6 +49,7 @@ class HealthWatch:
         """Look and publish until cancelled; a look that waits for an answer delays no word about what is known."""
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._look_again_and_again())
+            loops.create_task(self._list_again_and_again())
             while True:
                 self._say(self._health())
                 await self._clock.sleep_s(LOOK_EVERY_S / 2 * self._clock.rate)
@@ -55,13 +62,21 @@ class HealthWatch:
                 self._changed()
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
 
+    async def _list_again_and_again(self) -> None:
+        """Hear what components report of absences, also while a look waits for a creator that is cut off."""
+        while True:
+            with suppress(LinkError, Refusal):  # the look says so
+                listed = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
+                self._components = {state.address: state for state in printable_all(listed.components)}
+            await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
+
     async def _look(self) -> MissionPicture:
         now_s, rate = self._clock.now_s(), self._clock.rate
         return await look(self._bus, now_s, before=self._picture, rate=rate, schedule=False)
 
     def _health(self) -> Health:
         # The launcher's own state in the list is a look old: what it missed then may be back.
-        others = {at: state for at, state in self._picture.components.items() if at != self._bus.source}
+        others = {at: state for at, state in self._components.items() if at != self._bus.source}
         missed = [*self._own(), *self._picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 

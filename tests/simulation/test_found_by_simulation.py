@@ -7,7 +7,7 @@ import pytest
 from resource_pool.simulation.faults import Fault, Kill, MessageFault
 from resource_pool.simulation.mission_run import run_mission
 from resource_pool.simulation.supervised_mission import run_supervised
-from resource_pool.simulation.supervision_faults import Cut, End, SupervisionFault
+from resource_pool.simulation.supervision_faults import Cut, End, Pause, SupervisionFault
 
 FOUND: dict[str, tuple[int, list[Fault]]] = {
     "an RC whose renewal came too late lets go, and the RC manager must hear of it": (
@@ -101,6 +101,10 @@ SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {
     "a component that runs where nobody reaches it is named as absent": (
         0,
         [Cut(2.7, "behavior1", 19.7), End(3.3, "nameserver", "politely")],
+    ),
+    "a look that waits for a creator that is cut off delays no word about what hangs": (
+        612,
+        [Pause(2.319, "scout4", 17.5), Cut(3.494, "creator-h2", 1.695)],
     ),
     "a behavior whose first claim is refused while its host comes back does not fail for good": (
         1,
