@@ -290,8 +290,10 @@ class Launcher(Component[NoParameters]):
                 placed.set_exception(refusal)
                 return
             finally:
-                placed.cancel()
                 self._wishes.remove(wish)
+            if not placed.done():  # stopped before it ran: the start of the mission does not wait for it
+                placed.set_result(None)
+            self._awaited.discard(order.name)
             self.tell(order.name, f"is not wanted any more: {stopped}")
             again = Companion(self.bus, component)
             try:
@@ -419,7 +421,7 @@ async def _with_hub(
     observer: Observer,
     began_s: float,
 ) -> Outcome:
-    keeper = ProcessKeeper(zygote)
+    keeper = ProcessKeeper(zygote, clock)
     others = door_for_others(description)
     hub = service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
     await keeper.start_hub(hub, CORE_POLICY)

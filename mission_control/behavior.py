@@ -31,7 +31,7 @@ from backbone.keys import Conversation
 from backbone.mission.behavior_orders import PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Ended, ListPlacements, Placement, Placements, StopComponent
+from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope, Message, UnknownMessage
 from mission_control.behavior_tree import (
@@ -239,6 +239,8 @@ class Behavior(Component[B], Generic[B]):
         if self.status.is_final or not status.is_final:
             return
         self.status, self.payload = status, dict(payload or {})
+        if status is BehaviorStatus.FAILURE and self._parent is None and not self._abandoned:
+            self._abandon(self.name, self.payload)
         self.tell(self.name, f"finished: {status}")
         self._begin(self._wind_up(), "wind-up")
 
@@ -298,6 +300,8 @@ class Behavior(Component[B], Generic[B]):
 
     def absences(self) -> list[Absence]:
         """Return children and ARC that are wanted and missing, and children it goes on without."""
+        if self.status.is_final:
+            return list(self._abandoned.values())
         wishes = [
             *self._wishes.values(),
             *([self.arc.wish] if self.arc is not None and self._keeping is not None else []),
@@ -411,13 +415,18 @@ class Behavior(Component[B], Generic[B]):
     async def _release(self) -> None:
         keeping, self._keeping = self._keeping, None
         if keeping is None or self.arc is None:
-            return
+            return None
         await _end_task(keeping)
         self.changed()
-        try:
-            await self.arc.release(f"{self.name} is done")
-        except LinkError as error:  # the ARC watches its owner's token and ends with it
-            log.info("%s: released without an answer: %s", self.arc.arc, error)
+        while True:
+            try:
+                return await self.arc.release(f"{self.name} is done")
+            except LinkError as error:
+                log.info("%s: released without an answer: %s", self.arc.arc, error)
+            except Refusal as refusal:  # it is another owner's by now
+                log.info("%s is not released: %s", self.arc.arc, refusal)
+                return None
+            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
     # ------------------------------------------------------------------ the children
     def _carry_out(self, instructions: Sequence[Instruction]) -> None:
@@ -512,10 +521,25 @@ class Behavior(Component[B], Generic[B]):
     async def _stop_child(self, name: str) -> None:
         await _end_task(self._kept.pop(name, None))
         self._wishes.pop(name, None)
-        try:
-            await self.bus.ask(PLACER, StopComponent(name, f"{self.name} ends it"), Ended, within_s=START_TIME_S)
-        except (Refusal, LinkError) as error:
-            log.info("child %s: %s", name, error)
+        while True:
+            try:
+                await self.bus.ask(PLACER, StopComponent(name, f"{self.name} ends it"), Ended, within_s=START_TIME_S)
+            except (LinkError, CreatorSilent) as error:
+                log.info("child %s is not stopped yet: %s", name, error)
+            except Refusal as refusal:
+                log.info("child %s: %s", name, refusal)
+                return
+            else:
+                return
+            await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
+
+    def _abandon(self, name: str, payload: Mapping[str, Any]) -> None:
+        """Report for good what could not do its work, with its cause; a task that was done and failed is no absence."""
+        if "code" in payload:
+            remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
+            cause = str(payload.get("detail", "it failed"))
+            self._abandoned[name] = Absence(name, self.clock.now_s(), cause, remedy=remedy)
+            self.changed()
 
     def _hear_creator(self, host: str) -> None:
         if host not in self._heard_creators:
@@ -536,11 +560,8 @@ class Behavior(Component[B], Generic[B]):
     async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
         decision = await self.child_finished(name, status, payload)
         self.story.note(name, f"{decision} after {status}")
-        if decision is not Decision.RETRY and "code" in payload:  # it could not do its work; its work did not fail
-            remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
-            cause = str(payload.get("detail", "it failed"))
-            self._abandoned[name] = Absence(name, self.clock.now_s(), cause, remedy=remedy)
-            self.changed()
+        if decision is not Decision.RETRY:
+            self._abandon(name, payload)
         self._carry_out(self._children.decided(name, decision))
 
     # ------------------------------------------------------------------ the parent

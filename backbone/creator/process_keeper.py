@@ -492,8 +492,8 @@ class ProcessKeeper:
                     self._zygote.kill(pid, number)
                 case MemberRuns(name=name, pid=pid):
                     self._do(self._supervision.forked(name, pid, self._now_s()))
-                case MemberNotStarted(name=name, why=why):
-                    self._do(self._supervision.fork_failed(name, why, self._now_s()))
+                case MemberNotStarted(name=name, why=why, returncode=returncode):
+                    self._do(self._supervision.fork_failed(name, why, self._now_s(), returncode))
                 case MemberGone(name=name, returncode=returncode, how=how):
                     self._do(self._supervision.left(name, returncode, how, self._now_s()))
                 case ProcessesWakeAt(at_s=at_s):

@@ -78,10 +78,15 @@ class MemberRuns:
 
 @dataclass(frozen=True, slots=True)
 class MemberNotStarted:
-    """It does not live, and will not by this order."""
+    """It does not live, and will not by this order.
+
+    Attributes:
+        returncode: That of its process if that ended first; 1: it was refused, or there was no process.
+    """
 
     name: str
     why: str
+    returncode: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,8 +255,8 @@ class SharedProcesses:
                 told.append(MemberGone(member.name, returncode, how))
             elif was_ended:
                 left[member.name] = _Member(member.name)
-            else:
-                told.append(MemberNotStarted(member.name, how))
+            else:  # by a signal from outside its start is begun again, by the process's own failure it is not
+                told.append(MemberNotStarted(member.name, how, 1 if one.failure else returncode))
         if left:
             self._all[one.name] = _Process(one.name, members=left)
             told.append(ForkProcess(one.name, next(iter(left))))

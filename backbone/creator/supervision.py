@@ -187,10 +187,10 @@ class Supervision:
         one.phase, one.deadline_s = Phase.STARTING, now_s + one.ready_within_s
         return self._and_wake(self._become_ready(one) if one.token_rose else [])
 
-    def fork_failed(self, name: str, why: str, now_s: float) -> list[Instruction]:
-        """Take note that there is no process."""
+    def fork_failed(self, name: str, why: str, now_s: float, returncode: int = 1) -> list[Instruction]:
+        """Take note that there is no process: there could be none, or the one it was to share ended with this code."""
         one = self._all[name]
-        return self._and_wake(self._gone(one, one.failure or why, 1, now_s))
+        return self._and_wake(self._gone(one, one.failure or why, returncode, now_s))
 
     def ready(self, name: str) -> list[Instruction]:
         """Take note that its liveliness token rose; of no meaning for names that are not starting."""

@@ -91,6 +91,11 @@ class Record:
         spawn = self.spawn
         return Placement(spawn.name, spawn.type, self.host, spawn.requester, self.since_s, list(self.reasons))
 
+    def runs(self, pid: int) -> None:
+        """Take note that it has a process, and is missed no longer."""
+        self.pid, self.suspect = pid, False
+        self.missing_since_s, self.cause, self.doing = -1.0, "", ""
+
     def misses(self, cause: str, now_s: float) -> None:
         """Take note that the component ran and is missing now."""
         self.phase, self.host, self.pid, self.suspect = Phase.WAITING, "", 0, False
@@ -292,8 +297,8 @@ class PlacementBook:
     def started(self, name: str, pid: int, now_s: float) -> None:
         """Take note that it is ready."""
         record = self.record(name)
-        record.phase, record.pid, record.since_s, record.suspect = Phase.RUNNING, pid, now_s, False
-        record.missing_since_s, record.cause, record.doing = -1.0, "", ""
+        record.phase, record.since_s = Phase.RUNNING, now_s
+        record.runs(pid)
 
     def unsure(self, name: str, now_s: float) -> None:
         """Take note that nobody knows whether it runs; its creator's next word settles it."""
@@ -398,7 +403,7 @@ class PlacementBook:
         """Take note that a component is ready again."""
         for record in self._records.values():
             if (record.address, record.host) == (component_address, host) and record.phase is Phase.RUNNING:
-                record.pid, record.suspect = pid, False
+                record.runs(pid)
 
     def inspected(self, host: str, processes: Collection[ProcessState], asked_s: float) -> list[Instruction]:
         """Settle the records of this host by what its creator answered to a question of that mission time."""
@@ -410,7 +415,8 @@ class PlacementBook:
                 continue
             process = listed.get(name)
             if process is not None:
-                record.pid = process.pid or record.pid
+                if process.pid:
+                    record.runs(process.pid)
             elif record.unwanted or not record.spawn.policy.restart:
                 self.forget(name)
                 told.append(Note(name, f"ended on {host}"))
@@ -435,7 +441,7 @@ class PlacementBook:
         """Settle one process a creator came up with."""
         spawn, record = process.spawn, self._records.get(process.spawn.name)
         if record is None:
-            if (host, spawn.name) in self._left_behind:
+            if (host, spawn.name) in self._left_behind or spawn.name in self._stopped:
                 return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
             self._remember_number(spawn)
             record = Record(spawn, host if spawn.pinned else "", Phase.RUNNING, host, asked_s)

@@ -62,6 +62,7 @@ from backbone.placer.messages import (
     Ended,
     ListPlacements,
     NoHost,
+    NotPlaced,
     Placements,
     PlacerQuestion,
     Start,
@@ -141,7 +142,10 @@ class Placer(Component[NoParameters]):
             case StopComponent(name=name, reason=reason):
                 return await self._stop(name, reason or f"asked by {asked.source}")
             case AskPlacement(name=name):
-                return self._book.record(name).placement()
+                record = self._book.record(name)
+                if record.unwanted:
+                    raise NotPlaced(f"{name} is being stopped", name=name, stopped=True)
+                return record.placement()
             case ListPlacements():
                 return Placements([record.placement() for record in self._book.records()], self._book.stopped())
             case other:
@@ -226,6 +230,7 @@ class Placer(Component[NoParameters]):
                 spawned = await self.bus.ask(_creator(record.host), spawn, Spawned, within_s=SPAWN_WITHIN_S)
                 pid = spawned.pid
             except StartFailed as refusal:
+                self._refuse_unwanted(record)
                 if self._book.is_alive(record.host) or not tries_left:
                     raise
                 self.story.note(name, f"was ended with {record.host}: {refusal.detail}")
@@ -233,6 +238,11 @@ class Placer(Component[NoParameters]):
             except LinkError as error:
                 self.story.note(name, f"was ordered on {record.host} without an answer: {error}")
                 fate, pid = await self._fate_of_spawn(record)
+                if fate is Fate.HOST_LOST:
+                    await self._unfenced(record)
+                    if self._book.is_alive(record.host):  # it was only cut off, and may have started it
+                        fate, pid = await self._fate_of_spawn(record)
+                self._refuse_unwanted(record)
                 lost = fate is Fate.HOST_LOST or (fate is Fate.NOT_DONE and isinstance(error, NoResponder))
                 if lost and tries_left:
                     continue
@@ -528,8 +538,9 @@ class Placer(Component[NoParameters]):
                 each_s=ANSWER_EACH_S,
                 within_s=ANSWER_WITHIN_S,
             )
-        except LinkError as error:  # if it lives, its token comes again
+        except LinkError as error:  # it may only be slow: it is asked again for as long as it is there
             self.story.note(host, f"its creator does not tell what it runs: {error}")
+            self._do(partial(self._begin, partial(self._meet_later, creator), f"meet {host} later"))
             return
         finally:
             self._meeting[host] -= 1
@@ -538,6 +549,16 @@ class Placer(Component[NoParameters]):
             self._tell_news()
         if self._newest[host] == creator.pid:  # else its successor is being met, and answers for itself
             self._carry_out(self._book.creator_up(host, answered.tags, creator.pid, answered.processes, asked_s))
+
+    async def _meet_later(self, creator: ComponentState) -> None:
+        await self.clock.sleep_s(ANSWER_WITHIN_S * self.clock.rate)
+        try:
+            found = await self._creators()
+        except LinkError:  # the nameserver's return makes the placer look again
+            return
+        is_there = any((each.host, each.pid) == (creator.host, creator.pid) for each in found.components)
+        if is_there and not self._book.knows_creator(creator.host, creator.pid):
+            self._begin_meeting(creator)
 
     async def _inspect(self, host: str) -> None:
         asked_s = self.clock.now_s()

@@ -22,7 +22,7 @@ from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import NameTaken
 from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import AskPlacement, CreatorSilent, NotPlaced, Placement, Start, Started
+from backbone.placer.messages import AskPlacement, CreatorSilent, NotPlaced, Placement, Start, Started, StoppedMeanwhile
 
 log = logging.getLogger(__name__)
 
@@ -101,7 +101,10 @@ async def keep_placed(
     component, placer = Companion(bus, address), Companion(bus, PLACER)
     try:
         while True:
-            placement, was_there = await _start(bus, clock, wish, order, on_changed, give_up_s)
+            try:
+                placement, was_there = await _start(bus, clock, wish, order, on_changed, give_up_s)
+            except StoppedMeanwhile as stopped:
+                return stopped.detail
             wish.placed()
             on_placed(placement, was_there)
             on_changed()
@@ -125,8 +128,14 @@ async def _start(
         except NameTaken:
             try:
                 return await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S), True
-            except (LinkError, NotPlaced) as error:  # its former life is ending
+            except NotPlaced as refusal:
+                if wish.started and refusal.facts.get("stopped"):  # the order to stop is newer than this wish
+                    raise StoppedMeanwhile(refusal.detail) from refusal
+                cause = refusal.detail  # its former life is ending
+            except (LinkError, Refusal) as error:
                 cause = str(error)
+        except StoppedMeanwhile:
+            raise
         except (LinkError, CreatorSilent) as error:
             cause = str(error)
         except Refusal as refusal:
@@ -165,7 +174,7 @@ async def _wait_missing(
             await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S)
         except NotPlaced as refusal:
             return refusal
-        except LinkError as error:
+        except (LinkError, Refusal) as error:
             log.info("the placer does not answer about %s: %s", wish.name, error)
             await clock.sleep_s(PAUSE_FIRST_S * clock.rate)
             continue

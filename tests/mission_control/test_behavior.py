@@ -494,6 +494,34 @@ def test_children_in_order_run_one_after_the_other(placer_world: Run) -> None:
     placer_world(scene)
 
 
+def test_a_root_that_cannot_claim_its_arc_is_reported(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        placer.refusals["capture"] = NoHost("no host has tag gl")
+        top = await root(placer, node("top", arc=ARC))
+        await placer.wait(lambda: top.status.is_final)
+        [absence] = top.absences()
+        assert (absence.name, absence.cause, absence.doing) == ("top", "no host has tag gl", "")
+
+    placer_world(scene)
+
+
+def test_an_order_to_stop_a_child_is_repeated_until_the_placer_takes_it(placer_world: Run) -> None:
+    """A hub that was away for a moment left children driving for ever."""
+
+    async def scene(placer: FakePlacer) -> None:
+        Parent.decisions = [Decision.ABORT]
+        await root(placer, node("top", "parent", 5, children=[node("a"), node("b")]))
+        await placer.wait(lambda: {"a", "b"} <= set(placer.components))
+        placer.silence()
+        placer.components["a"].finish(BehaviorStatus.FAILURE, {"why": "tired"})
+        await placer.clock.sleep_s(5.0)
+        assert "b" in placer.components
+        placer.speak()
+        await placer.wait(lambda: set(placer.components) == {"top"}, within_s=5.0)
+
+    placer_world(scene)
+
+
 def test_an_aborting_parent_ends_the_other_children_and_fails_with_the_reason(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         Parent.decisions = [Decision.ABORT]

@@ -85,7 +85,7 @@ class FakeCreator(Component[NoParameters]):
     def __init__(self, launch: Launch, bus: LocalBus, clock: VirtualClock, tags: list[str]) -> None:
         super().__init__(launch, bus, clock)
         self.network, self.tags = bus.network, tags
-        self.spawn_s = 0.1
+        self.spawn_s, self.end_s = 0.1, 0.0
         self.answers_spawn = self.answers_list = True
         self.fails: list[str] = []
         self.spawns: list[str] = []
@@ -98,6 +98,7 @@ class FakeCreator(Component[NoParameters]):
             case EndProcess(name=name):
                 if name not in self.lives:
                     raise NotHere(f"no {name} here")
+                await self.clock.sleep_s(self.end_s)
                 await self.kill_child(name)
                 return ProcessEnded(name, EndedBy.ASKING, 0)
             case ListProcesses() if self.answers_list:
@@ -337,6 +338,18 @@ async def test_a_component_stopped_while_it_starts_does_not_stay(one: Mission) -
 
 
 @on("a")
+async def test_a_component_that_is_being_stopped_is_placed_no_more(one: Mission) -> None:
+    await one.start("watcher", "w")
+    one.creators["a"].end_s = 2.0
+    stopping = asyncio.create_task(one.stop("w"))
+    await one.clock.sleep_s(1.0)
+    with pytest.raises(NotPlaced) as refused:
+        await one.bus.ask(ADDRESS, AskPlacement("w"), Placement, within_s=1.0)
+    assert refused.value.facts["stopped"] is True
+    await stopping
+
+
+@on("a")
 async def test_a_component_stopped_while_it_waits_for_a_host_is_not_placed_again(one: Mission) -> None:
     await one.start("watcher", "w")
     await one.crash("creator-a")
@@ -468,6 +481,22 @@ async def test_what_a_silent_host_may_still_run_is_started_elsewhere_only_when_i
     await one.creators["b"].kill_child("w2")
     await one.clock.sleep_s(2.0)
     assert one.creators["a"].spawns == ["w1", "w2"]
+
+
+@on("a", "b")
+async def test_a_start_on_a_host_that_fell_silent_is_repeated_elsewhere_only_when_it_cannot_run(one: Mission) -> None:
+    await one.start("watcher", "w0", host="a")
+    one.creators["b"].spawn_s = 2.0
+    starting = asyncio.create_task(one.start("watcher", "w", host=""))
+    await one.clock.sleep_s(0.5)
+    assert one.creators["b"].spawns == ["w"]
+    one.cut_off("b")
+    one.creators["b"].answers_spawn = False
+    await one.clock.sleep_s(CUT_OFF_ENDS_WITHIN_S - 1.5)
+    assert "w" not in one.creators["a"].spawns
+    one.reconnect("b")
+    assert (await starting).host == "b"
+    assert "w" not in one.creators["a"].spawns
 
 
 @on("a", "b")
