@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from random import Random
 
 from backbone.bus.interface import Bus, Clock
@@ -39,7 +40,8 @@ COUNTS = (2**63 - 1, 2**63, 2**64 - 1, -(2**63))
 TIMES = (1e9, 1e308, math.inf, -math.inf, math.nan, -1.0)
 
 
-class HostileMessage(Message, frozen=True):
+@dataclass(frozen=True, slots=True)
+class HostileMessage:
     """One hostile message.
 
     Attributes:
