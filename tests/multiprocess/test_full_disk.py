@@ -71,17 +71,17 @@ def let_nothing_be_written(mission: RunningMission) -> None:
 
 
 @pytest.fixture(params=["no process may write", "a small disk is full"])
-def fill(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Fill]:
+def fill(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Fill]:
     """Return what fills the disk under a running mission."""
     if request.param == "no process may write":
         yield let_nothing_be_written
         return
-    disk = tmp_path / "disk"
-    disk.mkdir()
+    disk = Path(tempfile.mkdtemp(prefix="disk-"))  # short: the mission's socket lies in it
     mounted = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", str(disk)], capture_output=True, check=False
     )
     if mounted.returncode:
+        disk.rmdir()
         pytest.skip("needs the right to mount a small disk")
     monkeypatch.setattr(tempfile, "tempdir", str(disk))
 
@@ -92,6 +92,7 @@ def fill(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mon
 
     yield write_all_of_it
     subprocess.run(["umount", "--lazy", str(disk)], check=True)
+    disk.rmdir()
 
 
 def test_a_disk_that_fills_up_stops_the_trace_and_keeps_no_component_from_coming_back(fill: Fill) -> None:
