@@ -68,7 +68,7 @@ REPLY_TIME_S = 1.0  # chosen: parents and placer answer in milliseconds
 START_TIME_S = 30.0  # chosen: as for ARCs, a child's host may be busy
 ADOPT_WITHIN_S = 10.0  # chosen: a child that is being restarted answers within this
 DRAIN_TIME_S = 1.2  # chosen: shorter than the 1.5 s its creator gives it before SIGTERM
-START_PATIENCE_S = 10.0  # chosen: a host that comes back, or a creator, is whole again within half of it
+START_PATIENCE_S = 60.0  # chosen: a link cut of 30 s, and the tries that began in it; health names it meanwhile
 AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one or two of these; machine seconds
 
 

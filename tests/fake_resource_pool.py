@@ -209,7 +209,7 @@ class FakePlacer:
         fell = ProcessFell(name, "signal 9", 10.0, [], failing=True)
         self.creator.publish("backbone/creator-local", Conversation.EVENTS, fell)
 
-    async def wait(self, condition: Callable[[], Any], within_s: float = 20.0) -> None:
+    async def wait(self, condition: Callable[[], Any], within_s: float = 90.0) -> None:
         """Return when the condition holds; it is looked at every hundredth of a (virtual) second."""
         async with asyncio.timeout(within_s):
             while not condition():

@@ -365,7 +365,7 @@ class LinkedNetwork(LocalNetwork):
             link.process.run(watching.tell, address, stands)
 
         if link.is_up:
-            link.carry(tell)
+            link.carry(tell, _nothing if stands else tell)  # with a lost link every token falls
         elif not link.process.is_dead:
             tell()
 

@@ -102,6 +102,10 @@ SUPERVISED: dict[str, tuple[int, list[SupervisionFault]]] = {
         0,
         [Cut(2.7, "behavior1", 19.7), End(3.3, "nameserver", "politely")],
     ),
+    "a behavior waits for its ARC while the dependency database is cut off": (
+        1761,
+        [End(1.341, "creator-h1", "killed"), Cut(1.567, "dependency_database", 10.279)],
+    ),
     "a look that waits for a creator that is cut off delays no word about what hangs": (
         612,
         [Pause(2.319, "scout4", 17.5), Cut(3.494, "creator-h2", 1.695)],

@@ -123,6 +123,22 @@ def test_a_paused_process_learns_of_its_lost_link_when_it_goes_on() -> None:
     play(body)
 
 
+def test_one_that_was_paused_too_long_also_learns_of_a_death_meanwhile() -> None:
+    async def body(scene: Scene) -> None:
+        scene.near.pause()
+        scene.network.pause(scene.near)
+        await CLOCK.sleep_until_s(2.0)
+        scene.far.die()
+        scene.network.end(scene.far)
+        await CLOCK.sleep_until_s(9.0)
+        scene.near.go_on()
+        scene.network.go_on(scene.near)
+        await CLOCK.sleep_until_s(10.0)
+        assert scene.seen == [(9.0, False)]
+
+    play(body)
+
+
 def test_the_death_of_a_process_is_seen_at_once_and_that_of_the_hub_by_everybody() -> None:
     async def body(scene: Scene) -> None:
         asking = asyncio.create_task(scene.ask(within_s=30.0))
