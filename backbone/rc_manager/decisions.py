@@ -79,7 +79,7 @@ class Requested:
 
 @dataclass(frozen=True, slots=True)
 class Adopted:
-    """A restarted RC manager found an ARC that holds its RCs under a standing lease."""
+    """A restarted RC manager found an ARC that holds its RCs under a standing lease, since it was connected to them."""
 
     request: SchedulingRequest
     epochs: Mapping[str, int]

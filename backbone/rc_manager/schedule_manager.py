@@ -372,18 +372,16 @@ class ScheduleManager:
     def _adopted(self, event: Adopted) -> None:
         """Let an ARC run on that an earlier RC manager granted its RCs.
 
-        The trace has no word for it: it shows a grant now, for what is left of the slice.
+        The caller says that it happened when its RCs were connected, so the trace shows its slice as it was.
         """
         request, rcs = event.request, tuple(event.epochs)
         if request.arc in self._table.arcs or any(rc not in self._table.rcs for rc in rcs):
             return
-        rest_s = max(0.0, event.granted_s + request.minimum_runtime_s - self._now_s)
-        arc = self._add(Requested(msgspec.structs.replace(request, minimum_runtime_s=rest_s, idle=False), rcs))
+        arc = self._add(Requested(msgspec.structs.replace(request, idle=False), rcs))
         holders = [other for other in self._table.arcs.values() if other.holds]
         if self._table.usable(arc) and self._table.fits(arc, holders):
             self._hold_on(arc, event)
         arc.request = request
-        self._runtime_changed(arc.name, request.minimum_runtime_s, request.maximum_runtime_s)
 
     def _hold_on(self, arc: ArcEntry, event: Adopted) -> None:
         arc.epochs = dict(event.epochs)
@@ -393,11 +391,11 @@ class ScheduleManager:
             entry.granted_epoch = max(entry.granted_epoch, epoch)
         why = "it held its RCs when this RC manager started"
         self._chronicle.record(trace.connect(self._now_s, arc.name, arc.epochs), why)
-        self._chronicle.record(trace.grant(self._now_s, arc.name, arc.epochs), why)
+        self._chronicle.record(trace.grant(event.granted_s, arc.name, arc.epochs), why)
         arc.turns = 1
-        arc.began_s = arc.granted_s = event.granted_s
+        arc.began_s, arc.granted_s = self._now_s, event.granted_s
         self._enter(arc, RequestState.RUNNING)
-        self._table.end_at(arc, self._now_s + arc.minimum_s)
+        self._table.end_at(arc, event.granted_s + arc.minimum_s)
 
     def _wanted(self, name: str) -> None:
         arc = self._table.arcs.get(name)

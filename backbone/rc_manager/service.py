@@ -147,7 +147,7 @@ class RcManager(Component[RcManagerParameters]):
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
-        self._context_switch = ContextSwitch(bus, clock, self.story.note)
+        self._context_switch = ContextSwitch(bus, clock, self.story.note, lambda rc: rc not in self._running_rcs)
         self._roll_call = RollCall(bus, clock)
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
@@ -268,9 +268,9 @@ class RcManager(Component[RcManagerParameters]):
         self._beats[request.arc] = self.clock.now_s()
 
     # ------------------------------------------------------------------ decide, then do
-    def happened(self, event: Event) -> None:
-        """Let the schedule manager decide on the event and begin to carry out its instructions."""
-        instructions = self.manager.handle(event, self.clock.now_s())
+    def happened(self, event: Event, at_s: float | None = None) -> None:
+        """Let the schedule manager decide on what happened, now unless told, and begin to carry out what it says."""
+        instructions = self.manager.handle(event, self.clock.now_s() if at_s is None else at_s)
         for instruction in instructions:
             self._carry_out(instruction)
         if instructions:
@@ -333,10 +333,13 @@ class RcManager(Component[RcManagerParameters]):
         self._running_rcs.discard(failed)
         self.happened(OpenFailed(order.arc, failed))
         if failed:
-            self.start_task(self._meet_later(failed), f"meet {failed}")
+            self._meet_in_a_while(failed)
 
     async def _revoke(self, order: RevokeArc) -> None:
-        await self._context_switch.revoke(order)
+        for rc in await self._context_switch.revoke(order):
+            self._running_rcs.discard(rc)
+            self.happened(RcWentDown(rc))
+            self._meet_in_a_while(rc)
         self.happened(Freed(order.arc))
 
     def _measure_switch(self, order: ConnectArc) -> None:
@@ -383,9 +386,8 @@ class RcManager(Component[RcManagerParameters]):
         state = await self._ask_rc(rc)
         if state is None:
             return False
-        orphans = [(rc, holder.arc, holder.epoch) for holder in state.holders]
-        if orphans and rc not in self._running_rcs:
-            await self._context_switch.disconnect(orphans, "held from before it was down")
+        if rc not in self._running_rcs:
+            await self._context_switch.clear(rc, [(rc, holder.arc, holder.epoch) for holder in state.holders])
         if rc not in self._running_rcs:
             if self._faults.pop(rc, ""):
                 self.story.note(rc, "makes sense again")
@@ -420,8 +422,7 @@ class RcManager(Component[RcManagerParameters]):
             log.warning("%s is put aside: %s", rc, fault)
             self.tell(rc, f"is put aside: {fault}")
             self.happened(RcWentDown(rc, fault))
-        if rc not in self._failing_rcs:
-            self.start_task(self._meet_later(rc), f"meet {rc}")
+        self._meet_in_a_while(rc)
 
     async def _ask_doubted(self, rc: str) -> None:
         """Ask an RC itself about which something was published that cannot be: anybody may publish in its name."""
@@ -439,7 +440,12 @@ class RcManager(Component[RcManagerParameters]):
 
     # ------------------------------------------------------------------ who is there
     def _take_over(self, found: Found) -> None:
-        """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait."""
+        """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait.
+
+        Slices that go on are told in the order and at the times in which they began.
+        """
+        adopted = sorted(map(self._adopted, filter(found.holds_rightly, found.arcs)), key=lambda one: one[0])
+        began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
         for resource in self._resources.values():
             state = found.rcs.get(resource.name)
             if state is not None:
@@ -454,15 +460,22 @@ class RcManager(Component[RcManagerParameters]):
                     disconnect_s=resource.disconnect_s,
                     up=state is not None,
                     last_epoch=state.last_epoch if state is not None else 0,
-                )
+                ),
+                began_s,
             )
-        for arc, current in found.arcs.items():
-            if found.holds_rightly(arc):
-                self._remember(current.request, tuple(current.rcs))
-                self.happened(Adopted(current.request, current.epochs, current.granted_s))
+        for at_s, event in adopted:
+            self._remember(event.request, tuple(event.epochs))
+            self.happened(event, at_s)
         for arc, current in found.arcs.items():
             if current.rcs and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
+
+    def _adopted(self, arc: str) -> tuple[float, Adopted]:
+        """Return since when the ARC is connected to its RCs, and what it was granted."""
+        current, now_s = self._found.arcs[arc], self.clock.now_s()
+        granted_s = current.granted_s if 0.0 <= current.granted_s <= now_s else now_s
+        settle_s = max(self._resources[rc].connect_s for rc in current.epochs)
+        return max(0.0, granted_s - settle_s), Adopted(current.request, current.epochs, granted_s)
 
     def _heard_from_nameserver(self, envelope: Envelope[Any]) -> None:
         match envelope.body:
@@ -475,9 +488,13 @@ class RcManager(Component[RcManagerParameters]):
         if name in self._resources and at.startswith("resource_pool/"):
             self.start_task(self._meet_again(name), f"meet {name}")
 
+    def _meet_in_a_while(self, rc: str) -> None:
+        if rc not in self._failing_rcs:
+            self._failing_rcs.add(rc)
+            self.start_task(self._meet_later(rc), f"meet {rc}")
+
     async def _meet_later(self, rc: str) -> None:
         """Ask a failed RC how it is; not at once, or it and the schedule would try each other without end."""
-        self._failing_rcs.add(rc)
         try:
             await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
             while not await self._meet_rc(rc) and rc in await self._roll_call.present():

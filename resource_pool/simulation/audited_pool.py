@@ -176,9 +176,9 @@ class AuditedRcManager(RcManager):
         super().__init__(launch, bus, clock)
         self._audit = current_audit.get()
 
-    def happened(self, event: Event) -> None:
+    def happened(self, event: Event, at_s: float | None = None) -> None:
         """Have it decided, then checked; see ``RcManager.happened``."""
-        super().happened(event)
+        super().happened(event, at_s)
         try:
             self.manager.check()
         except AssertionError as broken:

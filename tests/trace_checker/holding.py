@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .state import Arc, Phase, Rc
+from .violation import Violation
 
 if TYPE_CHECKING:
     from .replay import Replay
@@ -40,7 +41,16 @@ def time_passes(replay: Replay, until_s: float) -> None:
         if arc.phase is Phase.REVOKING:
             latest_s = arc.revoke_s + replay.grace_s + arc.release_s + replay.slack_s
             if replay.now_s <= latest_s < until_s:
-                replay.report("GRACE", arc.name, f"revoked at {arc.revoke_s:.3f}, not free by {latest_s:.3f}")
+                arc.late = Violation(
+                    "GRACE", replay.now_s, arc.name, f"revoked at {arc.revoke_s:.3f}, not free by {latest_s:.3f}"
+                )
+
+
+def is_free(replay: Replay, arc: Arc) -> None:
+    """Report that it took too long, unless an RC was down meanwhile: one that is dead cannot confirm in time."""
+    if arc.late and not arc.has_lost:
+        replay.found.append(arc.late)
+    arc.late, arc.has_lost = None, False
 
 
 def _loses_its_holders(replay: Replay, rc: Rc, until_s: float) -> None:

@@ -56,6 +56,8 @@ class Replay:
         for line, after in pairwise([*sound, None]):
             if line is not None:
                 self._read(line, after["t"] if after else None)
+        for arc in self.world.arcs.values():
+            holding.is_free(self, arc)
         self._fairness.over()
         return sorted(self.found, key=lambda one: one.t)
 
@@ -110,6 +112,8 @@ class Replay:
         rc = self._rc(line["id"])
         rc.up = line["state"] == "up"
         rc.down_s = None if rc.up else self.now_s
+        for arc in rc.holders.values():
+            arc.has_lost |= not rc.up and arc.phase is Phase.REVOKING
         self._fairness.disturbed()
 
     def _on_rc_cap(self, line: Line) -> None:
@@ -140,6 +144,7 @@ class Replay:
         arc = self._asked(line)
         old = self.world.arcs.get(arc.name)
         if old is not None:  # it begins anew, as after a restart of the RC manager
+            holding.is_free(self, old)
             self.world.forget_holder(old)
             arc.active_s, arc.services, arc.moved_s = old.active_s, old.services, old.moved_s
         self.world.arcs[arc.name] = arc
@@ -243,10 +248,12 @@ class Replay:
         if arc.is_served(self.now_s, self.slack_s if line["why"] == "slice" else INSTANT_S):
             arc.stamp = (self.now_s, self.number)
         arc.phase, arc.revoke_s = Phase.REVOKING, self.now_s
+        arc.has_lost = not all(self.world.rcs[name].up for name in arc.uses)
         self.world.forget_groups()
 
     def _on_free(self, line: Line) -> None:
         arc = self._arc(line, Phase.REVOKING)
+        holding.is_free(self, arc)
         self.world.forget_holder(arc)
         if arc.wants:
             arc.phase, arc.since_s, arc.due_s = Phase.WAITING, self.now_s, None

@@ -8,6 +8,7 @@ from math import inf
 
 from .admission import Stream
 from .priority_order import Path
+from .violation import Violation
 
 
 class Phase(Enum):
@@ -59,6 +60,8 @@ class Arc:
         is_leaving: It has departed, and its RCs are not free yet.
         stamp: When it became active or was last served, and the number of the line.
         freed_for: Its place in the order while RCs that were freed by force are reserved for it.
+        late: What is to be reported of its revocation, unless an RC was down meanwhile.
+        has_lost: One of its RCs was down while it was being revoked.
         since_s: Since when it waits.
         served_s: When its slice has lasted for the minimum run time that held at its begin.
         until_s: The end that it asked to extend its slice to.
@@ -88,6 +91,8 @@ class Arc:
     served_s: float = 0.0
     until_s: float = 0.0
     revoke_s: float = 0.0
+    late: Violation | None = None
+    has_lost: bool = False
     due_s: float | None = None
     is_reported: bool = False
     active_s: list[tuple[float, float]] = field(default_factory=list)

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 import pytest
+from trace_checker import check
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
@@ -53,6 +54,7 @@ from backbone.rc_manager.messages import (
     Schedule,
     Scheduled,
     SchedulingRequest,
+    SetIdle,
     SetPriority,
     StaleEpoch,
     UnknownRc,
@@ -376,6 +378,47 @@ def test_an_rc_that_was_away_is_free_as_soon_as_it_says_so_itself(pool: Any) -> 
     run_virtual(main())
 
 
+def test_the_other_rcs_of_an_arc_do_not_wait_for_one_that_died(pool: Any) -> None:
+    """Its successor confirms instead, before it is counted as up."""
+
+    async def main() -> None:
+        async with pool() as here, here.beside(here.manager()):
+            one, two = await here.arc("one"), await here.arc("two")
+            await one.ask_for(request("one", "left", "video"))
+            await two.ask_for(request("two", "right", "video"))
+            await here.clock.sleep_s(1.0)
+            assert one.is_open
+            here.rcs["left"].end("it is killed")
+            await here.clock.sleep_s(0.3 + 0.2)
+            assert two.is_open
+            successor = await here.rc(HARDWARE[0])
+            await here.clock.sleep_s(6.0)
+            assert one.is_open
+            assert successor.log == [("disconnect", "one"), ("connect", "one")]
+
+    run_virtual(main())
+
+
+def test_an_rc_that_never_confirmed_is_down_until_it_answers(pool: Any) -> None:
+    async def main() -> Path:
+        async with pool() as here, here.beside(here.manager()):
+            one = await here.arc("one")
+            await one.ask_for(request("one", "left", "radio"))
+            await here.clock.sleep_s(1.0)
+            here.rcs["left"].hangs = True
+            await one.bus.ask(ADDRESS, SetIdle("one", True), Done, within_s=1)
+            await here.clock.sleep_s(LEASE_S + 0.1)
+            here.rcs["left"].hangs = False
+            await here.clock.sleep_s(LEASE_S)
+            return here.trace  # type: ignore[no-any-return]
+
+    lines = [json.loads(line) for line in run_virtual(main()).read_text().splitlines()]
+    ended = next(number for number, line in enumerate(lines) if line["ev"] == "revoke")
+    told = [line for line in lines[ended:] if line.get("id") == "left" or line.get("arc") == "one"]
+    assert [line.get("state", line["ev"]) for line in told] == ["revoke", "down", "free", "up"]
+    assert check(lines) == []
+
+
 def test_a_set_that_cannot_be_connected_whole_is_given_back_whole(pool: Any) -> None:
     async def main() -> None:
         async with pool() as here, here.beside(here.manager()):
@@ -415,6 +458,30 @@ def test_a_restarted_rc_manager_adopts_the_running_arc_and_remembers_the_waiting
             assert here.rcs["video"].log[:2] == [("connect", "one"), ("disconnect", "one")]
 
     run_virtual(main())
+
+
+def test_the_trace_after_a_restart_shows_the_slice_that_goes_on_as_it_was(pool: Any) -> None:
+    """Its RCs settled and its slice began before the restart: nothing was granted now, nothing unsettled."""
+
+    async def main() -> tuple[Path, float]:
+        async with pool() as here:
+            one, two = await here.arc("one"), await here.arc("two")
+            async with here.beside(here.manager()):
+                await one.ask_for(request("one", "left", "video", "radio"))
+                await two.ask_for(request("two", "right", "video", "radio"))
+                await here.clock.sleep_s(2.0)
+            granted_s = one.granted_s
+            async with here.beside(here.manager()):
+                await here.clock.sleep_s(8.0)
+            return here.trace, granted_s
+
+    trace, granted_s = run_virtual(main())
+    lines = [json.loads(line) for line in trace.read_text().splitlines()]
+    lines = lines[[line["ev"] for line in lines].index("meta", 1) :]
+    grant = next(line for line in lines if line["ev"] == "grant")
+    assert (grant["arc"], grant["t"]) == ("one", pytest.approx(granted_s))
+    assert [line["arc"] for line in lines if line["ev"] == "grant"] == ["one", "two"]
+    assert check(lines) == []
 
 
 def test_a_restarted_rc_manager_frees_what_a_dead_arc_left_held(pool: Any) -> None:

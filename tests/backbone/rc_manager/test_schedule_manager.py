@@ -321,12 +321,13 @@ def test_a_changed_priority_decides_at_once():
 
 def test_a_restarted_manager_lets_who_holds_run_on_to_the_end_of_its_slice():
     bench = Bench(manager(), unit("v"))
-    bench.now_s = 3.0
+    bench.now_s = 1.0
     request = ask("a", "v")
     bench.tell(Adopted(request.request, {"v": 7}, 1.0))
+    bench.now_s = 3.0
     bench.tell(ask("b", "v"))
     bench.run(20.0)
-    assert bench.runs("a")[:2] == [(3, 6), (11, 16)]
+    assert bench.runs("a")[:2] == [(1, 6), (11, 16)]
     assert [order.epochs["v"] for order in told(bench, ConnectArc)] == [8, 9, 10]
     assert [(lease.arc, lease.epoch) for lease in bench.manager.leases()] == [("b", 10)]
     assert bench.verdict() == []
