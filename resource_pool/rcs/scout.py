@@ -124,7 +124,7 @@ class Scout(ResourceController[ScoutParameters]):
                 self.story.note(self.name, f"{asked.source} was refused: {type(asked.body).__name__}")
                 raise NotFromYou(f"{self.name} is stopped and freed by operators, not by {asked.source}")
             case EmergencyStop(reason=reason, user=user):
-                return await self._stop_now(user or asked.source, reason)
+                return await self._stop_now(user or asked.source, reason, asked.source)
             case LiftStop(number=number, user=user):
                 if self._latch.lift(number, user or asked.source, self.clock.now_s()):
                     self._keep_stop()
@@ -142,7 +142,7 @@ class Scout(ResourceController[ScoutParameters]):
             )
         hold = self.admit(order.arc, order.epoch)
         if isinstance(order.command, Drive | Jump):
-            self._latch.require_moving()
+            self._latch.require_moving(order.command.after_stop)
         match order.command:
             case Drive(left_rad_s=left, right_rad_s=right):
                 left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
@@ -175,11 +175,10 @@ class Scout(ResourceController[ScoutParameters]):
         stops = float(self._latch.state.number)
         return {**super().statistics(), "command_timeouts": self._timeouts, "emergency_stops": stops}
 
-    async def _stop_now(self, by: str, reason: str) -> StopState:
+    async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
         """Refuse all that moves the robot from here on, and stop its wheels if somebody could be turning them."""
-        is_new = self._latch.stop(by, reason, self.clock.now_s())
-        if is_new:
-            self._keep_stop()
+        is_new = self._latch.stop(by, reason, self.clock.now_s(), console)
+        self._keep_stop()
         self._halt_at_s = None
         holder = self._holder
         if holder is not None:
@@ -193,9 +192,9 @@ class Scout(ResourceController[ScoutParameters]):
                 self._latch.confirm(False)
             else:
                 self._latch.confirm(True)
-            self.changed()
+        self._publish_stop()
         if is_new:
-            self._tell_stop(self._latch.state, f"was stopped{f': {reason}' if reason else ''}")
+            self.tell(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
         return self._latch.state
 
     def standing_stop(self) -> StandingStop | None:
@@ -203,12 +202,16 @@ class Scout(ResourceController[ScoutParameters]):
         state = self._latch.state
         if not state.is_stopped:
             return None
-        return StandingStop(state.number, state.by, state.reason, state.at_s, state.is_confirmed)
+        by = ", ".join(dict.fromkeys([state.by, *(author.by for author in state.also)]))
+        return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed)
 
     def _tell_stop(self, state: StopState, what: str) -> None:
-        self.changed()
-        self.bus.publish(self.address, Conversation.EVENTS, state)
+        self._publish_stop()
         self.tell(self.name, f"{what} (by {state.by})")
+
+    def _publish_stop(self) -> None:
+        self.changed()
+        self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
 
     def _keep_stop(self) -> None:
         """Keep the stop for the next process of this RC; a disk that refuses must not keep the wheels turning."""
