@@ -383,15 +383,17 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._keeping is None:
             log.info("%s was granted after it was given back", notice.arc)
             return  # its wish for no time reached the RC manager later than its turn did; that takes the RCs back
+        robot = notice.rcs.get(ROBOT_KIND, "no robot")
+        self.require_let_go()
+        await self._ear.listen(robot)
+        if not self.is_held or self._arc is None or self._arc.granted is not notice:
+            return  # it went again meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
         now_s = self.clock.now_s()
-        robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.report(f"drives {robot}")
         if not again:
             self.tell(robot, f"was taken over by {self.user}")
         self._holding = robot
-        self.require_let_go()
-        self._ear.listen(robot)
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 
