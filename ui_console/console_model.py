@@ -14,8 +14,9 @@ from typing import cast, get_args
 
 import msgspec
 
-from resource_pool.arc_client import EmergencyStopped
-from ui_console.consent import Sought
+from backbone.naming import Subsystem
+from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
+from ui_console.consent import Sought, Topic
 from ui_console.console_events import (
     Asked,
     Attention,
@@ -28,13 +29,16 @@ from ui_console.console_events import (
     ConsoleEvent,
     GivenBack,
     Granted,
+    LetGoNeeded,
     LinkTrouble,
     Lost,
     OwnEvent,
     PictureSeen,
+    RobotLost,
     TeamEvent,
     WhyHeard,
 )
+from ui_console.lifting import question_line
 from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.views import (
     NONE_S,
@@ -43,6 +47,7 @@ from ui_console.views import (
     ConsoleView,
     LinkView,
     LogRow,
+    LostView,
     OwnView,
     RobotView,
     VideoView,
@@ -51,6 +56,8 @@ from ui_console.views import (
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
+UNRENEWED = ("lost", "lease")  # reasons of a loss that nobody decided
+ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 _TEAM_EVENTS = get_args(TeamEvent)
 
@@ -77,8 +84,11 @@ class ConsoleModel:
         self.applied: CommandApplied | None = None
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
+        self._address = f"{Subsystem.UI_CONSOLE}/{name}"
         self._pictures: dict[str, deque[PictureSeen]] = {}
-        self._sought: dict[str, Sought] = {}
+        self._sought: dict[tuple[str, Topic], Sought] = {}
+        self._must_let_go = False
+        self._went: RobotLost | None = None
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
         self._blind = ""  # robot that is held without pictures to drive by
@@ -107,6 +117,10 @@ class ConsoleModel:
         """Note that this console's user has seen one alarm, or with an empty key all; return how many."""
         return self.team.alarms.acknowledge(self.user, key)
 
+    def dismiss_lost(self) -> None:
+        """This console's user knows that a robot was lost, and does not want it back."""
+        self._went = None
+
     # ------------------------------------------------------------------ views out
     def view(self, now_s: float) -> ConsoleView:
         """Return all that there is to show."""
@@ -133,21 +147,25 @@ class ConsoleModel:
     def own(self, now_s: float) -> OwnView:
         """Return what this console wants and has."""
         held = self.held
+        link_down_s = self.team.link_down_s(now_s)
         return OwnView(
             console=self.name,
             user=self.user,
             robot=self.robot,
-            is_held=held is not None,
+            is_held=self._is_held(now_s),
             is_asked=self.asked is not None,
             status=self.status_line(now_s),
             epoch=max(held.epochs.values(), default=0) if held is not None else 0,
             until_s=held.until_s if held is not None else NONE_S,
             taken_because=f"{self.lost.reason} by {self.lost.by}" if self.lost is not None else "",
             applied=_applied_line(self.applied),
-            stop=self.team.stop_view(self.robot, now_s) if held is not None else None,
+            stop=self.team.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
             asked=self.asked_line(now_s),
+            must_let_go=self._must_let_go and held is not None,
+            lost=self._lost_view(now_s),
+            link_down_s=link_down_s,
         )
 
     def consent(self, now_s: float) -> ConsentView | None:
@@ -155,24 +173,40 @@ class ConsoleModel:
         if not self._sought:
             return None
         first, *others = self._sought.values()
-        return ConsentView(first.user, first.robot, first.why, max(0.0, first.until_s - now_s), len(others))
+        return ConsentView(
+            user=first.user,
+            robot=first.robot,
+            why=first.why,
+            left_s=max(0.0, first.until_s - now_s),
+            others=len(others),
+            topic=first.topic,
+            line=_question_line(first),
+        )
 
     def asked_line(self, now_s: float) -> str:
         """Return in one line what came of asking others for their consent; empty: nobody was asked."""
         asked = self._asked_whom
         if asked is None:
             return ""
+        if asked.topic is Topic.LIFT and now_s > asked.until_s + ANSWER_SHOWN_S:
+            return ""
         said = [_answer_line(heard) for heard in self._heard]
         if len(said) < len(asked.of):
-            said.append(f"asked {', '.join(asked.of)} for {asked.robot}: {max(0.0, asked.until_s - now_s):.0f} s left")
+            what = asked.robot if asked.topic is Topic.TAKE else f"leave to lift the stop of {asked.robot}"
+            said.append(f"asked {', '.join(asked.of)} for {what}: {max(0.0, asked.until_s - now_s):.0f} s left")
         return "; ".join(said)
 
     def robots(self, now_s: float) -> list[RobotView]:
         """Return one row for each robot, sorted by name; this console's own and its pictures are marked."""
         videos = {video.robot: video for video in self.videos(now_s)}
-        mine = self.robot if self.held is not None else ""
+        mine = self.robot if self._is_held(now_s) else ""
         return [
-            msgspec.structs.replace(row, is_mine=row.robot == mine, video=videos.get(row.robot))
+            msgspec.structs.replace(
+                row,
+                is_mine=row.robot == mine,
+                video=videos.get(row.robot),
+                stop=self.team.stop_view(row.robot, now_s, self.user, self._address),
+            )
             for row in self.team.robots(now_s)
         ]
 
@@ -194,6 +228,10 @@ class ConsoleModel:
 
     def status_line(self, now_s: float) -> str:
         """Return in one line whether this console has its robot, and if not, why."""
+        down_s = self.team.link_down_s(now_s)
+        if down_s >= 0:
+            mine = f"; {self.robot} is given back there by itself" if self.held is not None else ""
+            return f"NO LINK to the mission for {now_s - down_s:.0f} s: nothing can be stopped from here{mine}"
         if self.held is not None:
             stop = self.team.stop_of(self.robot)
             if stop is not None:
@@ -219,30 +257,38 @@ class ConsoleModel:
             case ConsentHeard():
                 self._heard.append(event)
             case ConsentSought(sought=sought):
-                self._sought[sought.asker] = sought
+                self._sought[sought.asker, sought.topic] = sought
             case ConsentSettled(settled=settled):
-                self._sought.pop(settled.sought.asker, None)
+                self._sought.pop((settled.sought.asker, settled.sought.topic), None)
+            case LetGoNeeded(is_needed=is_needed):
+                self._must_let_go = is_needed
+            case RobotLost():
+                self._went = event
             case Asked(robot=robot):
-                self._asked_whom = None
+                self._asked_whom = self._went = None
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
+                self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s, reason=reason, by=by):
                 self.held, self.lost = None, event
+                if reason in UNRENEWED:
+                    self._went = RobotLost(at_s, self.robot, "the link to it was away for too long")
                 self._pictures.clear()
                 line = f"{self.robot or 'the robot'} was taken from {self.user}: {reason} by {by}"
                 alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
             case CommandApplied():
                 self.applied = event
             case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
-                if code != EmergencyStopped.code:  # that one is an alarm of its own
+                if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
                         AlarmKind.REFUSED, self.robot, f"refused: {detail}", at_s, remedy, f"refused:{code}"
                     )
             case LinkTrouble(at_s=at_s, detail=detail):
                 alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
-            case GivenBack(at_s=at_s, confirmed=confirmed):
+            case GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
+                self._went = None if wanted else RobotLost(at_s, self.robot, reason)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:
@@ -257,6 +303,17 @@ class ConsoleModel:
                 self.why = event
             case Attention(at_s=at_s, is_there=is_there):
                 alarms.attention(is_there, at_s)
+
+    def _is_held(self, now_s: float) -> bool:
+        """Return whether keys move a robot, as far as can be known now."""
+        return self.held is not None and self.team.link_down_s(now_s) < 0
+
+    def _lost_view(self, now_s: float) -> LostView | None:
+        went = self._went
+        if went is None:
+            return None
+        is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots(now_s))
+        return LostView(went.robot, went.why, went.at_s, is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:
         """Return what is wrong with the pictures of the robot that is held; empty if nothing is."""
@@ -278,7 +335,17 @@ def _video(robot: str, seen: deque[PictureSeen], now_s: float) -> VideoView:
     return VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
 
 
+def _question_line(sought: Sought) -> str:
+    if sought.topic is Topic.LIFT:
+        return question_line(sought.user, sought.robot, sought.why)
+    return f"{sought.user} asks for {sought.robot}{f': {sought.why}' if sought.why else ''}"
+
+
 def _answer_line(heard: ConsentHeard) -> str:
+    if heard.topic is Topic.LIFT:
+        said = "lets" if heard.is_given else "keeps"
+        what = f"{heard.robot} move" if heard.is_given else f"{heard.robot} stopped"
+        return f"{heard.user} {said} {what}{f': {heard.reason}' if heard.reason else ''}"
     word = "lets you have" if heard.is_given else "keeps"
     return f"{heard.user} {word} {heard.robot}{f': {heard.reason}' if heard.reason else ''}"
 

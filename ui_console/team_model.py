@@ -9,6 +9,7 @@ model calls before it shows it.
 
 from __future__ import annotations
 
+import dataclasses
 from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import assert_never
@@ -39,6 +40,7 @@ from ui_console.console_events import (
     TeamEvent,
 )
 from ui_console.health_board import HealthBoard
+from ui_console.lifting import author_name, authors, is_own, lift_line
 from ui_console.timeline import Timeline
 from ui_console.views import (
     NONE_S,
@@ -63,6 +65,7 @@ LOG_KEPT = 500  # chosen: some minutes of a busy mission; the rest is in the rec
 STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
 OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
+NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
 _STATE_OF_REQUEST = {
     RequestState.RUNNING: NodeState.RUNNING,
@@ -100,6 +103,7 @@ class TeamModel:
         self._overruns: dict[tuple[str, str], float] = {}
         self._radios: dict[str, Mapping[str, float]] = {}
         self._link = LinkHeard(0.0, True)
+        self._link_heard_s = 0.0
         self._parameters: dict[tuple[str, str], ParameterView] = {}
         self._log: deque[LogRow] = deque(maxlen=LOG_KEPT)
 
@@ -133,11 +137,8 @@ class TeamModel:
                 self._take_stop(stop, at_s)
             case RadioCounted(at_s=at_s, radio=radio, values=values):
                 self._take_counts(radio, values, at_s)
-            case LinkHeard(at_s=at_s, is_up=is_up):
-                if is_up and event.latency_s < 0:
-                    event = LinkHeard(at_s, True, self._link.latency_s)
-                self._link = event
-                self._so(not is_up, AlarmKind.LINK, "hub", "no link to the hub: what is shown is old", at_s)
+            case LinkHeard():
+                self._take_link(event)
             case HealthHeard():
                 self._health.take(event)
             case ParametersHeard():
@@ -148,6 +149,7 @@ class TeamModel:
     def look(self, now_s: float) -> None:
         """Find out what only time can tell."""
         self._health.look(now_s)
+        self._so(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
             starves = request.state is RequestState.WAITING and request.expected_start_s < 0 and waits_s >= STARVING_S
@@ -164,6 +166,11 @@ class TeamModel:
         rcs = sorted((rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND), key=lambda rc: rc.rc)
         return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
 
+    def link_down_s(self, now_s: float) -> float:
+        """Return since when nothing is heard from the mission's hub; negative: the link is up."""
+        link = self._link
+        return NONE_S if link.is_up and now_s <= link.until_s else self._link_heard_s
+
     def robot_names(self) -> list[str]:
         """Return every robot heard of, in the schedule or as a component."""
         in_schedule = {rc.rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND} if self.schedule else set()
@@ -175,12 +182,31 @@ class TeamModel:
         stop = self._stops.get(robot)
         return stop if stop is not None and stop.is_stopped else None
 
-    def stop_view(self, robot: str, now_s: float) -> StopView | None:
-        """Return the same for a screen."""
+    def stop_view(self, robot: str, now_s: float, user: str = "", console: str = "") -> StopView | None:
+        """Return the same for a screen.
+
+        Args:
+            robot: Which.
+            now_s: Mission time.
+            user: Who looks at it; empty: nobody in particular.
+            console: Address of their console.
+        """
         stop = self.stop_of(robot)
         if stop is None:
             return None
-        return StopView(stop.number, stop.by, stop.reason, max(0.0, now_s - stop.at_s), stop.is_confirmed)
+        by_user, *also = dict.fromkeys(map(author_name, authors(stop)))
+        return StopView(
+            number=stop.number,
+            by=stop.by,
+            reason=stop.reason,
+            age_s=max(0.0, now_s - stop.at_s),
+            is_confirmed=stop.is_confirmed,
+            by_user=by_user,
+            also=also,
+            since_s=stop.at_s,
+            is_mine=is_own(stop, user, console),
+            lift_line=lift_line(stop, user, console, self._is_there),
+        )
 
     def tree(self) -> list[NodeView]:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
@@ -226,7 +252,7 @@ class TeamModel:
     def links(self, now_s: float) -> list[LinkView]:
         """Return the link to the hub, the RC manager's renewals, and the radios."""
         renewed = f"leases renewed {now_s - self._leases_s:.1f} s ago" if self._leases_s >= 0 else ""
-        views = [LinkView("hub", self._link.is_up, self._link.latency_s, renewed)]
+        views = [LinkView("hub", self.link_down_s(now_s) < 0, self._link.latency_s, renewed)]
         for radio, values in sorted(self._radios.items()):
             sent, late = values.get("packets_sent", 0.0), values.get("overruns", 0.0)
             worst_ms = 1e3 * values.get("worst_packet_s", 0.0)
@@ -414,7 +440,23 @@ class TeamModel:
             _because(request) if request is not None else "",
         )
 
+    def _is_there(self, address: str) -> bool:
+        """Return whether this component is there; True as long as nothing was heard of who is."""
+        component = self._components.get(address)
+        if component is None:
+            return not self._components
+        return component.state not in LEAVING and address not in self._lost
+
     # ------------------------------------------------------------------ what happened
+    def _take_link(self, link: LinkHeard) -> None:
+        if link.is_up:
+            self._link_heard_s = link.at_s
+            latency_s = link.latency_s if link.latency_s >= 0 else self._link.latency_s
+            self._link = dataclasses.replace(link, latency_s=latency_s)
+        else:
+            self._link = link
+        self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
+
     def _take_story(self, story: StoryEvent) -> None:
         self._note(story.at_s, story.subject, story.what, story.where)
         head, _, status = story.what.partition(": ")
