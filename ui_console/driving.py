@@ -115,8 +115,8 @@ class DriveSpan:
 class DeadMan:
     """Turns key presses into commands that repeat while a key is held, and one halt after it.
 
-    Laws: a command is due only within the hold of a press; every drive is followed by a halt; from ``require_let_go`` on
-    a control that is held moves nothing until it was let go and pressed anew.
+    Laws: a command is due only within the hold of a press; every drive is followed by a halt; from ``require_let_go``
+    on a control that is held moves nothing until it was let go and pressed anew.
     """
 
     def __init__(self) -> None:

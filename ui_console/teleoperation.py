@@ -119,9 +119,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         user: str = "",
         answers: ConsentAnswers | None = None,
     ) -> None:
-        super().__init__(
-            launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers
-        )
+        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
         self._claimed: tuple[str, dict[str, Any]] | None = None
@@ -204,17 +202,16 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._touched.set()
 
     def leave(self) -> None:
-        """The operator turned away, or the window is no longer in front: the wheels stop, and what is held is let go."""
+        """The operator turned away, or the window is no longer in front: the wheels stop, and nothing held counts."""
         if self._is_attended:
             self._is_attended = False
             self.show(Attention(self.clock.now_s(), False))
-        self.stop()
         self.require_let_go()
 
     def require_let_go(self) -> None:
         """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop.
 
-        When: a dialog opens or closes. A stop, a lift, a grant, the loss of the robot and of the link require it anyway.
+        When: a dialog opens or closes. Stops, lifts, grants, and the loss of robot or link require it anyway.
         """
         self._controls.require_let_go()
 
