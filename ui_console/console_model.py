@@ -340,7 +340,7 @@ def _slice_end(until_s: float, now_s: float) -> str:
     left_s = until_s - now_s
     if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
         return ""
-    return f", slice {left_s:.0f} s" if left_s > 0 else f", {-left_s:.0f} s beyond its slice"
+    return f", slice {left_s:.0f} s" if left_s > 0 else ", beyond its slice"
 
 
 def _question_line(sought: Sought) -> str:

@@ -425,4 +425,4 @@ def test_a_slice_that_ends_now_has_no_number_and_one_kept_longer_says_so() -> No
     assert shown.status_line(GRANT.until_s - 3.0).endswith("slice 3 s")
     assert "slice" not in shown.status_line(GRANT.until_s - 0.4)
     assert "slice" not in shown.status_line(GRANT.until_s + 0.4)
-    assert shown.status_line(GRANT.until_s + 7.0).endswith("7 s beyond its slice")
+    assert shown.status_line(GRANT.until_s + 7.0).endswith(", beyond its slice")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 from bursts import burst
 from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model
@@ -14,6 +15,7 @@ from written_session import WrittenSession, settle
 from ui_console.console_events import ScheduleHeard, StopHeard
 from ui_console.console_model import ConsoleModel
 from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.dialogs import READ_S
 from ui_console.terminal.keys import Profile, robot_meant, stop_meant
 from ui_console.terminal.widgets import DrivePad
 
@@ -124,6 +126,52 @@ async def test_lifting_says_whose_stop_it_is_and_why_and_needs_another_key(profi
         await pilot.press("l")
         await settle(pilot)
     assert session.wanted == [("lift", "scout1", STOP.number)]
+
+
+async def test_a_stop_set_anew_while_the_question_is_open_is_shown_and_not_lifted_unread() -> None:
+    session = WrittenSession(shown=stopped_model())
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        again = msgspec.structs.replace(STOP, number=STOP.number + 1, by="ben", reason="smoke", at_s=11.5)
+        session.model.apply(StopHeard(11.5, again))
+        app.redraw()
+        await pilot.press("l")
+        await settle(pilot)
+        told = screen_text(app)
+        assert "set by ben" in told
+        assert "smoke" in told
+        assert session.wanted == []
+        await pilot.pause(READ_S)
+        await pilot.press("l")
+        await settle(pilot)
+    assert session.wanted == [("lift", "scout1", again.number)]
+
+
+async def test_the_question_closes_when_somebody_else_lifts_the_stop() -> None:
+    session = WrittenSession(shown=stopped_model())
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        session.model.apply(StopHeard(11.5, msgspec.structs.replace(STOP, is_stopped=False, by="ben")))
+        app.redraw()
+        await settle(pilot)
+        assert len(app.screen_stack) == 1
+    assert session.wanted == []
+
+
+async def test_a_lift_that_was_not_granted_is_said_aloud() -> None:
+    session = WrittenSession(shown=stopped_model())
+    session.is_sure = False
+    async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        await pilot.press("l")
+        await settle(pilot)
+        await pilot.pause()
+        assert "scout1 stays stopped" in screen_text(pilot.app)
 
 
 async def test_where_no_robot_is_stopped_lifting_says_so() -> None:

@@ -86,7 +86,7 @@ class WrittenSession:
 
     async def lift_stop(self, robot: str, number: int) -> bool:
         self.wanted.append(("lift", robot, number))
-        return True
+        return self.is_sure
 
     async def why(self, name: str) -> list[str]:
         self.wanted.append(("why", name))

@@ -25,7 +25,7 @@ from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
-from ui_console.terminal.lines import Row, lift_lines, robot_rows
+from ui_console.terminal.lines import Row, robot_rows
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
@@ -170,6 +170,9 @@ class ConsoleApp(App[None]):
         self._show(self._turn, turn, view)
         keys = hints(view, self.profile, self._robot_meant())
         main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
+        if isinstance(self.screen, LiftQuestion):
+            subject = self.screen.subject
+            self.screen.look(next((robot.stop for robot in view.robots if robot.robot == subject), None))
         self.redraw_video()
 
     def redraw_if_cut(self) -> None:
@@ -350,11 +353,14 @@ class ConsoleApp(App[None]):
             told = "which one? move to the row of a stopped robot first" if stopped else "no robot is stopped"
             self.notify(told, severity="warning")
             return
-        number = stop.number
         self._open(
-            LiftQuestion(meant, lift_lines(stop)),
-            lambda _yes: self.run_worker(self._session.lift_stop(meant, number), exclusive=False),
+            LiftQuestion(meant, stop), lambda number: self.run_worker(self._lift(meant, number), exclusive=False)
         )
+
+    async def _lift(self, robot: str, number: int) -> None:
+        if not await self._session.lift_stop(robot, number):
+            self.notify(f"{robot} stays stopped: see the alarms", severity="warning")
+        self.redraw()
 
     async def _stop_robot(self, robot: str) -> None:
         if not await self._session.stop_robot(robot):
@@ -385,9 +391,7 @@ class ConsoleApp(App[None]):
 
     # ------------------------------------------------------------------ tables
     def action_panel(self, steps: int) -> None:
-        """Go to the next table; not while a dialog hides them."""
-        if len(self.screen_stack) > 1:
-            return
+        """Go to the next table."""
         names = list(PanelName)
         self.chosen = names[(names.index(self.chosen) + steps) % len(names)]
         if self.chosen not in FIXED:

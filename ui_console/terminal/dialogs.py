@@ -6,6 +6,7 @@ while a line is typed.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from typing import ClassVar, TypeVar
 
@@ -18,7 +19,8 @@ from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ui_console.terminal.keys import STOP_KEYS
-from ui_console.terminal.lines import Row
+from ui_console.terminal.lines import Row, lift_lines
+from ui_console.views import StopView
 
 T = TypeVar("T")
 CSS = """
@@ -29,6 +31,7 @@ Dialog OptionList { height: auto; max-height: 20; }
 Dialog VerticalScroll { height: auto; max-height: 100%; }
 Dialog .remark { color: $text-muted; }
 """
+READ_S = 0.5  # chosen: nobody reads a line faster
 FIELD_REMARK = "x and X stop robots here too; ctrl+x types an x"
 
 
@@ -128,19 +131,19 @@ class Question(Dialog[str]):
         self.answer(event.value)
 
 
-class LiftQuestion(Dialog[bool]):
-    """Ask whether a stop is to be lifted, by another key than the one that asked; answers True for that key.
+class LiftQuestion(Dialog[int]):
+    """Ask whether a stop is to be lifted, by another key than the one that asked; answers the number of that stop.
 
     Args:
         robot: Which robot.
-        lines: Whose stop it is, why, and what lifting it needs.
+        stop: The stop to lift, as it is now.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("l", "lift", "lift it")]
 
-    def __init__(self, robot: str, lines: Sequence[str]) -> None:
+    def __init__(self, robot: str, stop: StopView) -> None:
         super().__init__()
-        self._robot, self._lines = robot, lines
+        self._robot, self._stop, self._changed_s = robot, stop, -READ_S
 
     @property
     def subject(self) -> str:
@@ -151,8 +154,22 @@ class LiftQuestion(Dialog[bool]):
         """Lay out the question."""
         with Vertical() as box:
             box.border_title = f"lift the stop of {self._robot}?"
-            yield Static(Text("\n".join([*self._lines, "", "l: lift it   escape: leave it stopped"])))
+            yield Static(self._text(), id="stop")
+
+    def look(self, stop: StopView | None) -> None:
+        """Show the stop as it is now; close if there is none any more."""
+        if stop is None:
+            self.answer(None)
+            return
+        if stop.number != self._stop.number:
+            self._changed_s = asyncio.get_running_loop().time()
+        self._stop = stop
+        self.query_one("#stop", Static).update(self._text())
 
     def action_lift(self) -> None:
-        """Answer."""
-        self.answer(True)
+        """Answer, unless the stop has just become another one, which nobody can have read yet."""
+        if asyncio.get_running_loop().time() - self._changed_s >= READ_S:
+            self.answer(self._stop.number)
+
+    def _text(self) -> Text:
+        return Text("\n".join([*lift_lines(self._stop), "", "l: lift it   escape: leave it stopped"]))

@@ -231,7 +231,7 @@ def _slice_end(until_s: float, now_s: float) -> Iterator[str]:
     if until_s > now_s:
         yield f"{until_s - now_s:.1f} s left"
     elif now_s - until_s >= BEYOND_S:
-        yield f"{now_s - until_s:.0f} s beyond its slice"
+        yield "beyond its slice"
 
 
 def _node(node: NodeView, now_s: float) -> Text:
