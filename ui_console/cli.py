@@ -261,16 +261,8 @@ def design(
     new: Annotated[bool, typer.Option("--new", help="Begin from nothing, whatever the file holds.")] = False,
 ) -> None:
     """Build or change a mission file by keys, checked while you build it; nothing needs to be up."""
-    from backbone.mission.reader import MissionInvalid
-    from ui_console.design.draft import Draft
-
     _need_a_terminal("design", "an editor and scout-backbone check")
-    try:
-        draft = Draft.opened(file) if Path(file).exists() and not new else Draft.new(file)
-    except MissionInvalid as invalid:
-        say(str(invalid))
-        raise typer.Exit(ExitCode.MISSION_INVALID) from invalid
-    run(lambda: _design(draft))
+    run(lambda: _design(file, is_new=new or not Path(file).exists()))
 
 
 def main() -> None:
@@ -315,7 +307,7 @@ async def _drive_by_script(where: _Where, wished: dict[str, Any], user: str, giv
 async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -> int:
     from ui_console.gamepad import find_gamepad
     from ui_console.teleoperation import Teleoperation
-    from ui_console.terminal import app as screens
+    from ui_console.terminal import keys
     from ui_console.terminal.session import TerminalSession
 
     pad = find_gamepad() if looks.has_gamepad else None
@@ -325,7 +317,7 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
         launch.name,
         launch.mission,
         looks.user,
-        profile=screens.Profile(looks.profile),
+        profile=keys.Profile(looks.profile),
         is_bare=looks.is_bare,
         sees=sees,
         gamepad=pad,
@@ -333,11 +325,11 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
     bus = await _open_bus(launch, clock, secret)
     see = session.see if sees else None
     console = Teleoperation(launch, bus, clock, show=session.show, see=see, keeps_arc=True, user=looks.user)
-    _end_on_signals(console)
-    await session.run(console)
+    interrupted = _end_on_signals(console)
+    ended = await session.run(console)
     if console.refusal is not None and console.given_back is None:
         raise console.refusal
-    return ExitCode.DONE
+    return ExitCode.INTERRUPTED if interrupted() else ended
 
 
 async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
@@ -361,9 +353,9 @@ async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
 
     session = TerminalSession(launch.name, launch.mission, user, sees=False)
     console = Observer(launch, bus, clock, show=session.show, user=user)
-    _end_on_signals(console)
-    await session.run(console)
-    return ExitCode.DONE
+    interrupted = _end_on_signals(console)
+    ended = await session.run(console)
+    return ExitCode.INTERRUPTED if interrupted() else ended
 
 
 async def _look_once(where: _Where, user: str) -> int:
@@ -484,12 +476,32 @@ def _shown(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-async def _design(draft: Draft) -> int:
+async def _design(file: str, *, is_new: bool) -> int:
+    from backbone.mission.reader import MissionInvalid
+    from ui_console.design.draft import Draft
     from ui_console.design.look_up import look_up
     from ui_console.design.screen import DesignApp
 
-    await DesignApp(draft, look_up).run_async()
-    return ExitCode.DONE
+    try:
+        draft = Draft.new(file) if is_new else Draft.opened(file)
+    except MissionInvalid as invalid:
+        say(str(invalid))
+        return ExitCode.MISSION_INVALID
+    screen = DesignApp(draft, look_up)
+    await screen.run_async()
+    if screen.return_code:
+        _rescue(screen.draft)
+    return screen.return_code or ExitCode.DONE
+
+
+def _rescue(draft: Draft) -> None:
+    """Write what a designer that crashed had not saved beside the mission file."""
+    from ui_console.design.file import save
+
+    if draft.is_changed:
+        beside = Path(f"{draft.source}.rescued")
+        save(draft, beside, overwrite=True)
+        say(f"what was not saved is in {beside}")
 
 
 def _user() -> str:
