@@ -18,7 +18,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
-from backbone.component.messages import LifeState
+from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
@@ -354,7 +354,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.report(f"drives {robot}")
         if not again:
-            self.tell(robot, f"was taken over by {self.user}")
+            self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
