@@ -27,6 +27,7 @@ from backbone.operators import OperatorActed
 from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
+from backbone.spoken import counted
 from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope
 
@@ -129,7 +130,7 @@ class ConsoleObserver:
 
     def _heard_act(self, envelope: Envelope[Any]) -> None:
         act: OperatorActed = printable_all(envelope.body)
-        self._show_event(StoryEvent(act.at_s, envelope.source, act.sentence, act.subject, envelope.cause))
+        self._show_event(act.event(envelope.source, envelope.cause))
 
     def _heard_event(self, envelope: Envelope[Any]) -> None:
         self._show_event(printable_all(envelope.body))
@@ -186,4 +187,4 @@ def last_lines(outcome: Outcome) -> list[str]:
         lines.append("more than asking was needed: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
     if outcome.failure is not None:
         return [*lines, f"the mission failed: {outcome.failure}"]
-    return [*lines, f"down: {len(outcome.ended)} components ended, nothing is left"]
+    return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]
