@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import ExitCode, SecretFile, finite, read_secret_option, run, say
+from backbone.cli import ExitCode, SecretFile, finite, hub_endpoint, read_secret_option, run, say
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -57,7 +57,9 @@ class Profile(StrEnum):
 
 
 Mission = Annotated[str | None, typer.Option("--mission", help="Name of a mission that is up on this machine.")]
-Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")]
+Connect = Annotated[
+    str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
+]
 
 
 User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]

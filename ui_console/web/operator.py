@@ -179,7 +179,7 @@ class Operator:
         put("own", view_json(model.own(now_s)))
         put("robots", _encode(model.robots(now_s)))
         put("links", _encode(model.links(now_s)))
-        put("alarms", _encode(model.team.alarms.views()))
+        put("alarms", _encode(model.alarm_views()))
         put("drawn", msgspec.json.encode({robot: round(at, 3) for robot, at in sorted(self._latency_s.items())}))
         self.news.set()
 
