@@ -26,6 +26,9 @@ class OperatorAction(StrEnum):
     STOP_ROBOT = "stop_robot"  # emergency stop
     STOP_ALL = "stop_all"
     LIFT_STOP = "lift_stop"
+    ASK_LIFT = "ask_lift"  # asked who stopped a robot whether it may move again
+    LET_LIFT = "let_lift"  # let another operator lift the stop
+    KEEP_STOPPED = "keep_stopped"
     SET_PARAMETER = "set_parameter"
     ACKNOWLEDGE = "acknowledge"  # saw an alarm
     ASK_CONSENT = "ask_consent"  # asked an equal for a robot
@@ -48,6 +51,9 @@ _SENTENCES = {
     OperatorAction.STOP_ROBOT: "{user} stops it",
     OperatorAction.STOP_ALL: "{user} stops all",
     OperatorAction.LIFT_STOP: "{user} lifts its stop",
+    OperatorAction.ASK_LIFT: "{user} asks whether it may move again",
+    OperatorAction.LET_LIFT: "{user} says that it may move again",
+    OperatorAction.KEEP_STOPPED: "{user} keeps it stopped",
     OperatorAction.SET_PARAMETER: "{user} changes it",
     OperatorAction.ACKNOWLEDGE: "{user} has seen it",
     OperatorAction.ASK_CONSENT: "{user} asks for it",

@@ -38,15 +38,18 @@ from resource_pool.messages import (
     EmergencyStop,
     EmergencyStopped,
     Frame,
+    GivenBeforeStop,
     Halt,
     Jump,
     LiftStop,
     NoSuchAction,
     Noted,
+    OtherStop,
     Pose,
     Release,
     Resumed,
     SliceEnds,
+    Stopper,
     StopState,
     Suspended,
     Suspending,
@@ -55,6 +58,7 @@ from resource_pool.messages import (
     WantLonger,
     WantRuntime,
 )
+from resource_pool.stop_knowledge import StopKnowledge
 
 __all__ = [
     "DEFAULT_DRIVE_USAGE",
@@ -67,14 +71,17 @@ __all__ = [
     "AskPose",
     "EmergencyStopped",
     "Frame",
+    "GivenBeforeStop",
     "NoSuchAction",
     "NotMyArc",
     "Noted",
+    "OtherStop",
     "PathNode",
     "Pose",
     "Resumed",
     "SliceEnds",
     "StopState",
+    "Stopper",
     "Suspended",
     "Suspending",
     "SwappedOut",
@@ -136,6 +143,7 @@ class ArcClient:
         self._granted, self._suspended = asyncio.Event(), asyncio.Event()
         self._suspended.set()
         self._frames: Subscription | None = None
+        self._stops = StopKnowledge()
 
     @classmethod
     async def claim(
@@ -300,8 +308,9 @@ class ArcClient:
 
         Raises:
             SwappedOut: The ARC holds nothing now; nothing was sent.
+            EmergencyStopped: An operator stopped the robot, or did so before this command and after the one before.
         """
-        return await self._do(Drive(left_rad_s, right_rad_s))
+        return await self._move(Drive(left_rad_s, right_rad_s, self._last_stop()))
 
     async def halt(self) -> Applied:
         """Stop the wheels; see ``drive``."""
@@ -309,7 +318,14 @@ class ArcClient:
 
     async def jump(self) -> Applied:
         """Jump; see ``drive``."""
-        return await self._do(Jump())
+        return await self._move(Jump(self._last_stop()))
+
+    def heard_stop(self, state: StopState) -> bool:
+        """Take note that a robot was stopped or may move again; return whether that is news.
+
+        Whoever is told of a stop gives the next command knowing of it; a person has to be made aware of it first.
+        """
+        return self._stops.heard(state)
 
     def frames(self, listener: Callable[[Frame], None]) -> Subscription:
         """Call the listener with the newest picture of the current grant; those of earlier grants never arrive."""
@@ -452,6 +468,16 @@ class ArcClient:
     async def _lost(self) -> None:
         if self.granted is not None:
             await self.handle(Suspended(self.arc, "lost", self.arc, -1.0))
+
+    def _last_stop(self) -> int:
+        return self._stops.number(self.granted.rcs.get("scout", "")) if self.granted is not None else 0
+
+    async def _move(self, command: Drive | Jump) -> Applied:
+        try:
+            return await self._do(command)
+        except EmergencyStopped as stopped:
+            self._stops.refused(stopped)
+            raise
 
     async def _do(self, command: Message) -> Applied:
         return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)

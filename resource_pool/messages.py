@@ -49,10 +49,12 @@ class Drive(Message, frozen=True):
     Attributes:
         left_rad_s: Left wheel, forward is positive.
         right_rad_s: Right wheel.
+        after_stop: Number of the robot's last stop that whoever says this knows of; 0: of none.
     """
 
     left_rad_s: WheelSpeed
     right_rad_s: WheelSpeed
+    after_stop: Count = 0
 
 
 class Halt(Message, frozen=True):
@@ -60,7 +62,13 @@ class Halt(Message, frozen=True):
 
 
 class Jump(Message, frozen=True):
-    """Wind the spring foot and kick."""
+    """Wind the spring foot and kick.
+
+    Attributes:
+        after_stop: As for ``Drive``.
+    """
+
+    after_stop: Count = 0
 
 
 class WantIdle(Message, frozen=True):
@@ -258,6 +266,8 @@ class LoadPacket(Message, frozen=True):
             A robot RC that hangs must not keep its robot moving through the radio.
         afterwards: What is repeated after the packet was sent once, or has lasted its time; empty: what was before.
         kind: Which of the ARC's streams on the radio it is sent in; if it has none of that kind: its first.
+        moves: True: it moves the robot; it is not sent once a packet of a later stop was loaded.
+        robot_stop: Number of the robot's last stop when this was made.
     """
 
     arc: Mention
@@ -270,6 +280,8 @@ class LoadPacket(Message, frozen=True):
     afterwards: Payload = b""
     lasts_s: Duration = 0.0
     kind: Mention = "drive"
+    moves: bool = False
+    robot_stop: Count = 0
 
 
 class PacketLoaded(Message, frozen=True):
@@ -363,18 +375,32 @@ class AskStop(Message, frozen=True):
     """Is this robot stopped?"""
 
 
+class Stopper(Message, frozen=True):
+    """Somebody who stopped a robot.
+
+    Attributes:
+        by: Who, for people; without a name the address of the console.
+        console: Address of the console it was done by: whom to ask before the stop is lifted. Empty: not known.
+    """
+
+    by: Mention
+    console: Mention = ""
+
+
 class StopState(Message, frozen=True):
     """Answer to all three; also published as an event whenever it changes.
 
     Attributes:
         rc: The robot.
         is_stopped: True: drives and jumps are refused.
-        number: Of the stop in force, or of the last one; grows with each.
-        by: Who stopped it, or lifted the last stop.
+        number: Of the last order to stop; grows with each, also if the robot was stopped already.
+        by: Who stopped it first, or lifted the last stop.
         reason: As given.
         at_s: Mission time of the stop, or of its end.
         is_confirmed: False if the packet that stops the wheels could not be handed to the radio: nothing new moves
             the robot, and what moves it now ends by itself within ``COMMAND_TIMEOUT_S``.
+        console: Address of the console of whom ``by`` names.
+        also: Who else stopped it since it moved last.
     """
 
     rc: Mention
@@ -384,6 +410,8 @@ class StopState(Message, frozen=True):
     reason: Text
     at_s: Instant
     is_confirmed: bool = True
+    console: Mention = ""
+    also: Annotated[list[Stopper], FEW] = []
 
 
 EmergencyQuestion = EmergencyStop | LiftStop | AskStop
@@ -401,6 +429,7 @@ class RadioPacket(Message, frozen=True):
         epoch: For the audit: the robot's epoch under which the payload was made.
         number: Of the packet among those of its radio since it was opened.
         air_time_s: How long its bits take.
+        robot_stop: For the audit: number of the robot's last stop when the payload was made.
     """
 
     radio: Mention
@@ -410,6 +439,7 @@ class RadioPacket(Message, frozen=True):
     epoch: Epoch = 0
     number: Count = 0
     air_time_s: Duration = 0.0
+    robot_stop: Count = 0
 
 
 class AskWorld(Message, frozen=True):
@@ -529,10 +559,20 @@ class ImpossibleUse(Refusal):
 
 
 class EmergencyStopped(Refusal):
-    """An operator stopped the robot; facts: ``rc``, ``number``, ``by``, ``reason``, ``since_s``. Nothing moved."""
+    """An operator stopped the robot; nothing moved.
+
+    Facts: ``rc``, ``number``, ``is_stopped``, ``by``, ``reason``, ``since_s``.
+    """
 
     code = "scout.emergency_stop"
     remedy = "See that the robot may move, then lift the stop at a console; the grant is not lost meanwhile."
+
+
+class GivenBeforeStop(EmergencyStopped):
+    """The command was given without knowing of the robot's last stop, which was lifted since; facts as there."""
+
+    code = "scout.given_before_stop"
+    remedy = "Give the command anew, now that you know of the stop: let go of the control and press it again."
 
 
 class OtherStop(Refusal):

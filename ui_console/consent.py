@@ -1,28 +1,37 @@
-"""May I? Who waits for a robot asks the operator who holds it; nobody has to wait for a turn that is not needed.
+"""May I? One operator asks another: to have the robot they hold, or to lift the stop they set.
 
 Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments.
 
-* An asker has at most one question open here; questions are answered in the order in which they came.
-* Each question gets exactly one answer. Without one in time it is a no: the scheduler's rule goes on as before.
-* A yes gives the robot back, so it answers only the first question; the others hear who was let have it.
-* A robot that is given back anyway is a yes to everybody; one that is lost to somebody else is a no.
+* An asker has at most one question of a topic open here; questions are answered in the order in which they came.
+* Each question gets exactly one answer. Without one in time it is a no: everything goes on as before.
+* A yes that gives the robot back answers only the first question for it; the others hear who was let have it.
+* A robot that is given back anyway is a yes to everybody who wants it; one that is lost to somebody else is a no.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Annotated
 
 import msgspec
 
 from backbone.errors import Refusal
+from backbone.naming import Subsystem
 from backbone.ranges import Line, Mention
 from backbone.wire import Message
 
 CONSENT_WITHIN_S = 8.0  # chosen: to look up from driving, read a line and press a key; a turn is shorter or as long
 MOST_OPEN = 8  # chosen: more people than share one robot
 MAX_WHY = 200  # chosen: a line a driver reads at a glance
+
+
+class Topic(StrEnum):
+    """What may be asked for."""
+
+    TAKE = "take"  # to have the robot
+    LIFT = "lift"  # to let it move again
 
 
 class AskConsent(Message, frozen=True):
@@ -43,7 +52,7 @@ class Consent(Message, frozen=True):
     """Answer to ``AskConsent``.
 
     Attributes:
-        is_given: True: it is being given back.
+        is_given: True: it is being given back, or may move.
         user: Who decided.
         reason: For people; empty: none was said.
     """
@@ -75,10 +84,25 @@ class NobodyToAsk(Refusal):
 
 
 class NotAnOperator(Refusal):
-    """Something else than a console asked for a robot."""
+    """Something else than a console asked a person."""
 
     code = "consent.not_an_operator"
     remedy = "Claim the robot; the RC manager decides between programs."
+
+
+def is_console(address: str) -> bool:
+    """Return whether an operator sits at this address."""
+    return address.startswith(f"{Subsystem.UI_CONSOLE}/")
+
+
+def require_console(asked: str, asker: str) -> None:
+    """Return if an operator asks.
+
+    Raises:
+        NotAnOperator: The asker is no console.
+    """
+    if not is_console(asker):
+        raise NotAnOperator(f"{asked} is asked by operators only, not by {asker}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +115,7 @@ class Sought:
         robot: What it is about.
         why: For people.
         until_s: It is a no from then on.
+        topic: What is asked for.
     """
 
     asker: str
@@ -98,6 +123,7 @@ class Sought:
     robot: str
     why: str
     until_s: float
+    topic: Topic = Topic.TAKE
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,29 +151,32 @@ class ConsentDesk:
         return tuple(self._open)
 
     def seek(self, asker: str, asked: AskConsent, now_s: float, within_s: float = CONSENT_WITHIN_S) -> Sought:
+        """Open a question for the robot that is held here; see ``open_question``."""
+        return self.open_question(Sought(asker, asked.user, asked.robot, asked.why, now_s + within_s))
+
+    def open_question(self, sought: Sought) -> Sought:
         """Open a question.
 
         Raises:
-            AskedAlready: One of this asker is open.
+            AskedAlready: One of this asker on this topic is open.
             TooManyAsk: ``MOST_OPEN`` are.
         """
-        if any(one.asker == asker for one in self._open):
-            raise AskedAlready(f"{asker} has asked already", asker=asker)
+        if any((one.asker, one.topic) == (sought.asker, sought.topic) for one in self._open):
+            raise AskedAlready(f"{sought.asker} has asked already", asker=sought.asker)
         if len(self._open) >= MOST_OPEN:
             raise TooManyAsk(f"{self._user} is being asked by {MOST_OPEN} already")
-        sought = Sought(asker, asked.user, asked.robot, asked.why, now_s + within_s)
         self._open.append(sought)
         return sought
 
     def decide(self, is_given: bool, reason: str = "") -> list[Settled]:
-        """Answer the first question, and with a yes all others; return what was settled, none if none was open."""
+        """Answer the first question; if it gives the robot away, all others for it too; return what was settled."""
         if not self._open:
             return []
         first, others = self._open[0], self._open[1:]
         settled = [Settled(first, Consent(is_given, self._user, reason))]
-        self._open = [] if is_given else others
-        if is_given:
-            settled += [Settled(one, Consent(False, self._user, f"{first.user} may have it")) for one in others]
+        self._open = others
+        if is_given and first.topic is Topic.TAKE:
+            settled += self._close_takes(Consent(False, self._user, f"{first.user} may have it"))
         return settled
 
     def expire(self, now_s: float) -> list[Settled]:
@@ -157,7 +186,10 @@ class ConsentDesk:
         return [Settled(one, Consent(False, self._user, "no answer")) for one in late]
 
     def ended(self, is_given: bool, reason: str) -> list[Settled]:
-        """Settle all: nothing is held here any more."""
-        settled = [Settled(one, Consent(is_given, self._user, reason)) for one in self._open]
-        self._open = []
+        """Settle all who want the robot: nothing is held here any more."""
+        return self._close_takes(Consent(is_given, self._user, reason))
+
+    def _close_takes(self, consent: Consent) -> list[Settled]:
+        settled = [Settled(one, consent) for one in self._open if one.topic is Topic.TAKE]
+        self._open = [one for one in self._open if one.topic is not Topic.TAKE]
         return settled

@@ -12,7 +12,7 @@ from typing import Any
 
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal, code_of
-from backbone.naming import Subsystem, component_of
+from backbone.naming import component_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Schedule
@@ -21,17 +21,16 @@ from ui_console.consent import (
     MAX_WHY,
     AskConsent,
     Consent,
-    ConsentDesk,
     NobodyToAsk,
-    NotAnOperator,
     Settled,
+    Topic,
+    is_console,
+    require_console,
 )
 from ui_console.console_events import (
     CommandRefused,
     ConsentAsked,
     ConsentHeard,
-    ConsentSettled,
-    ConsentSought,
     LinkTrouble,
 )
 from ui_console.feed import REPLY_TIME_S
@@ -65,8 +64,7 @@ class ConsentTalk:
 
     def __init__(self, console: Observer[Any], give_back: Callable[[str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
-        self._desk = ConsentDesk(console.user)
-        self._answers: dict[str, asyncio.Future[Consent]] = {}
+        console.answers.yield_robot = self._begin_to_yield
         self._unanswered = 0
 
     # ------------------------------------------------------------------ who waits
@@ -118,7 +116,7 @@ class ConsentTalk:
         arcs = {arc for one in schedule.requests if one.arc == claim.arc for arc in one.blockers}
         arcs |= {holder.arc for rc in schedule.rcs if rc.rc == claim.robot for holder in rc.holders}
         blockers = {owners[arc] for arc in arcs - {claim.arc} if arc in owners}
-        consoles = sorted(at for at in blockers if _is_console(at) and at != console.address)
+        consoles = sorted(at for at in blockers if is_console(at) and at != console.address)
         if not consoles:
             names = ", ".join(sorted(map(component_of, blockers))) or "nobody"
             raise NobodyToAsk(f"no operator stands in the way of {console.user}, but {names}")
@@ -152,59 +150,17 @@ class ConsentTalk:
 
         Raises:
             NotAnOperator: The asker is no console.
-            Refusal: See ``ConsentDesk.seek``.
+            Refusal: See ``ConsentDesk.open_question``.
         """
-        console = self._console
-        if not _is_console(asker):
-            raise NotAnOperator(f"{console.name} is asked for its robot by operators only, not by {asker}")
+        require_console(self._console.name, asker)
         if at_once is not None:
             return at_once
-        within_s = CONSENT_WITHIN_S * console.clock.rate
-        sought = self._desk.seek(asker, asked, console.clock.now_s(), within_s)
-        answer: asyncio.Future[Consent] = asyncio.get_running_loop().create_future()
-        self._answers[asker] = answer
-        console.show(ConsentSought(console.clock.now_s(), sought))
-        try:
-            async with asyncio.timeout(CONSENT_WITHIN_S):
-                return await answer
-        except TimeoutError:
-            self._settle(self._desk.expire(max(console.clock.now_s(), sought.until_s)))
-            return Consent(False, console.user, "no answer")
+        return await self._console.answers.seek(asker, asked.user, asked.robot, asked.why, Topic.TAKE)
 
-    def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer who asks for the robot; with a yes it is given back."""
-        settled = self._desk.decide(is_given, reason)
-        if not settled:
-            return
-        asker = settled[0].sought
-        action = OperatorAction.CONSENT if is_given else OperatorAction.DECLINE
-        self._console.acted(action, asker.robot, f"asked by {asker.user}{f', {reason}' if reason else ''}")
-        if is_given:
-            self._console.start_task(self._yield_to(settled), "consent")
-        else:
-            self._settle(settled)
-
-    def ended(self, is_given: bool, reason: str) -> None:
-        """Answer all who ask: nothing is held any more.
-
-        Args:
-            is_given: True: it was given back; False: somebody else has it now.
-            reason: For people.
-        """
-        self._settle(self._desk.ended(is_given, reason))
+    def _begin_to_yield(self, settled: list[Settled]) -> None:
+        self._console.start_task(self._yield_to(settled), "consent")
 
     async def _yield_to(self, settled: list[Settled]) -> None:
         """Give the robot back, then say so: who was let have it finds it free."""
         await self._give_back(f"{settled[0].sought.user} may have it")
-        self._settle(settled)
-
-    def _settle(self, settled: list[Settled]) -> None:
-        for one in settled:
-            answer = self._answers.pop(one.sought.asker, None)
-            if answer is not None and not answer.done():
-                answer.set_result(one.consent)
-            self._console.show(ConsentSettled(self._console.clock.now_s(), one))
-
-
-def _is_console(address: str) -> bool:
-    return address.startswith(f"{Subsystem.UI_CONSOLE}/")
+        self._console.answers.settle(settled)

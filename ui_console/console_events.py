@@ -5,6 +5,7 @@ Rules of this file: no bus, no clock, no screen. Times are mission seconds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +18,7 @@ from backbone.health import MissionHealth
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import Leases, Schedule, Why
 from resource_pool.arc_client import StopState
-from ui_console.consent import Settled, Sought
+from ui_console.consent import Settled, Sought, Topic
 
 
 # ---------------------------------------------------------------------- of its own robot
@@ -115,11 +116,47 @@ class LinkTrouble:
 
 @dataclass(frozen=True, slots=True)
 class GivenBack:
-    """The robot was given back; ``confirmed`` is False if nobody confirmed it."""
+    """The robot was given back.
+
+    Attributes:
+        at_s: When.
+        reason: Why.
+        confirmed: False if nobody confirmed it.
+        wanted: False if the operator did not ask for it: a robot that is lost.
+    """
 
     at_s: float
     reason: str
     confirmed: bool
+    wanted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class RobotLost:
+    """A robot went from this operator before this console could know: a page that slept, a link that was cut.
+
+    Attributes:
+        at_s: When.
+        robot: Which.
+        why: For people.
+    """
+
+    at_s: float
+    robot: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class LetGoNeeded:
+    """A control that is held moves nothing before it is let go, or no longer so.
+
+    Attributes:
+        at_s: When.
+        is_needed: True: let go, then press anew.
+    """
+
+    at_s: float
+    is_needed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,19 +191,21 @@ class Attention:
 
 @dataclass(frozen=True, slots=True)
 class ConsentAsked:
-    """This console asked whether it may have what others hold.
+    """This console asked whether it may have what others hold, or lift what others stopped.
 
     Attributes:
         at_s: When.
         robot: What it is about.
-        of: Names of the consoles that were asked.
+        of: Names of those who were asked.
         until_s: Silence is a no from then on.
+        topic: What was asked for.
     """
 
     at_s: float
     robot: str
     of: Sequence[str]
     until_s: float
+    topic: Topic = Topic.TAKE
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,8 +216,9 @@ class ConsentHeard:
         at_s: When.
         robot: What it was about.
         user: Who decided.
-        is_given: True: it is being given back.
+        is_given: True: it is being given back, or may move.
         reason: For people.
+        topic: What was asked for.
     """
 
     at_s: float
@@ -186,11 +226,12 @@ class ConsentHeard:
     user: str
     is_given: bool
     reason: str
+    topic: Topic = Topic.TAKE
 
 
 @dataclass(frozen=True, slots=True)
 class ConsentSought:
-    """Another console asks for what this one holds."""
+    """Another console asks for what this one holds, or to lift what its operator stopped."""
 
     at_s: float
     sought: Sought
@@ -327,11 +368,13 @@ class LinkHeard:
         at_s: When.
         is_up: Whether messages pass.
         latency_s: There and back, seconds of the machine; negative: not measured now.
+        until_s: The link counts as down if nothing more was heard of it by then.
     """
 
     at_s: float
     is_up: bool
     latency_s: float = -1.0
+    until_s: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -376,6 +419,8 @@ OwnEvent = (
     | CommandRefused
     | LinkTrouble
     | GivenBack
+    | RobotLost
+    | LetGoNeeded
     | PictureSeen
     | WhyHeard
     | Attention
@@ -409,6 +454,8 @@ _WORDS: dict[type[Any], str] = {
     CommandRefused: "refused",
     LinkTrouble: "no_answer",
     GivenBack: "released",
+    RobotLost: "lost",
+    LetGoNeeded: "let_go",
     PictureSeen: "picture",
     WhyHeard: "why",
     Attention: "attention",

@@ -14,10 +14,10 @@ from typing import cast, get_args
 
 import msgspec
 
-from backbone.naming import component_of
-from resource_pool.arc_client import EmergencyStopped
+from backbone.naming import Subsystem, component_of
+from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
 from ui_console.alarms import AlarmBook
-from ui_console.consent import Sought
+from ui_console.consent import Sought, Topic
 from ui_console.console_events import (
     Asked,
     Attention,
@@ -30,13 +30,16 @@ from ui_console.console_events import (
     ConsoleEvent,
     GivenBack,
     Granted,
+    LetGoNeeded,
     LinkTrouble,
     Lost,
     OwnEvent,
     PictureSeen,
+    RobotLost,
     TeamEvent,
     WhyHeard,
 )
+from ui_console.lifting import question_line
 from ui_console.losses import WANTED, why_lost
 from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.views import (
@@ -47,6 +50,7 @@ from ui_console.views import (
     ConsoleView,
     LinkView,
     LogRow,
+    LostView,
     OwnView,
     RobotView,
     VideoView,
@@ -55,6 +59,8 @@ from ui_console.views import (
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
+UNRENEWED = ("lost", "lease")  # reasons of a loss that nobody decided
+ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 _TEAM_EVENTS = get_args(TeamEvent)
 
@@ -90,8 +96,11 @@ class ConsoleModel:
         self.applied: CommandApplied | None = None
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
+        self._address = f"{Subsystem.UI_CONSOLE}/{name}"
         self._pictures: dict[str, deque[PictureSeen]] = {}
-        self._sought: dict[str, Sought] = {}
+        self._sought: dict[tuple[str, Topic], Sought] = {}
+        self._must_let_go = False
+        self._went: RobotLost | None = None
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
         self._blind = ""  # robot that is held without pictures to drive by
@@ -134,6 +143,10 @@ class ConsoleModel:
             return 0
         return self.team.alarms.acknowledge(self.user, keys) + self.alarms.acknowledge(self.user, keys)
 
+    def dismiss_lost(self) -> None:
+        """This console's user knows that a robot was lost, and does not want it back."""
+        self._went = None
+
     # ------------------------------------------------------------------ views out
     def view(self, now_s: float) -> ConsoleView:
         """Return all that there is to show."""
@@ -160,22 +173,26 @@ class ConsoleModel:
     def own(self, now_s: float) -> OwnView:
         """Return what this console wants and has."""
         held = self.held
+        link_down_s = self.team.link_down_s(now_s)
         return OwnView(
             console=self.name,
             user=self.user,
             robot=self.robot,
-            is_held=held is not None,
+            is_held=self._is_held(now_s),
             is_asked=self.asked is not None,
             status=self.status_line(now_s),
             epoch=max(held.epochs.values(), default=0) if held is not None else 0,
             until_s=held.until_s if held is not None else NONE_S,
             taken_because=self._why_lost(self.lost) if self.lost is not None else "",
             applied=_applied_line(self.applied),
-            stop=self.team.stop_view(self.robot, now_s) if held is not None else None,
+            stop=self.team.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
             asked=self.asked_line(now_s),
             other_screens=self.other_screens(),
+            must_let_go=self._must_let_go and held is not None,
+            lost=self._lost_view(now_s),
+            link_down_s=link_down_s,
         )
 
     def other_screens(self) -> list[str]:
@@ -188,25 +205,41 @@ class ConsoleModel:
         if not self._sought:
             return None
         first, *others = self._sought.values()
-        return ConsentView(first.user, first.robot, first.why, max(0.0, first.until_s - now_s), len(others))
+        return ConsentView(
+            user=first.user,
+            robot=first.robot,
+            why=first.why,
+            left_s=max(0.0, first.until_s - now_s),
+            others=len(others),
+            topic=first.topic,
+            line=_question_line(first),
+        )
 
     def asked_line(self, now_s: float) -> str:
         """Return in one line what came of asking others for their consent; empty: nobody was asked."""
         asked = self._asked_whom
         if asked is None:
             return ""
+        if asked.topic is Topic.LIFT and now_s > asked.until_s + ANSWER_SHOWN_S:
+            return ""
         said = [self._answer_line(heard) for heard in self._heard]
         if len(said) < len(asked.of):
+            what = asked.robot if asked.topic is Topic.TAKE else f"leave to lift the stop of {asked.robot}"
             whom, left_s = ", ".join(map(self.team.person, asked.of)), max(0.0, asked.until_s - now_s)
-            said.append(f"asked {whom} for {asked.robot}: {left_s:.0f} s left")
+            said.append(f"asked {whom} for {what}: {left_s:.0f} s left")
         return "; ".join(said)
 
     def robots(self, now_s: float) -> list[RobotView]:
         """Return one row for each robot, sorted by name; this console's own and its pictures are marked."""
         videos = {video.robot: video for video in self.videos(now_s)}
-        mine = self.robot if self.held is not None else ""
+        mine = self.robot if self._is_held(now_s) else ""
         return [
-            msgspec.structs.replace(row, is_mine=row.robot == mine, video=videos.get(row.robot))
+            msgspec.structs.replace(
+                row,
+                is_mine=row.robot == mine,
+                video=videos.get(row.robot),
+                stop=self.team.stop_view(row.robot, now_s, self.user, self._address),
+            )
             for row in self.team.robots(now_s)
         ]
 
@@ -228,6 +261,10 @@ class ConsoleModel:
 
     def status_line(self, now_s: float) -> str:
         """Return in one line whether this console has its robot, and if not, why."""
+        down_s = self.team.link_down_s(now_s)
+        if down_s >= 0:
+            mine = f"; {self.robot} is given back there by itself" if self.held is not None else ""
+            return f"NO LINK to the mission for {now_s - down_s:.0f} s: nothing can be stopped from here{mine}"
         if self.held is not None:
             stop = self.team.stop_of(self.robot)
             if stop is not None:
@@ -253,17 +290,24 @@ class ConsoleModel:
             case ConsentHeard():
                 self._heard.append(event)
             case ConsentSought(sought=sought):
-                self._sought[sought.asker] = sought
+                self._sought[sought.asker, sought.topic] = sought
             case ConsentSettled(settled=settled):
-                self._sought.pop(settled.sought.asker, None)
+                self._sought.pop((settled.sought.asker, settled.sought.topic), None)
+            case LetGoNeeded(is_needed=is_needed):
+                self._must_let_go = is_needed
+            case RobotLost():
+                self._went = event
             case Asked(robot=robot):
-                self._asked_whom = None
+                self._asked_whom = self._went = None
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
+                self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s):
                 self.held, self.lost = None, event
+                if event.reason in UNRENEWED:
+                    self._went = RobotLost(at_s, self.robot, "the link to it was away for too long")
                 self._pictures.clear()
                 if event.reason != WANTED:
                     line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
@@ -271,13 +315,14 @@ class ConsoleModel:
             case CommandApplied():
                 self.applied = event
             case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
-                if code != EmergencyStopped.code:  # that one is an alarm of its own
+                if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
                         AlarmKind.REFUSED, self.robot, f"refused: {detail}", at_s, remedy, f"refused:{code}"
                     )
             case LinkTrouble(at_s=at_s, detail=detail):
                 alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
-            case GivenBack(at_s=at_s, confirmed=confirmed):
+            case GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
+                self._went = None if wanted else RobotLost(at_s, self.robot, reason)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:
@@ -297,9 +342,22 @@ class ConsoleModel:
         return why_lost(lost.reason, self.team.person(lost.by))
 
     def _answer_line(self, heard: ConsentHeard) -> str:
-        word = "lets you have" if heard.is_given else "keeps"
-        reason = f": {self.team.people.named(heard.reason)}" if heard.reason else ""
-        return f"{self.team.person(heard.user)} {word} {heard.robot}{reason}"
+        who, reason = self.team.person(heard.user), f": {self.team.people.named(heard.reason)}" if heard.reason else ""
+        if heard.topic is Topic.LIFT:
+            what = f"lets {heard.robot} move" if heard.is_given else f"keeps {heard.robot} stopped"
+            return f"{who} {what}{reason}"
+        return f"{who} {'lets you have' if heard.is_given else 'keeps'} {heard.robot}{reason}"
+
+    def _is_held(self, now_s: float) -> bool:
+        """Return whether keys move a robot, as far as can be known now."""
+        return self.held is not None and self.team.link_down_s(now_s) < 0
+
+    def _lost_view(self, now_s: float) -> LostView | None:
+        went = self._went
+        if went is None:
+            return None
+        is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots(now_s))
+        return LostView(went.robot, went.why, went.at_s, is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:
         """Return what is wrong with the pictures of the robot that is held; empty if nothing is."""
@@ -319,6 +377,12 @@ def _video(robot: str, seen: deque[PictureSeen], now_s: float) -> VideoView:
     span_s = newest.at_s - seen[0].at_s
     rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
     return VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
+
+
+def _question_line(sought: Sought) -> str:
+    if sought.topic is Topic.LIFT:
+        return question_line(sought.user, sought.robot, sought.why)
+    return f"{sought.user} asks for {sought.robot}{f': {sought.why}' if sought.why else ''}"
 
 
 def _applied_line(applied: CommandApplied | None) -> str:

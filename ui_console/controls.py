@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
-from ui_console.console_events import CommandApplied, CommandRefused, LinkTrouble
+from resource_pool.arc_client import EmergencyStopped
+from ui_console.console_events import CommandApplied, CommandRefused, LetGoNeeded, LinkTrouble
 from ui_console.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ class Controls:
         self._console = console
         self._dead_man, self._span = DeadMan(), DriveSpan()
         self._pressed = asyncio.Event()
+        self._is_held_back = False
         self._arc: ArcClient | None = None
         self._is_on = False
 
@@ -37,7 +39,7 @@ class Controls:
 
     def switch_off(self) -> None:
         """Keys mean nothing until ``connect``, also those that are held down; single commands still go."""
-        self.release()
+        self.require_let_go()
         self._is_on = False
 
     def disconnect(self) -> None:
@@ -45,9 +47,10 @@ class Controls:
         self.switch_off()
         self._arc = None
 
-    def release(self) -> None:
-        """Forget what is held down; whoever takes the robot away has stopped it."""
-        self._dead_man = DeadMan()
+    def require_let_go(self) -> None:
+        """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop."""
+        self._dead_man.require_let_go()
+        self._pressed.set()
 
     # ------------------------------------------------------------------ the hands
     def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
@@ -60,8 +63,14 @@ class Controls:
         self._dead_man.press(drive, asyncio.get_running_loop().time(), lasts_s)
         self._pressed.set()
 
+    def press_jump(self) -> bool:
+        """The key for one jump is down; return whether that counts."""
+        counts = self._dead_man.press_jump(asyncio.get_running_loop().time())
+        self._pressed.set()
+        return counts
+
     def stop(self) -> None:
-        """Stop the wheels now."""
+        """Stop the wheels now; sticks, pads and pages say by this that they were let go."""
         self._dead_man.stop()
         self._pressed.set()
 
@@ -70,14 +79,27 @@ class Controls:
         loop = asyncio.get_running_loop()
         while True:
             self._pressed.clear()
+            self._tell_held_back(loop.time())
             command = self._dead_man.due(loop.time())
             if command is not None and self._is_on and self._arc is not None and self._arc.granted is not None:
                 await self.do(command)
             try:
-                async with asyncio.timeout_at(self._dead_man.next_s):
+                async with asyncio.timeout_at(self._next_s()):
                     await self._pressed.wait()
             except TimeoutError:
                 continue
+
+    def _next_s(self) -> float | None:
+        """Return when something is to be sent or told next, if nothing is pressed; None: not before a press."""
+        times = [self._dead_man.next_s, self._dead_man.let_go_s if self._is_held_back else None]
+        return min((at_s for at_s in times if at_s is not None), default=None)
+
+    def _tell_held_back(self, loop_s: float) -> None:
+        """Let the operator know when a control that is held has to be let go, and when it was."""
+        is_held_back = self._dead_man.is_held_back(loop_s)
+        if is_held_back is not self._is_held_back:
+            self._is_held_back = is_held_back
+            self._console.show(LetGoNeeded(self._console.clock.now_s(), is_held_back))
 
     async def do(self, command: Command) -> bool:
         """Have one command carried out and tell what became of it; return True if it was applied."""
@@ -94,9 +116,12 @@ class Controls:
                 case Jump():
                     applied = await self._arc.jump()
         except Refusal as refusal:
+            if isinstance(refusal, EmergencyStopped):
+                self.require_let_go()
             show(CommandRefused(now_s(), code_of(refusal), refusal.detail, refusal.remedy))
             return False
         except LinkError as error:
+            self.require_let_go()  # whoever is cut off for a moment does not see what the robot would do next
             show(LinkTrouble(now_s(), str(error)))
             return False
         took_s = time.perf_counter() - wanted_s

@@ -12,6 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from ui_console.grip import Grip
+
 FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
 REPEATED_HOLD_S = (0.15, FIRST_HOLD_S)  # chosen: bounds of the hold once the rhythm of the repeats is known
 HOLD_INTERVALS = 3.0  # chosen: two lost repeats are bridged
@@ -113,7 +115,8 @@ class DriveSpan:
 class DeadMan:
     """Turns key presses into commands that repeat while a key is held, and one halt after it.
 
-    Laws: a command is due only within the hold of a press; every drive is followed by a halt.
+    Laws: a command is due only within the hold of a press; every drive is followed by a halt; from ``require_let_go``
+    on a control that is held moves nothing until it was let go and pressed anew.
     """
 
     def __init__(self) -> None:
@@ -121,9 +124,11 @@ class DeadMan:
         self._pressed_s = self._until_s = self._next_s = 0.0
         self._repeats = 0
         self._must_halt = False
+        self._keys, self._stick, self._jump = Grip(), Grip(), Grip()
 
-    def press(self, drive: Drive, now_s: float, lasts_s: float | None = None) -> None:
-        """A key is down, for the first time or again.
+    # ------------------------------------------------------------------ the hands
+    def press(self, drive: Drive, now_s: float, lasts_s: float | None = None) -> bool:
+        """A key is down, for the first time or again; return whether that counts.
 
         Args:
             drive: What it stands for.
@@ -131,6 +136,9 @@ class DeadMan:
             lasts_s: How long that counts, for what says so again and again while it is held and tells when it is let
                 go; None: for a key, whose rhythm is found out.
         """
+        grip, silence_s = (self._keys, FIRST_HOLD_S) if lasts_s is None else (self._stick, lasts_s)
+        if not grip.press(now_s, silence_s):
+            return False
         if lasts_s is not None:
             if self._held is None or now_s >= self._until_s:
                 self._next_s = now_s
@@ -144,11 +152,32 @@ class DeadMan:
             self._repeats, hold_s, self._next_s = 0, FIRST_HOLD_S, now_s
         self._held, self._pressed_s, self._until_s = drive, now_s, now_s + hold_s
         self._must_halt = False  # what is held now comes in its place, and ends with one
+        return True
+
+    def press_jump(self, now_s: float) -> bool:
+        """The key or button for one jump is down, for the first time or again; return whether that counts."""
+        return self._jump.press(now_s, FIRST_HOLD_S)
 
     def stop(self) -> None:
-        """Nothing is held any more: a halt is due at once, also if nothing was."""
-        self._held, self._must_halt = None, True
+        """Nothing is held any more: a halt is due at once, also if nothing was.
 
+        A stick, pad or page says by this that it was let go; keys show it by a pause.
+        """
+        self._held, self._must_halt = None, True
+        self._stick.let_go()
+
+    def require_let_go(self) -> None:
+        """From now on presses move nothing until the control was let go; what is held now ends with a halt."""
+        self._must_halt = self._must_halt or self._held is not None
+        self._held = None
+        for grip in self._grips:
+            grip.require_let_go()
+
+    def is_held_back(self, now_s: float) -> bool:
+        """Return whether a control is held that has to be let go before it moves anything."""
+        return any(grip.is_held_back(now_s) for grip in self._grips)
+
+    # ------------------------------------------------------------------ what is to be sent
     def due(self, now_s: float) -> Drive | Halt | None:
         """Return the command to send now, if one is due; asking counts as sending."""
         if self._held is not None and now_s >= self._until_s:
@@ -167,3 +196,12 @@ class DeadMan:
         if self._must_halt:
             return 0.0
         return None if self._held is None else min(self._next_s, self._until_s)
+
+    @property
+    def let_go_s(self) -> float | None:
+        """When every control that is held back counts as let go if it stays silent; None: none is held back."""
+        return max((at_s for grip in self._grips if (at_s := grip.let_go_s) is not None), default=None)
+
+    @property
+    def _grips(self) -> tuple[Grip, Grip, Grip]:
+        return self._keys, self._stick, self._jump

@@ -1,7 +1,8 @@
 """The feed of a console: listens to what exists on the bus and hands it to the pure model as events.
 
 One feed serves any number of views in a process. It claims nothing, asks little (who is there, once; what a round trip
-takes and what the radios counted, every ``PULSE_S``), and carries out an operator's verbs that need no grant.
+takes every ``LINK_EVERY_S``, what the radios counted every ``PULSE_S``), and carries out an operator's verbs that need
+no grant.
 """
 
 from __future__ import annotations
@@ -72,6 +73,8 @@ from ui_console.team_model import ROBOT_KIND
 log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
+LINK_FRESH_S = 1.0  # chosen: nothing that is shown is older without saying so; machine seconds
+LINK_EVERY_S = 0.3  # chosen: two answers may be lost before what is shown counts as old; machine seconds
 PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and asking costs nothing to speak of; machine seconds
 
 FeedEvent = TeamEvent | LinkTrouble | CommandRefused
@@ -115,6 +118,7 @@ class ConsoleFeed:
         """Ask for how things are, now and whenever the link is back, and feel the mission's pulse; until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._list_when_due(), name="feed:list")
+            group.create_task(self._feel_link(), name="feed:link")
             group.create_task(self._feel_pulse(), name="feed:pulse")
 
     # ------------------------------------------------------------------ verbs of an operator
@@ -138,6 +142,19 @@ class ConsoleFeed:
             self._trouble(error)
             return self.robots
         return self.robots | {component_of(component.address) for component in listing.components}
+
+    async def ask_stop(self, robot: str) -> StopState | None:
+        """Return whether an operator's stop keeps the robot from moving; None: its RC did not say."""
+        try:
+            stop = await ask_stop(self._bus, robot)
+        except Refusal as refusal:
+            self._refused(refusal)
+            return None
+        except LinkError as error:
+            self._trouble(error)
+            return None
+        self._show(StopHeard(self._clock.now_s(), stop))
+        return stop
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again; return whether it may."""
@@ -253,20 +270,29 @@ class ConsoleFeed:
         else:
             self._show(StopHeard(self._clock.now_s(), stop))
 
+    async def _feel_link(self) -> None:
+        while True:
+            await self._clock.sleep_s(LINK_EVERY_S * self._clock.rate)
+            await self._measure_link()
+
     async def _feel_pulse(self) -> None:
         while True:
             await self._clock.sleep_s(PULSE_S * self._clock.rate)
-            await asyncio.gather(self._measure_link(), *map(self._count, sorted(self._radios)))
+            await asyncio.gather(*map(self._count, sorted(self._radios)))
 
     async def _measure_link(self) -> None:
         asked_s = time.perf_counter()
         try:
-            await self._bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
+            await self._bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=LINK_FRESH_S)
         except LinkError as error:
             log.info("the hub did not answer: %s", error)
             self._show(LinkHeard(self._clock.now_s(), False))
         else:
-            self._show(LinkHeard(self._clock.now_s(), self._is_up, time.perf_counter() - asked_s))
+            self._show_link(time.perf_counter() - asked_s)
+
+    def _show_link(self, latency_s: float = -1.0) -> None:
+        now_s = self._clock.now_s()
+        self._show(LinkHeard(now_s, self._is_up, latency_s, now_s + LINK_FRESH_S * self._clock.rate))
 
     async def _count(self, radio: str) -> None:
         address = f"{Subsystem.RESOURCE_POOL}/{radio}"
@@ -332,7 +358,7 @@ class ConsoleFeed:
 
     def _heard_link(self, is_up: bool) -> None:
         came_back, self._is_up = is_up and not self._is_up, is_up
-        self._show(LinkHeard(self._clock.now_s(), is_up))
+        self._show_link()
         if came_back:
             self._listing.set()
 

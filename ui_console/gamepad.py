@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 EV_KEY, EV_ABS = 1, 3  # Linux, input-event-codes.h
 ABS_X, ABS_Y = 0, 1
-BTN_SOUTH, BTN_EAST, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 310, 311, 314, 315
+BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 310, 311, 314, 315
 DEAD_MAN = frozenset({BTN_TL, BTN_TR})
 STILL_ZONE = 0.12  # chosen: sticks that are let go rest within a tenth of their middle
 SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
@@ -35,6 +35,7 @@ class PadWish(StrEnum):
     TAKE = "take"
     RELEASE = "release"
     STOP_ROBOT = "stop_robot"
+    STOP_ALL = "stop_all"
 
 
 BUTTONS = {
@@ -42,6 +43,7 @@ BUTTONS = {
     BTN_START: PadWish.TAKE,
     BTN_SELECT: PadWish.RELEASE,
     BTN_EAST: PadWish.STOP_ROBOT,
+    BTN_NORTH: PadWish.STOP_ALL,
 }
 
 
@@ -185,7 +187,7 @@ async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
 
 def buttons_help() -> list[str]:
     """Return for people what the gamepad's buttons do."""
-    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_SELECT: "select", BTN_START: "start"}
+    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),

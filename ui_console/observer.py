@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import types
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -15,9 +16,13 @@ from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
 from backbone.spoken import value_text
-from resource_pool.arc_client import StopState
-from ui_console.console_events import ConsoleEvent, ScheduleHeard
+from backbone.wire import Envelope, Message
+from ui_console.consent import Consent, Topic, require_console
+from ui_console.consent_answers import ConsentAnswers
+from ui_console.console_events import ConsoleEvent, LinkHeard, ScheduleHeard
 from ui_console.feed import ConsoleFeed, FeedEvent
+from ui_console.lift_talk import LiftTalk
+from ui_console.lifting import AskLift
 
 P = TypeVar("P", bound=msgspec.Struct)
 
@@ -30,7 +35,11 @@ class Observer(Component[P], Generic[P]):
         watches: False for one that is content with its own events.
         signs_in: Tell the mission that its operator came and left; False where somebody else does.
         user: Who sits at it, for the record; empty: the console's name.
+        answers: What its operator is asked; None: something of its own.
+        answers_of: Returns where a person of this name is asked, None if they left; None: one person sits here.
     """
+
+    accepts: ClassVar[types.UnionType | type[Any] | None] = AskLift
 
     def __init__(
         self,
@@ -42,6 +51,8 @@ class Observer(Component[P], Generic[P]):
         watches: bool = True,
         signs_in: bool = True,
         user: str = "",
+        answers: ConsentAnswers | None = None,
+        answers_of: Callable[[str], ConsentAnswers | None] | None = None,
     ) -> None:
         super().__init__(launch, bus, clock)
         self.show: Callable[[ConsoleEvent], None] = lambda event: show(printable_all(event))
@@ -50,6 +61,9 @@ class Observer(Component[P], Generic[P]):
         self.user = user or launch.name
         self.feed = ConsoleFeed(bus, clock, self._heard)
         """What it listens by, and the verbs that need no grant."""
+        self.answers = answers or ConsentAnswers(self.user, clock, self.show, self.acted)
+        """What its operator is asked."""
+        self._answers_of = answers_of or (lambda _user: self.answers)
 
     # ------------------------------------------------------------------ what the operator did
     def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
@@ -82,10 +96,22 @@ class Observer(Component[P], Generic[P]):
         unsure, found = await asyncio.gather(self.feed.stop_robots(known, reason, user), self.feed.find_robots())
         return unsure + await self.feed.stop_robots(found - known, reason, user)
 
-    async def lift_stop(self, stop: StopState, user: str = "") -> bool:
-        """Let a robot move again that was stopped; return whether it may."""
-        self.acted(OperatorAction.LIFT_STOP, stop.rc, f"stop {stop.number} by {stop.by}", user)
-        return await self.feed.lift(stop, user or self.user)
+    async def lift_stop(
+        self, robot: str, number: int, user: str = "", show: Callable[[ConsoleEvent], None] | None = None
+    ) -> bool:
+        """Let a robot move again that was stopped, if those who stopped it let it; return whether it may.
+
+        Args:
+            robot: Which.
+            number: Of the stop that was seen on the screen: a newer one is not lifted.
+            user: Who wants it; empty: who sits at this console.
+            show: Called with what others say to it; None: this console's screens show it.
+        """
+        return await LiftTalk(self, user or self.user, show or self.show).lift(robot, number)
+
+    def decide(self, is_given: bool, reason: str = "") -> None:
+        """Answer who asks this operator first: for the robot that is held here, or to lift a stop."""
+        self.answers.decide(is_given, reason)
 
     async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
         """Have a component run with another value; return whether it does."""
@@ -113,6 +139,18 @@ class Observer(Component[P], Generic[P]):
         if self._watches:
             self.feed.listen()
 
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Have whom the question is for decide whether a stop may be lifted."""
+        match asked.body:
+            case AskLift(robot=robot, author=author, user=user, why=why):
+                require_console(self.name, asked.source)
+                answers = self._answers_of(author)
+                if answers is None:
+                    return Consent(True, author, "is not here any more")
+                return await answers.seek(asked.source, user, robot, why, Topic.LIFT)
+            case _:
+                return await super().answer(asked)
+
     async def drain(self) -> None:
         """Tell that the operator left."""
         if self._signs_in:
@@ -136,7 +174,13 @@ class Observer(Component[P], Generic[P]):
     def schedule_heard(self) -> None:
         """Take note that there is a new schedule. When: after it was shown."""
 
+    def link_lost(self) -> None:
+        """Take note that the hub does not answer. When: after it was shown, again and again while it is so."""
+
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)
-        if isinstance(event, ScheduleHeard):
-            self.schedule_heard()
+        match event:
+            case ScheduleHeard():
+                self.schedule_heard()
+            case LinkHeard(is_up=False):
+                self.link_lost()

@@ -9,6 +9,7 @@ model calls before it shows it.
 
 from __future__ import annotations
 
+import dataclasses
 from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import assert_never
@@ -42,6 +43,7 @@ from ui_console.console_events import (
     TeamEvent,
 )
 from ui_console.health_board import HealthBoard
+from ui_console.lifting import author_name, authors, is_own, lift_line
 from ui_console.timeline import Timeline
 from ui_console.views import (
     NONE_S,
@@ -68,6 +70,7 @@ LOG_KEPT = 500  # chosen: some minutes of a busy mission; the rest is in the rec
 STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
 OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
+NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
 _STATE_OF_REQUEST = {
     RequestState.RUNNING: NodeState.RUNNING,
@@ -109,6 +112,7 @@ class TeamModel:
         self._overruns: dict[tuple[str, str], float] = {}
         self._radios: dict[str, Mapping[str, float]] = {}
         self._link = LinkHeard(0.0, True)
+        self._link_heard_s = 0.0
         self._parameters: dict[tuple[str, str], ParameterView] = {}
         self._log: deque[StoryEvent] = deque(maxlen=LOG_KEPT)
 
@@ -138,11 +142,8 @@ class TeamModel:
                 self._take_stop(stop, at_s)
             case RadioCounted(at_s=at_s, radio=radio, values=values):
                 self._take_counts(radio, values, at_s)
-            case LinkHeard(at_s=at_s, is_up=is_up):
-                if is_up and event.latency_s < 0:
-                    event = LinkHeard(at_s, True, self._link.latency_s)
-                self._link = event
-                self._so(not is_up, AlarmKind.LINK, "hub", "no link to the hub: what is shown is old", at_s)
+            case LinkHeard():
+                self._take_link(event)
             case HealthHeard():
                 self._health.take(event)
             case ParametersHeard():
@@ -155,6 +156,7 @@ class TeamModel:
         self.alarms.look(now_s)
         self._health.look(now_s)
         owners = {request.arc: request.owner for request in self.schedule.requests} if self.schedule else {}
+        self._so(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
             is_wanted = bool(request.blockers) and all(is_console(owners.get(arc, "")) for arc in request.blockers)
@@ -185,6 +187,11 @@ class TeamModel:
         """Return the consoles at which this person sits now."""
         return screens_of(user, self._components.values())
 
+    def link_down_s(self, now_s: float) -> float:
+        """Return since when nothing is heard from the mission's hub; negative: the link is up."""
+        link = self._link
+        return NONE_S if link.is_up and now_s <= link.until_s else self._link_heard_s
+
     def robot_names(self) -> list[str]:
         """Return every robot heard of, in the schedule or as a component."""
         in_schedule = {rc.rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND} if self.schedule else set()
@@ -196,12 +203,31 @@ class TeamModel:
         stop = self._stops.get(robot)
         return stop if stop is not None and stop.is_stopped else None
 
-    def stop_view(self, robot: str, now_s: float) -> StopView | None:
-        """Return the same for a screen."""
+    def stop_view(self, robot: str, now_s: float, user: str = "", console: str = "") -> StopView | None:
+        """Return the same for a screen.
+
+        Args:
+            robot: Which.
+            now_s: Mission time.
+            user: Who looks at it; empty: nobody in particular.
+            console: Address of their console.
+        """
         stop = self.stop_of(robot)
         if stop is None:
             return None
-        return StopView(stop.number, stop.by, stop.reason, max(0.0, now_s - stop.at_s), stop.is_confirmed)
+        by_user, *also = dict.fromkeys(map(author_name, authors(stop)))
+        return StopView(
+            number=stop.number,
+            by=stop.by,
+            reason=stop.reason,
+            age_s=max(0.0, now_s - stop.at_s),
+            is_confirmed=stop.is_confirmed,
+            by_user=by_user,
+            also=also,
+            since_s=stop.at_s,
+            is_mine=is_own(stop, user, console),
+            lift_line=lift_line(stop, user, console, self._is_there),
+        )
 
     def tree(self) -> list[NodeView]:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
@@ -247,7 +273,7 @@ class TeamModel:
     def links(self, now_s: float) -> list[LinkView]:
         """Return the link to the hub, the RC manager's renewals, and the radios."""
         renewed = f"leases renewed {now_s - self._leases_s:.1f} s ago" if self._leases_s >= 0 else ""
-        views = [LinkView("hub", self._link.is_up, self._link.latency_s, renewed)]
+        views = [LinkView("hub", self.link_down_s(now_s) < 0, self._link.latency_s, renewed)]
         for radio, values in sorted(self._radios.items()):
             sent, late = values.get("packets_sent", 0.0), values.get("overruns", 0.0)
             worst_ms = 1e3 * values.get("worst_packet_s", 0.0)
@@ -530,7 +556,23 @@ class TeamModel:
         line = f"{fell.name} fell: {fell.how}; {again}{said}"
         self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
+    def _is_there(self, address: str) -> bool:
+        """Return whether this component is there; True as long as nothing was heard of who is."""
+        component = self._components.get(address)
+        if component is None:
+            return not self._components
+        return component.state not in LEAVING and address not in self._lost
+
     # ------------------------------------------------------------------ what happened
+    def _take_link(self, link: LinkHeard) -> None:
+        if link.is_up:
+            self._link_heard_s = link.at_s
+            latency_s = link.latency_s if link.latency_s >= 0 else self._link.latency_s
+            self._link = dataclasses.replace(link, latency_s=latency_s)
+        else:
+            self._link = link
+        self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
+
     def _take_story(self, story: StoryEvent) -> None:
         self._log.append(story)
         head, _, status = story.what.partition(": ")

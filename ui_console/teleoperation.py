@@ -23,7 +23,7 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy, Why
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Envelope, Message
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
@@ -31,12 +31,14 @@ from resource_pool.arc_client import (
     NotMyArc,
     PathNode,
     Resumed,
+    StopState,
     Suspended,
     Suspending,
     arc_name,
     claim_parameters,
 )
 from ui_console.consent import AskConsent, Consent
+from ui_console.consent_answers import ConsentAnswers
 from ui_console.consent_talk import Claim, ConsentTalk
 from ui_console.console_events import (
     Asked,
@@ -47,12 +49,15 @@ from ui_console.console_events import (
     Granted,
     Lost,
     PictureSeen,
+    StopHeard,
     WhyHeard,
 )
 from ui_console.controls import Controls
 from ui_console.driving import Command, Drive, Halt, Jump
 from ui_console.feed import REPLY_TIME_S
+from ui_console.lifting import AskLift
 from ui_console.observer import Observer
+from ui_console.stop_ear import StopEar
 from ui_console.team_model import ROBOT_KIND
 
 log = logging.getLogger(__name__)
@@ -92,10 +97,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         keeps_arc: Keep the ARC when the robot is given back, so that it is there at once when it is taken again.
         signs_in: Tell the mission that its operator came and left; False where somebody else does.
         user: Who drives, for the record; empty: the console's name.
+        answers: What its operator is asked, if several consoles are one person's; None: something of its own.
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskLift
 
     def __init__(
         self,
@@ -111,8 +117,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         keeps_arc: bool = False,
         signs_in: bool = True,
         user: str = "",
+        answers: ConsentAnswers | None = None,
     ) -> None:
-        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user)
+        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
         self._claimed: tuple[str, dict[str, Any]] | None = None
@@ -126,6 +133,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._decided = asyncio.Event()
         self._controls = Controls(self)
         self._consent = ConsentTalk(self, self.give_back)
+        self._ear = StopEar(self, self._heard_stop)
         self._asking_why: asyncio.Task[None] | None = None
         self._touched = asyncio.Event()
         self._is_attended = True
@@ -194,11 +202,19 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._touched.set()
 
     def leave(self) -> None:
-        """The operator turned away, or the window is no longer in front: the wheels stop."""
+        """The operator turned away, or the window is no longer in front: the wheels stop, and nothing held counts."""
         if self._is_attended:
             self._is_attended = False
             self.show(Attention(self.clock.now_s(), False))
         self.stop()
+        self.require_let_go()
+
+    def require_let_go(self) -> None:
+        """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop.
+
+        When: a dialog opens or closes. Stops, lifts, grants, and the loss of robot or link require it anyway.
+        """
+        self._controls.require_let_go()
 
     async def wait_granted(self) -> None:
         """Return when the claim was granted.
@@ -221,12 +237,12 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._controls.hold(drive, lasts_s)
 
     def stop(self) -> None:
-        """Stop the wheels now."""
+        """Stop the wheels now; sticks, pads and pages say by this that they were let go."""
         self._controls.stop()
 
     def jump(self) -> None:
-        """Jump once."""
-        if self.is_held:
+        """The key for one jump is down: jump, unless it has to be let go first."""
+        if self._controls.press_jump() and self.is_held:
             self.start_task(self._jump(), "jump")
 
     async def do(self, command: Command) -> bool:
@@ -237,21 +253,22 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Give the robot back without waiting for it."""
         self.start_task(self.give_back(), "release")
 
-    async def give_back(self, reason: str = "released", *, for_good: bool = False) -> None:
+    async def give_back(self, reason: str = "released", *, for_good: bool = False, wanted: bool = True) -> None:
         """Give the robot back; afterwards the console watches until the next ``take``.
 
         Args:
             reason: For people.
             for_good: End the ARC also if the console keeps it otherwise.
+            wanted: False if the operator did not ask for it.
         """
         async with self._giving_back:
             if self._arc is not None and (self._is_asking or for_good):
-                await self._give_back(self._arc, reason, for_good=for_good)
+                await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
         if self._takes_next and self.is_ready:
             self._takes_next = False
             self.take()
 
-    async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool) -> None:
+    async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool, wanted: bool) -> None:
         keeping, self._keeping = self._keeping, None
         self._controls.switch_off()
         if keeping is not None:
@@ -263,7 +280,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._frames = None
         if self._is_asking:
             self._is_asking, self.given_back = False, confirmed
-            self._tell_given_back(reason, confirmed=confirmed)
+            self._tell_given_back(reason, confirmed=confirmed, wanted=wanted)
 
     async def _let_go(self, arc: ArcClient, reason: str, *, for_good: bool) -> bool:
         """Have the ARC rest if it is kept, else end it; return whether it confirmed that."""
@@ -285,13 +302,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._arc, self._rests = None, False
         return confirmed
 
-    def _tell_given_back(self, reason: str, *, confirmed: bool) -> None:
+    def _tell_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
+        self._ear.close()
         self._controls.tell_drive_ended(self._holding, reason)
-        self._consent.ended(True, reason)
+        self.answers.ended(True, reason)
         robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
         self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
         self.report("holds no robot")
-        self.show(GivenBack(self.clock.now_s(), reason, confirmed))
+        self.show(GivenBack(self.clock.now_s(), reason, confirmed, wanted))
 
     # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
@@ -299,10 +317,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
         robot, is_waiting = self.parameters.robot, self._is_asking and not self.is_held
         claim = Claim(arc_name(self.bus, self.parameters.kind), robot, robot or ANY_ROBOT, self._asked_s)
         self._consent.begin_ask(claim if is_waiting else None, why)
-
-    def decide(self, is_given: bool, reason: str = "") -> None:
-        """Answer who asks for the robot; with a yes it is given back."""
-        self._consent.decide(is_given, reason)
 
     def _consent_at_once(self) -> Consent | None:
         """Return what is said to who asks for the robot if there is nothing that the operator could decide."""
@@ -324,11 +338,13 @@ class Teleoperation(Observer[TeleoperationParameters]):
         await self.watch()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Answer the ARC's notices, and other consoles that ask for the robot."""
+        """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
+        if isinstance(asked.body, AskLift) and self._work is not None:
+            return Consent(False, self.user, "a script drives, and stopped it")
         if not isinstance(asked.body, ArcNotice):
-            raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
+            return await super().answer(asked)
         if self._arc is None:
             raise NotMyArc(f"{self.name} claims no ARC")
         return await self._arc.handle(asked.body)
@@ -337,6 +353,25 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Give the robot back if it was not."""
         await self.give_back("the console ends", for_good=True)
         await super().drain()
+
+    async def connect(self) -> None:
+        """Listen to what the mission tells, and to the own link."""
+        await super().connect()
+        self.bus.watch_link(lambda _is_up: self.require_let_go())
+
+    def link_lost(self) -> None:
+        """What is held moves nothing when the link is back."""
+        self.require_let_go()
+
+    async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
+        """Stop a robot, whoever holds it; return whether that is certain."""
+        self.require_let_go()
+        return await super().stop_robot(robot, reason, user)
+
+    async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
+        """Stop every robot of the mission, whoever holds it; return those of which it is not certain."""
+        self.require_let_go()
+        return await super().stop_all(reason, user)
 
     def schedule_heard(self) -> None:
         """Ask why this console waits, if it does."""
@@ -356,6 +391,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not again:
             self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
+        self.require_let_go()
+        self._ear.listen(robot)
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 
@@ -365,13 +402,20 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def arc_suspended(self, notice: Suspended) -> None:
         """Tell it; see ``ArcListener``."""
-        self._controls.release()
+        self.require_let_go()
         if self._keeping is not None:
             because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
-            self._consent.ended(False, f"it was lost: {because}")
+            self.answers.ended(False, f"it was lost: {because}")
             self._controls.tell_drive_ended(self._holding, because)
             self.report(f"waits: {notice.reason} by {notice.by}")
             self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
+
+    def _heard_stop(self, state: StopState) -> None:
+        """The robot that is held was stopped or may move again: whoever drives it has to know that first."""
+        if self._arc is not None and self._arc.heard_stop(state):
+            self.require_let_go()
+        if not self._watches:
+            self.show(StopHeard(self.clock.now_s(), state))
 
     def _claim_parameters(self) -> dict[str, Any]:
         wished = self.parameters
@@ -431,7 +475,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
                     await self._touched.wait()
             except TimeoutError:
                 self.leave()
-                await self.give_back(f"{self.user} is away")
+                await self.give_back(f"{self.user} is away", wanted=False)
                 await self._touched.wait()
 
     async def _jump(self) -> None:

@@ -61,10 +61,15 @@ class StopView(msgspec.Struct, frozen=True):
 
     Attributes:
         number: To lift it by.
-        by: Who stopped the robot.
+        by: Who stopped the robot first: a name, or the address of what stopped it.
         reason: As given.
         age_s: For how long.
         is_confirmed: False if the wheels may still turn for a moment.
+        by_user: Who stopped it first, for people.
+        also: Who else stopped it since, for people.
+        since_s: Since when.
+        is_mine: True if this operator stopped it, and nobody else.
+        lift_line: What lifting it needs, for people.
     """
 
     number: int
@@ -72,6 +77,11 @@ class StopView(msgspec.Struct, frozen=True):
     reason: str
     age_s: float
     is_confirmed: bool
+    by_user: str
+    also: list[str]
+    since_s: float
+    is_mine: bool
+    lift_line: str
 
 
 class VideoView(msgspec.Struct, frozen=True):
@@ -389,7 +399,7 @@ class LogRow(msgspec.Struct, frozen=True):
 
 
 class ConsentView(msgspec.Struct, frozen=True):
-    """Somebody asks for what this console holds.
+    """Somebody asks for what this console holds, or to lift what its operator stopped.
 
     Attributes:
         user: Who.
@@ -397,6 +407,8 @@ class ConsentView(msgspec.Struct, frozen=True):
         why: Why, for people.
         left_s: Seconds until silence is a no.
         others: How many more ask.
+        topic: ``take``: to have the robot; ``lift``: to let it move again.
+        line: The question in one sentence, for people.
     """
 
     user: str
@@ -404,6 +416,24 @@ class ConsentView(msgspec.Struct, frozen=True):
     why: str
     left_s: float
     others: int
+    topic: str
+    line: str
+
+
+class LostView(msgspec.Struct, frozen=True):
+    """A robot that this operator held, and that went without their asking for it.
+
+    Attributes:
+        robot: Which.
+        why: For people.
+        at_s: When.
+        may_retake: True if taking it can be offered: it is there, and this console does not ask for one already.
+    """
+
+    robot: str
+    why: str
+    at_s: float
+    may_retake: bool
 
 
 class OwnView(msgspec.Struct, frozen=True):
@@ -413,7 +443,7 @@ class OwnView(msgspec.Struct, frozen=True):
         console: Its name.
         user: Who sits at it.
         robot: Robot wanted or held; empty: any, or none.
-        is_held: True: keys move it.
+        is_held: True: keys move it; never while the link is down.
         is_asked: True: it is wanted.
         status: In one line: whether it is held, and if not, why.
         epoch: Of the grant; 0: none.
@@ -425,6 +455,9 @@ class OwnView(msgspec.Struct, frozen=True):
         consent: What this operator is asked; None: nothing.
         asked: In one line what came of asking others; empty: nobody was asked.
         other_screens: Where else the same person sits, one line each: one person with several screens.
+        must_let_go: True: a control is held that moves nothing before it is let go and pressed anew.
+        lost: The robot that went without the operator asking for it, until they take one or dismiss it.
+        link_down_s: Since when this console hears nothing from the mission's hub; negative: the link is up.
     """
 
     console: str
@@ -442,6 +475,9 @@ class OwnView(msgspec.Struct, frozen=True):
     consent: ConsentView | None = None
     asked: str = ""
     other_screens: list[str] = []
+    must_let_go: bool = False
+    lost: LostView | None = None
+    link_down_s: float = NONE_S
 
 
 class HealthView(msgspec.Struct, frozen=True):

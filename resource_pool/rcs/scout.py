@@ -34,6 +34,7 @@ from resource_pool.messages import (
     Drive,
     EmergencyQuestion,
     EmergencyStop,
+    GivenBeforeStop,
     Halt,
     Jump,
     LiftStop,
@@ -124,7 +125,7 @@ class Scout(ResourceController[ScoutParameters]):
                 self.story.note(self.name, f"{asked.source} was refused: {type(asked.body).__name__}")
                 raise NotFromYou(f"{self.name} is stopped and freed by operators, not by {asked.source}")
             case EmergencyStop(reason=reason, user=user):
-                return await self._stop_now(user or asked.source, reason)
+                return await self._stop_now(user or asked.source, reason, asked.source)
             case LiftStop(number=number, user=user):
                 if self._latch.lift(number, user or asked.source, self.clock.now_s()):
                     self._keep_stop()
@@ -142,16 +143,15 @@ class Scout(ResourceController[ScoutParameters]):
             )
         hold = self.admit(order.arc, order.epoch)
         if isinstance(order.command, Drive | Jump):
-            self._latch.require_moving()
+            self._latch.require_moving(order.command.after_stop)
         match order.command:
             case Drive(left_rad_s=left, right_rad_s=right):
                 left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
                 # Before the packet goes: while it does, the hold may end, or the answer of the radio be lost.
                 self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
                 self._driven.set()
-                await self._load(
-                    hold, self._protocol.drive(left, right), lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt()
-                )
+                packet, still = self._protocol.drive(left, right), self._protocol.halt()
+                await self._move(hold, order.command, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=still)
                 return self._applied(hold, "drive", {"left_rad_s": left, "right_rad_s": right})
             case Halt():
                 await self._load(hold, self._protocol.halt())
@@ -160,7 +160,8 @@ class Scout(ResourceController[ScoutParameters]):
             case Jump():
                 # Repeating the last drive or halt would trip the robot or call the jump off.
                 as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
-                await self._load(hold, self._protocol.jump(), at_once=True, afterwards=as_it_is, kind="jump")
+                packet = self._protocol.jump()
+                await self._move(hold, order.command, packet, at_once=True, afterwards=as_it_is, kind="jump")
                 self._stopped(hold)
                 return self._applied(hold, "jump", {})
             case SwitchTransmitter(on=on, frequency=frequency):
@@ -175,11 +176,10 @@ class Scout(ResourceController[ScoutParameters]):
         stops = float(self._latch.state.number)
         return {**super().statistics(), "command_timeouts": self._timeouts, "emergency_stops": stops}
 
-    async def _stop_now(self, by: str, reason: str) -> StopState:
+    async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
         """Refuse all that moves the robot from here on, and stop its wheels if somebody could be turning them."""
-        is_new = self._latch.stop(by, reason, self.clock.now_s())
-        if is_new:
-            self._keep_stop()
+        is_new = self._latch.stop(by, reason, self.clock.now_s(), console)
+        self._keep_stop()
         self._halt_at_s = None
         holder = self._holder
         if holder is not None:
@@ -193,9 +193,9 @@ class Scout(ResourceController[ScoutParameters]):
                 self._latch.confirm(False)
             else:
                 self._latch.confirm(True)
-            self.changed()
+        self._publish_stop()
         if is_new:
-            self._tell_stop(self._latch.state, f"was stopped{f': {reason}' if reason else ''}")
+            self.tell(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
         return self._latch.state
 
     def standing_stop(self) -> StandingStop | None:
@@ -203,12 +203,16 @@ class Scout(ResourceController[ScoutParameters]):
         state = self._latch.state
         if not state.is_stopped:
             return None
-        return StandingStop(state.number, state.by, state.reason, state.at_s, state.is_confirmed)
+        by = ", ".join(dict.fromkeys([state.by, *(author.by for author in state.also)]))
+        return StandingStop(state.number, by, state.reason, state.at_s, state.is_confirmed)
 
     def _tell_stop(self, state: StopState, what: str) -> None:
-        self.changed()
-        self.bus.publish(self.address, Conversation.EVENTS, state)
+        self._publish_stop()
         self.tell(self.name, f"{what} (by {state.by})")
+
+    def _publish_stop(self) -> None:
+        self.changed()
+        self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
 
     def _keep_stop(self) -> None:
         """Keep the stop for the next process of this RC; a disk that refuses must not keep the wheels turning."""
@@ -226,6 +230,18 @@ class Scout(ResourceController[ScoutParameters]):
         if self._holder is not None and self._holder.epoch == hold.epoch:
             self._halt_at_s = None
 
+    async def _move(self, hold: Hold, command: Drive | Jump, payload: bytes, **how: Any) -> None:
+        """Load a packet that moves the robot.
+
+        Raises:
+            EmergencyStopped: It was stopped meanwhile, and perhaps freed again; the packet is not sent.
+        """
+        try:
+            await self._load(hold, payload, moves=True, **how)
+        except GivenBeforeStop:
+            self._latch.require_moving(command.after_stop)
+            raise
+
     async def _load(
         self,
         hold: Hold,
@@ -235,6 +251,7 @@ class Scout(ResourceController[ScoutParameters]):
         afterwards: bytes = b"",
         lasts_s: float = 0.0,
         kind: str = "drive",
+        moves: bool = False,
     ) -> None:
         epoch = hold.companions.get(self._radio)
         if epoch is None:
@@ -250,6 +267,8 @@ class Scout(ResourceController[ScoutParameters]):
             afterwards,
             lasts_s,
             kind,
+            moves,
+            self._latch.state.number,
         )
         radio = address(Subsystem.RESOURCE_POOL, self._radio)
         await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)

@@ -102,8 +102,14 @@ class WrittenSession:
         self.wanted.append("stop all")
         return [] if self.is_sure else ["scout2"]
 
-    async def lift_stop(self, robot: str) -> bool:
-        self.wanted.append(("lift", robot))
+    def require_let_go(self) -> None:
+        self.wanted.append("let go")
+
+    def dismiss_lost(self) -> None:
+        self.wanted.append("dismiss lost")
+
+    async def lift_stop(self, robot: str, number: int) -> bool:
+        self.wanted.append(("lift", robot, number))
         return True
 
     async def why(self, name: str) -> list[str]:
@@ -140,7 +146,7 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("n", [("decide", False)]),
     ("x", ["stop", ("stop robot", "scout1")]),
     ("X", ["stop", "stop all"]),
-    ("c", [("lift", "scout1")]),
+    ("c", []),
     ("1", [("switch", "scout1")]),
     ("2", [("switch", "scout2")]),
     ("3", []),
@@ -157,6 +163,14 @@ async def settle(pilot: Any) -> None:
     await pilot.app.workers.wait_for_complete()
     await pilot.pause()
     await pilot.pause()
+
+
+async def test_a_lift_names_the_stop_that_is_on_the_screen() -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), StopHeard(11.0, STOP))
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        assert session.wanted == [("lift", "scout1", STOP.number)]
 
 
 async def test_every_key_does_what_it_says() -> None:

@@ -141,7 +141,13 @@ class Session(Protocol):
         """Ask the operator who holds the robot for it."""
 
     def decide(self, is_given: bool) -> None:
-        """Answer the operator who asks for the robot; with a yes it is given back."""
+        """Answer the operator who asks for the robot, or to lift a stop."""
+
+    def require_let_go(self) -> None:
+        """What is held moves nothing until it was let go and pressed anew."""
+
+    def dismiss_lost(self) -> None:
+        """The operator knows that a robot was lost."""
 
     async def switch(self, robot: str) -> None:
         """Give the robot back and ask for this one."""
@@ -161,8 +167,13 @@ class Session(Protocol):
     async def stop_all(self) -> list[str]:
         """Emergency stop of all; return the robots of which it is not certain."""
 
-    async def lift_stop(self, robot: str) -> bool:
-        """Let the robot move again; return whether it may."""
+    async def lift_stop(self, robot: str, number: int) -> bool:
+        """Let the robot move again, if those who stopped it let it; return whether it may.
+
+        Args:
+            robot: Which.
+            number: Of the stop that was seen on the screen.
+        """
 
     async def why(self, name: str) -> list[str]:
         """Return why it is as it is."""
@@ -340,7 +351,7 @@ class ConsoleApp(App[None]):
         if consent is not None:
             keys = "enter: let go" if self.profile is Profile.PENDANT else "g: let go, n: keep"
             others = f", {consent.others} more" if consent.others else ""
-            return f"{consent.user} asks for {consent.robot}: {consent.why} [{keys}; {consent.left_s:.0f} s{others}]"
+            return f"{consent.line} [{keys}; {consent.left_s:.0f} s{others}]"
         if view.own.asked:
             return view.own.asked
         unsure = [robot.robot for robot in view.robots if robot.stop is not None and not robot.stop.is_confirmed]
@@ -476,8 +487,10 @@ class ConsoleApp(App[None]):
     def action_lift(self) -> None:
         """Let the robot move again."""
         robot = self._robot_meant()
-        if robot:
-            self.run_worker(self._session.lift_stop(robot), exclusive=False)
+        rows = self._view.robots if self._view is not None else []
+        for row in rows:
+            if row.robot == robot and row.stop is not None:
+                self.run_worker(self._session.lift_stop(robot, row.stop.number), exclusive=False)
 
     async def _stop_robot(self, robot: str) -> None:
         if not await self._session.stop_robot(robot):

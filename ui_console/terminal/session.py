@@ -127,6 +127,8 @@ class TerminalSession:
                 self.release()
             case PadWish.STOP_ROBOT:
                 screen.action_stop_robot()
+            case PadWish.STOP_ALL:
+                screen.action_stop_all()
             case _:
                 assert_never(wish)
 
@@ -185,8 +187,17 @@ class TerminalSession:
         self._with_robot(lambda console: console.begin_ask_consent(why))
 
     def decide(self, is_given: bool) -> None:
-        """Answer the operator who asks for the robot."""
-        self._with_robot(lambda console: console.decide(is_given))
+        """Answer the operator who asks for the robot, or to lift a stop."""
+        if self._console is not None and self._console.state is LifeState.READY:
+            self._console.decide(is_given)
+
+    def require_let_go(self) -> None:
+        """What is held moves nothing until it was let go and pressed anew; when a dialog opens or closes."""
+        self._with_robot(Teleoperation.require_let_go)
+
+    def dismiss_lost(self) -> None:
+        """The operator knows that a robot was lost."""
+        self.model.dismiss_lost()
 
     async def switch(self, robot: str) -> None:
         """Give the robot back and ask for this one."""
@@ -215,10 +226,9 @@ class TerminalSession:
         """Emergency stop of all robots."""
         return await self._ready_console().stop_all()
 
-    async def lift_stop(self, robot: str) -> bool:
-        """Let the robot move again."""
-        stop = self.model.team.stop_of(robot)
-        return stop is not None and await self._ready_console().lift_stop(stop)
+    async def lift_stop(self, robot: str, number: int) -> bool:
+        """Let the robot move again if those who stopped it let it; the number is that of the stop that was seen."""
+        return await self._ready_console().lift_stop(robot, number)
 
     async def why(self, name: str) -> list[str]:
         """Return why it is as it is."""

@@ -22,6 +22,7 @@ from backbone.naming import Subsystem, address
 from backbone.operators import OperatorAction
 from backbone.wire import Envelope
 from resource_pool.arc_client import Frame
+from ui_console.consent_answers import ConsentAnswers
 from ui_console.console_events import ConsoleEvent, ScheduleHeard
 from ui_console.console_model import ConsoleModel
 from ui_console.observer import Observer
@@ -62,7 +63,7 @@ class WebHub:
         self.clock = clock
         self.team = TeamModel(launch.mission)
         self.observer: Observer[NoParameters] = Observer(
-            launch, bus, clock, show=self._heard, signs_in=False, user=launch.name
+            launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
         )
         self.guests: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False, alarms=self.team.alarms)
@@ -136,9 +137,9 @@ class WebHub:
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
     # ------------------------------------------------------------------ what operators need; see Hands
-    async def new_console(self, welcome: Welcome, robot: str, show: Callable[[ConsoleEvent], None]) -> Teleoperation:
-        """Return a console that claims the robot as soon as it runs."""
-        number = next(self._consoles)
+    async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
+        """Return a console of this operator that claims the robot as soon as it runs."""
+        number, welcome = next(self._consoles), operator.welcome
         wished = {
             "robot": robot,
             "kind": self._kind,
@@ -153,7 +154,15 @@ class WebHub:
         )
         bus = await self._join(launch)
         return Teleoperation(
-            launch, bus, self.clock, show=show, watches=False, keeps_arc=True, signs_in=False, user=welcome.user
+            launch,
+            bus,
+            self.clock,
+            show=operator.show,
+            watches=False,
+            keeps_arc=True,
+            signs_in=False,
+            user=welcome.user,
+            answers=operator.answers,
         )
 
     def watching_changed(self) -> None:
@@ -172,6 +181,11 @@ class WebHub:
         self.team.alarms.attention(any(one.is_there for one in self.guests), self.clock.now_s())
 
     # ------------------------------------------------------------------ within
+    def _answers_of(self, user: str) -> ConsentAnswers | None:
+        """Return where this person is asked: at the page they look at, else at any they left open."""
+        pages = [one for one in self.guests if one.welcome.user == user]
+        return next((page.answers for page in sorted(pages, key=lambda page: not page.is_there)), None)
+
     def _heard(self, event: ConsoleEvent) -> None:
         self._model.apply(event)
         if isinstance(event, ScheduleHeard):

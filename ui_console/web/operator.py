@@ -12,6 +12,7 @@ import msgspec
 from backbone.bus.interface import Clock
 from backbone.errors import LinkError, Refusal
 from backbone.printable import printable_all
+from ui_console.consent_answers import ConsentAnswers
 from ui_console.console_events import (
     Attention,
     CommandApplied,
@@ -33,6 +34,7 @@ from ui_console.web.protocol import (
     AskParameters,
     AskWhy,
     Decide,
+    DismissLost,
     Drawn,
     Here,
     Intent,
@@ -67,8 +69,8 @@ class Hands(Protocol):
     team: TeamModel
     clock: Clock
 
-    async def new_console(self, welcome: Welcome, robot: str, show: Callable[[ConsoleEvent], None]) -> Teleoperation:
-        """Return a console that claims the robot as soon as it runs."""
+    async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
+        """Return a console of this operator that claims the robot as soon as it runs."""
 
     def watching_changed(self) -> None:
         """Somebody wants other pictures."""
@@ -92,6 +94,8 @@ class Operator:
         """Set when there is something to send."""
         self.is_there = True
         self.model = ConsoleModel(welcome.user, welcome.user, hands.team)
+        self.answers = ConsentAnswers(welcome.user, hands.clock, self.show, hands.observer.acted)
+        """What this person is asked by others."""
         self._hands = hands
         self._console: Teleoperation | None = None
         self._life: asyncio.Task[None] | None = None
@@ -123,7 +127,10 @@ class Operator:
             case MayI(why):
                 self._with_robot(lambda console: console.begin_ask_consent(why))
             case Decide(is_given):
-                self._with_robot(lambda console: console.decide(is_given))
+                self.answers.decide(is_given)
+            case DismissLost():
+                self.model.dismiss_lost()
+                self.refresh(self._hands.clock.now_s())
             case TakeOver() | LetGo() | StopRobot() | StopAll() | LiftStop() | AskWhy() | AskParameters():
                 self._begin(intent)
             case SetParameter():
@@ -239,12 +246,10 @@ class Operator:
             case StopRobot(robot):
                 await self._stop(robot)
             case StopAll():
-                self.stop()
+                self._with_robot(Teleoperation.require_let_go)
                 self._tell_unsure(await observer.stop_all("", user))
-            case LiftStop(robot):
-                stop = self.model.team.stop_of(robot)
-                if stop is not None:
-                    await observer.lift_stop(stop, user)
+            case LiftStop(robot, number):
+                await observer.lift_stop(robot, number, user, self.show)
             case AskWhy(name):
                 self._answer({"why": name, "lines": await observer.why(name)})
             case AskParameters(name):
@@ -258,7 +263,7 @@ class Operator:
 
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""
-        self.stop()
+        self._with_robot(Teleoperation.require_let_go)
         is_known = robot in self._hands.team.robot_names()
         is_stopped = is_known and await self._hands.observer.stop_robot(robot, "", self.welcome.user)
         self._tell_unsure([] if is_stopped else [robot])
@@ -273,7 +278,7 @@ class Operator:
                 await self._console.switch(robot)
             return
         try:
-            self._console = await self._hands.new_console(self.welcome, robot, self.show)
+            self._console = await self._hands.new_console(self, robot)
         except LinkError as error:
             self.show(LinkTrouble(self._hands.clock.now_s(), str(error)))
             return

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from backbone.ranges import EXACT
 from ui_console.consent import MAX_WHY
 from ui_console.web.door import Hello, ShortText
 
@@ -47,9 +48,13 @@ class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="d
 
 
 class Decide(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="decide"):
-    """Answer the operator who asks; with a yes the robot is given back."""
+    """Answer the operator who asks: for the robot, which is given back with a yes, or to lift a stop."""
 
     is_given: bool
+
+
+class DismissLost(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="dismiss_lost"):
+    """It was seen that a robot was lost."""
 
 
 class LetGo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
@@ -67,9 +72,10 @@ class StopAll(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 
 class LiftStop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="lift"):
-    """Let a robot move again."""
+    """Let a robot move again: the stop of this number, which was seen on the page."""
 
     robot: ShortText
+    number: Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 
 
 class Watch(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="watch"):
@@ -125,6 +131,7 @@ Intent = (
     | LetGo
     | MayI
     | Decide
+    | DismissLost
     | StopRobot
     | StopAll
     | LiftStop

@@ -115,7 +115,7 @@ function act(what, name, more = {}) {
     case "take": driving.letGo(); return say({ do: "take", robot: name });
     case "release": driving.letGo(); return say({ do: "release" });
     case "stop_robot": driving.letGo(); return say({ do: "stop_robot", robot: name });
-    case "lift": return say({ do: "lift", robot: name });
+    case "lift": return say({ do: "lift", robot: name, number: view.robots?.find((robot) => robot.robot === name)?.stop?.number ?? 0 });
     case "why": return say({ do: "why", name });
     case "acknowledge": return say({ do: "acknowledge", key: name });
     case "parameters": return say({ do: "parameters", name });

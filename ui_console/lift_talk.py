@@ -1,0 +1,81 @@
+"""Lifting a stop over the bus: who set it is asked where the rules in ``lifting`` say so, then it is lifted or kept."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, assert_never
+
+from backbone.errors import LinkError, NoResponder, Refusal
+from backbone.operators import OperatorAction
+from resource_pool.arc_client import OtherStop, Stopper, StopState
+from ui_console.consent import CONSENT_WITHIN_S, Consent, Topic
+from ui_console.console_events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent
+from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, author_name, decide_lift, is_agreed
+
+if TYPE_CHECKING:
+    from ui_console.observer import Observer
+
+ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: who is asked answers by itself before
+LOOK_AGAIN = "Look who stopped the robot and why, then lift that stop if it may move."
+
+
+class LiftTalk:
+    """Lifts the stops that one person wants lifted; what others say to it is shown to that person.
+
+    Args:
+        console: By which it is done.
+        user: Who wants it.
+        show: Called with what that person's screens are to show.
+    """
+
+    def __init__(self, console: Observer[Any], user: str, show: Callable[[ConsoleEvent], None]) -> None:
+        self._console, self._user, self._show = console, user, show
+
+    async def lift(self, robot: str, number: int) -> bool:
+        """Let the robot move again if nobody who stopped it minds; return whether it may.
+
+        Args:
+            robot: Which.
+            number: Of the stop that was seen.
+        """
+        stop = await self._console.feed.ask_stop(robot)
+        if stop is None:
+            return False
+        match decide_lift(stop, number, self._user, self._console.address):
+            case NotThatStop(line):
+                self._show(CommandRefused(self._console.clock.now_s(), OtherStop.code, line, LOOK_AGAIN))
+                return False
+            case AskFirst(others) if not await self._ask(stop, others):
+                return False
+            case AskFirst() | LiftNow():
+                detail = f"stop {stop.number} by {stop.by}"
+                self._console.acted(OperatorAction.LIFT_STOP, robot, detail, self._user)
+                return await self._console.feed.lift(stop, self._user)
+            case decision:
+                assert_never(decision)
+
+    async def _ask(self, stop: StopState, others: tuple[Stopper, ...]) -> bool:
+        console, robot = self._console, stop.rc
+        names, now_s = [author_name(one) for one in others], console.clock.now_s()
+        console.acted(OperatorAction.ASK_LIFT, robot, f"of {', '.join(names)}", self._user)
+        self._show(ConsentAsked(now_s, robot, names, now_s + CONSENT_WITHIN_S * console.clock.rate, Topic.LIFT))
+        answers = await asyncio.gather(*(self._ask_one(robot, author) for author in others))
+        return is_agreed(answers)
+
+    async def _ask_one(self, robot: str, author: Stopper) -> Consent:
+        name, bus = author_name(author), self._console.bus
+        try:
+            question = AskLift(robot, author.by, self._user)
+            consent = await bus.ask(author.console, question, Consent, within_s=ANSWER_TIME_S)
+        except NoResponder:  # who left in whatever way cannot be asked, and keeps no robot standing
+            consent = Consent(True, name, "is not here any more")
+        except LinkError:
+            consent = Consent(False, name, "does not answer")
+        except Refusal as refusal:
+            consent = Consent(False, name, refusal.detail)
+        heard = ConsentHeard(
+            self._console.clock.now_s(), robot, consent.user, consent.is_given, consent.reason, Topic.LIFT
+        )
+        self._show(heard)
+        return consent

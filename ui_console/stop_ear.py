@@ -1,0 +1,47 @@
+"""Hears of every stop and lift of the robot that a console holds."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from backbone.bus.interface import Subscription
+from backbone.errors import LinkError, Refusal
+from resource_pool.arc_client import StopState, ask_stop, watch_stops
+
+if TYPE_CHECKING:
+    from ui_console.observer import Observer
+
+log = logging.getLogger(__name__)
+
+
+class StopEar:
+    """Listens for one robot at a time.
+
+    Args:
+        console: Which holds it.
+        heard: Called with each state, the one in force at the beginning included.
+    """
+
+    def __init__(self, console: Observer[Any], heard: Callable[[StopState], None]) -> None:
+        self._console, self._heard = console, heard
+        self._listening: Subscription | None = None
+
+    def listen(self, robot: str) -> None:
+        """Hear of this robot from now on, and of no other."""
+        self.close()
+        self._listening = watch_stops(self._console.bus, self._heard, robot)
+        self._console.start_task(self._ask(robot), "stop")
+
+    def close(self) -> None:
+        """Hear of none."""
+        if self._listening is not None:
+            self._listening.close()
+            self._listening = None
+
+    async def _ask(self, robot: str) -> None:
+        try:
+            self._heard(await ask_stop(self._console.bus, robot))
+        except (Refusal, LinkError) as error:  # a robot of another make may know no such stop
+            log.info("%s did not say whether it is stopped: %s", robot, error)
