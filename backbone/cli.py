@@ -187,7 +187,8 @@ def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
     """Return what a person reads of an error that ended a command, and the command's exit code."""
     match error:
         case Refusal():
-            code = ExitCode.NO_BACKBONE if code_of(error).startswith("run.") else ExitCode.REFUSED
+            codes = {"run": ExitCode.NO_BACKBONE, "usage": ExitCode.USAGE}
+            code = codes.get(code_of(error).partition(".")[0], ExitCode.REFUSED)
             return f"refused [{code_of(error)}]: {error}", code
         case HubUnreachable():
             return f"{error} (is the mission up there, and --secret-file the mission's?)", ExitCode.NO_BACKBONE

@@ -24,9 +24,14 @@ def log_lines(log: Log, now: Now) -> list[str]:
     """
     return [
         f"{now.time_of_day(event.at_s):%H:%M:%S} {event.at_s:10.2f} s  {_MARKS[event.level]:2s} "
-        f"{event.subject:{SUBJECT_COLUMNS}s}  {event.what}"
+        f"{_about(event):{SUBJECT_COLUMNS}s}  {event.what}"
         for event in log.events
     ]
+
+
+def _about(event: StoryEvent) -> str:
+    """Return whom or what it is about, unless the sentence begins with that."""
+    return "" if event.what.startswith(f"{event.subject} ") else event.subject
 
 
 def log_json(log: Log, now: Now) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from rich.text import Text
 from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import ExitCode, complaint_of
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import ComponentState, StoryEvent
 from backbone.core_launches import UpOptions
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health import HealthWord, MissionHealth, line
@@ -23,7 +23,9 @@ from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
 from backbone.mission_picture import LAUNCHER, MissionPicture, holders_line, look
 from backbone.mission_screen import live_screen
+from backbone.naming import Subsystem
 from backbone.operators import OperatorActed
+from backbone.people import People
 from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
@@ -48,6 +50,7 @@ class ConsoleObserver:
     def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
         self._console, self._live, self._verdict = console, live, verdict
         self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
+        self._people = People()
         self._told = self._health_told = ""
         self._is_up, self._last_progress_s = False, 0.0
 
@@ -65,6 +68,8 @@ class ConsoleObserver:
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people, and to the mission's health."""
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
+        consoles = f"{Subsystem.UI_CONSOLE}/*"
+        bus.subscribe(consoles, Conversation.STATUS, ComponentState, self._heard_console, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
 
@@ -135,7 +140,11 @@ class ConsoleObserver:
     def _heard_event(self, envelope: Envelope[Any]) -> None:
         self._show_event(printable_all(envelope.body))
 
-    def _show_event(self, event: StoryEvent) -> None:
+    def _heard_console(self, envelope: Envelope[Any]) -> None:
+        self._people.heard(printable_all(envelope.body))
+
+    def _show_event(self, told: StoryEvent) -> None:
+        event = self._people.named_event(told)
         self._events.append(event)
         if not self._live:
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
@@ -144,7 +153,7 @@ class ConsoleObserver:
         schedule: Schedule = envelope.body
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
             return
-        line = holders_line(schedule)
+        line = self._people.named(holders_line(schedule))
         if line != self._told:
             self._told = line
             self._print(f"{schedule.at_s:9.2f} s  {line}")

@@ -74,6 +74,10 @@ class People:
         """
         return _NAME.sub(self._name_of, text) if self._called else text
 
+    def doing(self, component: ComponentState) -> str:
+        """Return what a component says it is doing, beginning with who sits there if somebody does."""
+        return f"{component.user} {self.named(component.feedback)}".strip()
+
     def named_event(self, event: StoryEvent) -> StoryEvent:
         """Return the event with the persons' names in what it says; where it was told and its cause stay."""
         subject, what = self.person(event.subject), self.named(event.what)

@@ -504,7 +504,6 @@ class TeamModel:
         )
 
     def _component_row(self, component: ComponentState) -> ComponentRow:
-        doing = self.people.named(component.feedback)
         return ComponentRow(
             component_of(component.address),
             component.address,
@@ -514,7 +513,7 @@ class TeamModel:
             component.pid,
             str(component.state),
             component.since_s,
-            f"{component.user} {doing}".strip(),
+            self.people.doing(component),
         )
 
     # ------------------------------------------------------------------ what alarms are about

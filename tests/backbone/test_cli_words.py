@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from backbone.cli import app, complaint_of, hub_endpoint
+from backbone.cli import ExitCode, app, complaint_of, hub_endpoint
 from backbone.completion import names_of, people_of, resources_of
 from backbone.component.messages import ComponentState, LifeState
 from backbone.errors import HubUnreachable
 from backbone.mission_picture import MissionPicture
+from backbone.moments import NoMoment
 from backbone.rc_manager.messages import RcView, RequestState, RequestView, Schedule
 from ui_console.cli import app as console_app
 
@@ -57,10 +58,10 @@ def test_a_hub_that_is_not_there_is_one_sentence_without_anything_inner() -> Non
     assert line.startswith("no hub answers at tcp/x:1 (is the mission up there")
 
 
-def test_a_moment_that_is_none_is_refused(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["log", "--since", "soon"])
-    assert done.exit_code in (4, 5)
-    assert done.stdout == ""
+def test_a_moment_that_is_none_is_wrong_usage() -> None:
+    line, code = complaint_of(NoMoment("'soon' is no moment"))
+    assert code == ExitCode.USAGE
+    assert "14:05" in line
 
 
 # ---------------------------------------------------------------------- completion
