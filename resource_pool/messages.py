@@ -49,7 +49,7 @@ class Drive(Message, frozen=True):
     Attributes:
         left_rad_s: Left wheel, forward is positive.
         right_rad_s: Right wheel.
-        after_stop: Number of the robot's last stop that whoever says this knows of; 0: of none.
+        after_stop: Number of the robot's last stop that whoever says this knows to be lifted; 0: of none.
     """
 
     left_rad_s: WheelSpeed

@@ -6,7 +6,7 @@ Rules of this file: pure; time is an argument; no bus.
   author, and has a number of its own.
 * Only the stop that was seen is lifted. A lift on its way while somebody stops again changes nothing.
 * Who holds the robot keeps it; its drives and jumps are refused with the author and the reason.
-* A command counts only if whoever gave it knew of the last stop: one that was on its way then is refused for good.
+* A command counts only if whoever gave it knew that the last stop was lifted: one that was on its way then is refused.
 """
 
 from __future__ import annotations
@@ -75,11 +75,11 @@ class StopLatch:
         """Return if a command may move the robot.
 
         Args:
-            after_stop: Number of the last stop that whoever gave the command knew of.
+            after_stop: Number of the last stop that whoever gave the command knew to be lifted.
 
         Raises:
             EmergencyStopped: The robot may not move.
-            GivenBeforeStop: It may, and the command is older than its last stop.
+            GivenBeforeStop: It may, and the command is older than the lift of its last stop.
         """
         state = self.state
         if state.is_stopped:

@@ -206,7 +206,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._is_attended:
             self._is_attended = False
             self.show(Attention(self.clock.now_s(), False))
-        self.stop()
         self.require_let_go()
 
     def require_let_go(self) -> None:
