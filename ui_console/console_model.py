@@ -273,7 +273,8 @@ class ConsoleModel:
             slice_end = f", slice {left_s:.0f} s" if left_s > 0 else ""
             return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
         if self.asked is None:
-            return "watching; you hold no robot"
+            there = "; ".join(self.other_screens())
+            return f"watching; you hold no robot{f' here; your other screen, {there}' if there else ''}"
         wanted = self.robot or "a robot"
         if self.why is not None and self.why.why.lines:
             return f"waiting for {wanted}: {self.team.people.named(self.why.why.lines[0])}"

@@ -279,6 +279,7 @@ class Operator:
             return
         try:
             self._console = await self._hands.new_console(self, robot)
+            self.model.name = self._console.name  # others of this person are other screens
         except LinkError as error:
             self.show(LinkTrouble(self._hands.clock.now_s(), str(error)))
             return
