@@ -14,7 +14,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import ExitCode, SecretFile, finite, read_secret_option, run, say
+from backbone.cli import (
+    ExitCode,
+    SecretFile,
+    WholeHelp,
+    complete_mission,
+    finite,
+    hub_endpoint,
+    picture_for,
+    read_secret_option,
+    run,
+    say,
+)
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -39,6 +50,7 @@ SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
+    cls=WholeHelp,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -46,6 +58,15 @@ app = typer.Typer(
     help="Consoles of a mission. Exit codes: 0 done, 1 unexpected, 2 usage or wrong script, 4 backbone not reached, "
     "5 refused, 130 Ctrl-C.",
 )
+
+
+def complete_robot(ctx: typer.Context) -> list[str]:
+    """Return the robots of the mission that is up, for a shell."""
+    from ui_console.team_model import ROBOT_KIND
+
+    picture = picture_for(ctx)
+    rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
+    return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
 
 
 class Profile(StrEnum):
@@ -56,8 +77,13 @@ class Profile(StrEnum):
     MONITOR = "monitor"  # tables only; drives nothing
 
 
-Mission = Annotated[str | None, typer.Option("--mission", help="Name of a mission that is up on this machine.")]
-Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")]
+Mission = Annotated[
+    str | None,
+    typer.Option("--mission", autocompletion=complete_mission, help="Name of a mission that is up on this machine."),
+]
+Connect = Annotated[
+    str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
+]
 
 
 User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
@@ -115,7 +141,10 @@ class _Site:
 
 @app.command()
 def attach(
-    robot: Annotated[str, typer.Argument(help="Robot to take over; none: any free one with a camera.")] = "",
+    robot: Annotated[
+        str,
+        typer.Argument(autocompletion=complete_robot, help="Robot to take over; none: any free one with a camera."),
+    ] = "",
     priority: Annotated[
         int, typer.Option(min=LEAST_PRIORITY, max=MOST_PRIORITY, help="Beside the mission's own; larger is higher.")
     ] = 100,

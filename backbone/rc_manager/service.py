@@ -21,6 +21,7 @@ from typing import Any, assert_never
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
@@ -317,7 +318,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _trace_stopped(self) -> None:
         """Let people know; the mission goes on without a trace."""
-        self.tell(self.name, self._why_no_trace())
+        self.tell(self.name, self._why_no_trace(), LogLevel.WARNING)
         self.changed()
 
     def _why_no_trace(self) -> str:
@@ -431,7 +432,7 @@ class RcManager(Component[RcManagerParameters]):
         if self._faults.get(rc) != fault:
             self._faults[rc] = fault
             log.warning("%s is put aside: %s", rc, fault)
-            self.tell(rc, f"is put aside: {fault}")
+            self.tell(rc, f"is put aside: {fault}", LogLevel.WARNING)
             self.happened(RcWentDown(rc, fault))
         self._meet_in_a_while(rc)
 
@@ -631,7 +632,7 @@ class RcManager(Component[RcManagerParameters]):
         try:
             await self._request(current.request)  # its own question was lost, or is still on its way
         except (Refusal, LinkError) as error:
-            self.story.note(arc, f"cannot be scheduled: {error}")
+            self.story.note(arc, f"got no place in the schedule: {error}")
 
 
 def _has_lines(trace: Path) -> bool:
