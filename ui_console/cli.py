@@ -429,7 +429,6 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
 
 
 async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> int:
-    from backbone.bus.clock import MissionClock
     from backbone.mission.reader import MissionInvalid
     from ui_console.design.look_up import look_up
     from ui_console.web.design_room import DesignRoom
@@ -456,7 +455,7 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
 
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended, number)
-    room = DesignRoom(draft, kept, look_up, MissionClock.started_now())
+    room = DesignRoom(draft, kept, look_up)
     server = DesignServer(room, Doorkeeper(passes))
     await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end, encryption)
     return ExitCode.INTERRUPTED if signal.SIGINT in came else ExitCode.DONE
