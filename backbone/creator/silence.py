@@ -17,7 +17,7 @@ from backbone.component.heartbeat import Vitals
 
 LOOK_EVERY_S = 0.2  # chosen: a little more often than a process beats
 LOOK_MOST_S = 0.4  # chosen: twice the period: one look may be missed
-SHOWN_AFTER_S = 0.55  # chosen: three looks; with the one that saw the last beat it is told 0.8 s after a process stopped
+SHOWN_AFTER_S = 0.55  # chosen: three looks; told 0.8 s after a process stopped, with the look that saw its last beat
 
 
 @dataclass
