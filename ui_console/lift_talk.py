@@ -82,4 +82,4 @@ class LiftTalk:
         except LinkError:  # it may be a console at which they sit
             return Consent(False, question.author, "does not answer", is_here=console == question.console)
         except Refusal as refusal:
-            return Consent(False, question.author, refusal.detail)
+            return Consent(False, question.author, refusal.detail, is_here=console == question.console)
