@@ -392,7 +392,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.require_let_go()
         await self._ear.listen(robot)
-        if not self.is_held or self._arc is None or self._arc.granted is not notice:
+        if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
             return  # it went again meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
         now_s = self.clock.now_s()
