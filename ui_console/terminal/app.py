@@ -6,7 +6,8 @@ Widgets are thin: what they show is in ``ConsoleModel``, what keys do is in the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
+from functools import partial
 from typing import Any, ClassVar, TypeVar
 
 import msgspec
@@ -249,6 +250,14 @@ class ConsoleApp(App[None]):
         self._session.require_let_go()
         self.push_screen(dialog, closed)
 
+    def _begin(self, act: Callable[[], Coroutine[Any, Any, object]], question: str = "") -> None:
+        """Do this while keys are heard; of several that ask the same question, the last."""
+
+        async def work() -> None:
+            await act()
+
+        self.run_worker(work, group=question or "default", exclusive=bool(question))
+
     # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
         """Take note that somebody is there."""
@@ -335,13 +344,13 @@ class ConsoleApp(App[None]):
             return
         self._session.touch()
         self._session.stop()
-        self.run_worker(self._stop_robot(robot), exclusive=False)
+        self._begin(partial(self._stop_robot, robot))
 
     def action_stop_all(self) -> None:
         """Stop all robots, whoever holds them."""
         self._session.touch()
         self._session.stop()
-        self.run_worker(self._stop_all(), exclusive=False)
+        self._begin(self._stop_all)
 
     def action_lift(self) -> None:
         """Show whose stop is meant and why it was set, and lift it if another key says so."""
@@ -353,9 +362,7 @@ class ConsoleApp(App[None]):
             told = "which one? move to the row of a stopped robot first" if stopped else "no robot is stopped"
             self.notify(told, severity="warning")
             return
-        self._open(
-            LiftQuestion(meant, stop), lambda number: self.run_worker(self._lift(meant, number), exclusive=False)
-        )
+        self._open(LiftQuestion(meant, stop), lambda number: self._begin(partial(self._lift, meant, number)))
 
     async def _lift(self, robot: str, number: int) -> None:
         if not await self._session.lift_stop(robot, number):
@@ -378,7 +385,7 @@ class ConsoleApp(App[None]):
         """Take the robot of this number in place of the one that is held."""
         robots = self._view.robots if self._view is not None else []
         if number <= len(robots):
-            self.run_worker(self._session.switch(robots[number - 1].robot), group="switch", exclusive=False)
+            self._begin(partial(self._session.switch, robots[number - 1].robot))
 
     def action_pick(self) -> None:
         """Pick a robot from the list."""
@@ -386,7 +393,7 @@ class ConsoleApp(App[None]):
             return
         self._open(
             RobotPicker(robot_rows(self._view.robots, self._view.now_s)),
-            lambda robot: self.run_worker(self._session.switch(robot), group="switch", exclusive=False),
+            lambda robot: self._begin(partial(self._session.switch, robot)),
         )
 
     # ------------------------------------------------------------------ tables
@@ -406,7 +413,7 @@ class ConsoleApp(App[None]):
         """Say why what the cursor is on is as it is."""
         subject = self._subject()
         if subject:
-            self.run_worker(self._why(subject), group="why", exclusive=True)
+            self._begin(partial(self._why, subject), "why")
 
     async def _why(self, subject: str) -> None:
         self._open(Reading(f"why {subject}?", await self._session.why(subject)))
@@ -442,7 +449,7 @@ class ConsoleApp(App[None]):
         """Have the component the cursor is on tell its parameters."""
         subject = self._subject()
         if subject:
-            self.run_worker(self._ask_parameters(subject), group="parameters", exclusive=True)
+            self._begin(partial(self._ask_parameters, subject), "ask")
 
     async def _ask_parameters(self, name: str) -> None:
         if await self._session.ask_parameters(name):
@@ -461,7 +468,7 @@ class ConsoleApp(App[None]):
 
         self._open(
             Question(f"{parameter.component}.{parameter.name} =", parameter.value),
-            lambda text: self.run_worker(self._set(parameter.component, parameter.name, text), group="parameters"),
+            lambda text: self._begin(partial(self._set, parameter.component, parameter.name, text)),
         )
 
     async def _set(self, component: str, parameter: str, text: str) -> None:
