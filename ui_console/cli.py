@@ -14,7 +14,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import ExitCode, SecretFile, finite, read_secret_option, run, say
+from backbone.cli import (
+    ExitCode,
+    SecretFile,
+    WholeHelp,
+    complete_mission,
+    finite,
+    hub_endpoint,
+    picture_for,
+    read_secret_option,
+    run,
+    say,
+)
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -25,6 +36,7 @@ if TYPE_CHECKING:
     from ui_console.design.draft import Draft
     from ui_console.observer import Observer
     from ui_console.web.door import Pass
+    from ui_console.web.token_file import TokenFile
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
@@ -39,6 +51,7 @@ SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
+    cls=WholeHelp,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -46,6 +59,15 @@ app = typer.Typer(
     help="Consoles of a mission. Exit codes: 0 done, 1 unexpected, 2 usage or wrong script, 4 backbone not reached, "
     "5 refused, 130 Ctrl-C.",
 )
+
+
+def complete_robot(ctx: typer.Context) -> list[str]:
+    """Return the robots of the mission that is up, for a shell."""
+    from ui_console.team_model import ROBOT_KIND
+
+    picture = picture_for(ctx)
+    rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
+    return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
 
 
 class Profile(StrEnum):
@@ -56,8 +78,13 @@ class Profile(StrEnum):
     MONITOR = "monitor"  # tables only; drives nothing
 
 
-Mission = Annotated[str | None, typer.Option("--mission", help="Name of a mission that is up on this machine.")]
-Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")]
+Mission = Annotated[
+    str | None,
+    typer.Option("--mission", autocompletion=complete_mission, help="Name of a mission that is up on this machine."),
+]
+Connect = Annotated[
+    str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
+]
 
 
 User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
@@ -100,6 +127,7 @@ class _Site:
     key: str
     kind: str
     away_after_s: float
+    has_new_tokens: bool
 
     @property
     def encryption(self) -> SSLContext | None:
@@ -115,7 +143,10 @@ class _Site:
 
 @app.command()
 def attach(
-    robot: Annotated[str, typer.Argument(help="Robot to take over; none: any free one with a camera.")] = "",
+    robot: Annotated[
+        str,
+        typer.Argument(autocompletion=complete_robot, help="Robot to take over; none: any free one with a camera."),
+    ] = "",
     priority: Annotated[
         int, typer.Option(min=LEAST_PRIORITY, max=MOST_PRIORITY, help="Beside the mission's own; larger is higher.")
     ] = 100,
@@ -221,6 +252,10 @@ def serve(
         str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
     ] = "",
     kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim.")] = KINDS["terminal"],
+    new_tokens: Annotated[
+        bool,
+        typer.Option("--new-tokens", help="Forget the tokens of the server before; its open pages do not come back."),
+    ] = False,
     away_after: Annotated[
         float,
         typer.Option(
@@ -246,7 +281,7 @@ def serve(
     if key and not certificate:
         say("--key belongs to a --certificate")
         raise typer.Exit(ExitCode.USAGE)
-    site = _Site(host, port, certificate, key, kind, away_after)
+    site = _Site(host, port, certificate, key, kind, away_after, new_tokens)
     if design:
         if mission is not None or connect is not None:
             say("--design serves a mission file; --mission and --connect are for missions that are up")
@@ -392,6 +427,7 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
 
     from ui_console.web.door import Doorkeeper
     from ui_console.web.hub import WebHub
+    from ui_console.web.token_file import kept_or_new
 
     try:
         from ui_console.web.reception import CannotListen
@@ -402,6 +438,9 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     encryption = site.encryption
     launch, clock, secret = await _launch(where, {})
     launch = msgspec.structs.replace(launch, name=f"web-{os.getpid()}")
+    tokens = _token_file(launch.mission, site) if where.connect is None else None
+    if tokens is not None and not site.has_new_tokens:
+        passes = kept_or_new(passes, tokens.read())
 
     async def join(one_more: Launch) -> Any:
         return await _open_bus(one_more, clock, secret)
@@ -410,18 +449,38 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     hub = WebHub(launch, bus, clock, join, kind=site.kind, away_after_s=site.away_after_s)
     interrupted = _end_on_signals(hub.observer)
 
+    def ready(port: int) -> None:
+        _keep(tokens, passes)
+        _tell_where(site, port, passes)
+
     try:
-        await WebServer(hub, Doorkeeper(passes)).run(
-            site.host, site.port, lambda port: _tell_where(site, port, passes), encryption
-        )
+        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, ready, encryption)
     except CannotListen:
         await bus.close()
         raise
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 
+def _token_file(mission: str, site: _Site) -> TokenFile | None:
+    """Return where the tokens are kept; None: nowhere, for no open page can come back to a port that nobody chose."""
+    from backbone import run_files
+    from ui_console.web.token_file import TokenFile
+
+    return TokenFile(run_files.run_directory(mission), site.port) if site.port else None
+
+
+def _keep(tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:
+    """Have the next server know the pages that are open; this one serves also if it cannot."""
+    from ui_console.web.token_file import TokensNotKept
+
+    try:
+        if tokens is not None:
+            tokens.keep(passes)
+    except TokensNotKept as refusal:
+        say(str(refusal))
+
+
 async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> int:
-    from backbone.bus.clock import MissionClock
     from backbone.mission.reader import MissionInvalid
     from ui_console.design.look_up import look_up
     from ui_console.web.design_room import DesignRoom
@@ -448,7 +507,7 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
 
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended, number)
-    room = DesignRoom(draft, kept, look_up, MissionClock.started_now())
+    room = DesignRoom(draft, kept, look_up)
     server = DesignServer(room, Doorkeeper(passes))
     await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end, encryption)
     return ExitCode.INTERRUPTED if signal.SIGINT in came else ExitCode.DONE

@@ -448,7 +448,7 @@ async def test_a_robot_that_was_taken_away_says_by_whom_across_the_picture() -> 
         screen.redraw()
         await pilot.pause()
         video = screen.query_one(Video)
-        assert "higher by console-2" in video.render_line(video.size.height // 2).text
+        assert "console-2 has the higher priority" in video.render_line(video.size.height // 2).text
 
 
 # ---------------------------------------------------------------------- every screen as it was when somebody looked

@@ -17,7 +17,6 @@ from msgspec import DecodeError
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from backbone.bus.clock import MissionClock
 from ui_console.design.catalogue import ClassFacts
 from ui_console.design.draft import Draft
 from ui_console.design.keeping import path_of_draft
@@ -122,7 +121,7 @@ async def serving(file: Path) -> AsyncIterator[Serving]:
         asked.extend(class_paths)
         return {path: ClassFacts(f"About {path}.") for path in class_paths}
 
-    made = Serving(DesignRoom(draft, kept, look_up, MissionClock.started_now()))
+    made = Serving(DesignRoom(draft, kept, look_up))
     made.asked = asked
     ready = asyncio.Event()
 
@@ -245,7 +244,7 @@ async def test_what_somebody_else_wrote_is_kept_until_it_is_told_to_overwrite(fi
         write(file, b"<mission")
         answer = await anna.change(do="reread")
         assert answer is not None
-        assert "no well-formed XML" in answer["refused"]
+        assert "not well-formed XML" in answer["refused"]
         await anna.change(do="save", overwrite=True)
     assert read(file) == theirs
 
