@@ -6,12 +6,13 @@ Widgets are thin: what they show is in ``ConsoleModel``, what keys do is in the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any, ClassVar, TypeVar
 
 import msgspec
 from rich.text import Text
+from textual import work
 from textual.app import App, ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
@@ -250,13 +251,10 @@ class ConsoleApp(App[None]):
         self._session.require_let_go()
         self.push_screen(dialog, closed)
 
-    def _begin(self, act: Callable[[], Coroutine[Any, Any, object]], question: str = "") -> None:
-        """Do this while keys are heard; of several that ask the same question, the last."""
-
-        async def work() -> None:
-            await act()
-
-        self.run_worker(work, group=question or "default", exclusive=bool(question))
+    @work
+    async def _begin(self, act: Callable[[], Awaitable[object]]) -> None:
+        """Do this while keys are heard."""
+        await act()
 
     # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
@@ -413,8 +411,9 @@ class ConsoleApp(App[None]):
         """Say why what the cursor is on is as it is."""
         subject = self._subject()
         if subject:
-            self._begin(partial(self._why, subject), "why")
+            self._why(subject)
 
+    @work(group="why", exclusive=True)
     async def _why(self, subject: str) -> None:
         self._open(Reading(f"why {subject}?", await self._session.why(subject)))
 
@@ -449,8 +448,9 @@ class ConsoleApp(App[None]):
         """Have the component the cursor is on tell its parameters."""
         subject = self._subject()
         if subject:
-            self._begin(partial(self._ask_parameters, subject), "ask")
+            self._ask_parameters(subject)
 
+    @work(group="parameters", exclusive=True)
     async def _ask_parameters(self, name: str) -> None:
         if await self._session.ask_parameters(name):
             self.chosen = self._turn = PanelName.PARAMETERS
