@@ -15,6 +15,7 @@ from textual.events import AppBlur, AppFocus
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
+from backbone.component.messages import StoryEvent
 from ui_console.consent import Consent, Settled, Sought
 from ui_console.console_events import (
     Attention,
@@ -27,6 +28,7 @@ from ui_console.console_events import (
     Lost,
     ScheduleHeard,
     StopHeard,
+    StoryHeard,
 )
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
@@ -101,6 +103,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
         "question_mark",
         "f1",
         "e",
+        "slash",
     }
     elsewhere |= {"left_square_bracket", "pageup", "right_square_bracket", "pagedown", "4", "5", "6", "7", "8", "9"}
     known = set(ConsoleApp(WrittenSession())._bindings.key_to_bindings)  # noqa: SLF001  what the footer is made of
@@ -210,6 +213,30 @@ async def test_tab_goes_through_all_tables_and_back() -> None:
         assert screen.chosen is PanelName.LOG
 
 
+async def test_the_log_is_searched_by_words_and_by_fields() -> None:
+    story = [
+        StoryHeard(9.0, StoryEvent(9.0, "ui_console/console-1", f"anna tells {n}", "scout2", "")) for n in range(3)
+    ]
+    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, *story))
+    async with app.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("slash")
+        await pilot.press(*"robot", "colon", *"scout2 ", *"tells 1", "enter")
+        await settle(pilot)
+        told = screen_text(app)
+        assert "log: robot:scout2 tells 1" in told
+        assert "anna tells 1" in told
+        assert "anna tells 2" not in told
+        assert "saw motion" not in told
+        await pilot.press("slash")
+        await pilot.press(*"since", "colon", *"soon", "enter")
+        await settle(pilot)
+        await pilot.pause()
+        assert "no number of mission seconds" in screen_text(app)
+        await pilot.press("slash", "delete", "enter")
+        await settle(pilot)
+        assert "saw motion" in screen_text(app)
+
+
 async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:
     session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
     screen = ConsoleApp(session)
@@ -234,6 +261,16 @@ async def test_why_is_shown_and_closed_and_drives_nothing_meanwhile() -> None:
         await pilot.pause()
         assert "minimum run time" not in screen_text(pilot.app)
     assert session.wanted == [("why", "scout1")]
+
+
+async def test_why_of_an_alarm_says_where_to_look_too() -> None:
+    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, StopHeard(11.0, STOP)))
+    async with app.run_test(size=SIZE) as pilot:
+        while app.chosen is not PanelName.ALARMS:
+            await pilot.press("tab")
+        await pilot.press("y")
+        await settle(pilot)
+        assert "where: scout on base" in screen_text(app)
 
 
 @pytest.mark.parametrize("is_sure", [True, False])

@@ -21,6 +21,7 @@ from textual.screen import Screen
 from textual.widgets import Input, Static
 
 from backbone.cli import ExitCode
+from ui_console.console_model import LOG_SHOWN
 from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
@@ -28,6 +29,7 @@ from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading,
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
 from ui_console.terminal.lines import Row, robot_rows
+from ui_console.terminal.log_search import SEARCH_HELP, WrongSearch, read_search
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
@@ -108,6 +110,7 @@ class ConsoleApp(App[None]):
         self.speed_rad_s = SPEED_RAD_S
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
+        self._search = ""
         self._view: ConsoleView | None = None
 
     @property
@@ -168,7 +171,8 @@ class ConsoleApp(App[None]):
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)
-        turn.border_title = self._turn
+        is_searched = self._turn is PanelName.LOG and bool(self._search)
+        turn.border_title = Text(f"log: {self._search}" if is_searched else self._turn)
         self._show(self._turn, turn, view)
         keys = hints(view, self.profile, self._robot_meant())
         main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
@@ -214,6 +218,9 @@ class ConsoleApp(App[None]):
     def _show(self, name: PanelName, panel: Panel, view: ConsoleView) -> None:
         is_chosen = name is self.chosen
         panel.set_class(is_chosen, "-chosen")
+        if name is PanelName.LOG and self._search:
+            found = self._session.model.team.log(LOG_SHOWN, read_search(self._search))
+            view = msgspec.structs.replace(view, log=found)
         rows = table_rows(name, view, panel.content_size.width)
         panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
@@ -408,14 +415,15 @@ class ConsoleApp(App[None]):
         self._panel().move(steps)
 
     def action_why(self) -> None:
-        """Say why what the cursor is on is as it is."""
-        subject = self._subject()
-        if subject:
-            self._why(subject)
+        """Say why what the cursor is on is as it is; of an alarm, also where to look."""
+        row = self._panel().row
+        if row is not None and row.subject:
+            where = next((alarm.where for alarm in self._alarms() if alarm.key == row.key), "")
+            self._why(row.subject, [f"where: {where}"] if where else [])
 
     @work(group="why", exclusive=True)
-    async def _why(self, subject: str) -> None:
-        self._open(Reading(f"why {subject}?", await self._session.why(subject)))
+    async def _why(self, subject: str, first: list[str]) -> None:
+        self._open(Reading(f"why {subject}?", [*first, *await self._session.why(subject)]))
 
     def action_acknowledge(self) -> None:
         """A robot that was lost is known to be; else the alarm the cursor is on was seen, or the first of the list."""
@@ -474,6 +482,20 @@ class ConsoleApp(App[None]):
     async def _set(self, component: str, parameter: str, text: str) -> None:
         if not await self._session.set_parameter(component, parameter, read_value(text)):
             self.notify(f"{component} did not take {parameter} = {text}: see the alarms", severity="error")
+        self.redraw()
+
+    def action_search(self) -> None:
+        """Show only what fits in the log."""
+        self._open(Question("search the log", self._search, SEARCH_HELP), self._searched)
+
+    def _searched(self, line: str) -> None:
+        try:
+            read_search(line)
+        except WrongSearch as wrong:
+            self.notify(str(wrong), severity="warning", markup=False)
+            return
+        self._search = " ".join(line.split())
+        self.chosen = self._turn = PanelName.LOG
         self.redraw()
 
     def action_bare(self) -> None:
