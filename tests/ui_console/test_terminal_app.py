@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from console_scenes import ASK, GRANT, SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 from screen_text import same_as_before, screen_text
+from textual.binding import Binding
 from textual.events import AppBlur, AppFocus
 from textual.widgets import Input
 from written_session import WrittenSession, settle
@@ -33,6 +34,7 @@ from ui_console.console_events import (
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
 from ui_console.terminal.keys import DRIVES, Profile
+from ui_console.terminal.keys import KEYS as KEYS_OF_THE_CONSOLE
 from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import DrivePad, Panel, Video
 
@@ -61,6 +63,7 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("x", ["stop", ("stop robot", "scout1")]),
     ("X", ["stop", "stop all"]),
     ("alt+x", ["stop", ("stop robot", "scout1")]),
+    ("shift+x", ["stop", "stop all"]),
     ("alt+shift+x", ["stop", "stop all"]),
     ("c", []),
     ("1", [("switch", "scout1")]),
@@ -122,6 +125,16 @@ def test_the_reference_names_every_key_and_who_has_it() -> None:
         bindings = screen._bindings.key_to_bindings  # noqa: SLF001  what the footer is made of
         can = {key for key, found in bindings.items() if screen.check_action(found[0].action.partition("(")[0], ())}
         assert {key for key, who in listed.items() if name in who} == can
+
+
+def test_the_how_to_names_only_keys_that_there_are() -> None:
+    page = (Path(__file__).parents[2] / "docs/how-to/operate-from-a-terminal.md").read_text().replace("```", "")
+    signs = {"plus": "+", "minus": "-", "slash": "/", "question_mark": "?"}
+    signs |= {"left_square_bracket": "[", "right_square_bracket": "]"}
+    known = {signs.get(binding.key, binding.key) for binding in Binding.make_bindings(KEYS_OF_THE_CONSOLE)}
+    lifts = {"l"}
+    assert set(re.findall(r"`(\S)`", page)) <= known | lifts
+    assert {"x", "X", "c", "l", "t", "r", "m", "g", "n", "/", "y"} <= set(re.findall(r"`(\S)`", page))
 
 
 async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds() -> None:
