@@ -25,6 +25,8 @@ from ui_console.console_events import (
     ConsentSettled,
     ConsentSought,
     ConsoleEvent,
+    GivenBack,
+    LinkHeard,
     LinkTrouble,
     Lost,
     ScheduleHeard,
@@ -442,6 +444,40 @@ async def test_the_pendants_key_gives_back_what_is_wanted_or_held() -> None:
     async with ConsoleApp(session, profile=Profile.PENDANT).run_test(size=(50, 20)) as pilot:
         await pilot.press("enter")
     assert session.wanted == ["release"]
+
+
+# ---------------------------------------------------------------------- no link, and a robot that was lost
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_a_console_without_a_link_says_across_the_screen_that_it_stops_nothing(profile: Profile) -> None:
+    session = WrittenSession(shown=held_model())
+    app = ConsoleApp(session, profile=profile)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.model.apply(LinkHeard(11.0, False))
+        await pilot.pause(0.5)  # no key is pressed: it is the console that has to look
+        shown = " ".join(screen_text(app).split())
+        assert "NO LINK to the mission" in shown
+        assert "x and X reach no robot now: stop at another console, or at the robot itself" in shown
+        assert "you hold" not in shown
+        assert app.screen.has_class("-unlinked")
+        session.model.apply(LinkHeard(11.5, True, 0.001))
+        await pilot.pause(0.5)
+        assert "NO LINK" not in screen_text(app)
+        assert not app.screen.has_class("-unlinked")
+
+
+async def test_a_robot_that_was_lost_is_taken_again_by_one_key_or_known_to_be_lost_by_another() -> None:
+    shown = held_model()
+    shown.apply(GivenBack(11.0, "anna is away", True, wanted=False))
+    session = WrittenSession(shown=shown)
+    app = ConsoleApp(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        told = "you lost scout1 1 s ago: anna is away [t: take it again, k: seen]"
+        assert told in " ".join(screen_text(app).split())
+        await pilot.press("t", "k")
+        await settle(pilot)
+        assert session.wanted == ["take", "dismiss lost"]
+        assert "you lost" not in screen_text(app)
 
 
 # ---------------------------------------------------------------------- the picture
