@@ -45,7 +45,7 @@ function changed({ is, why, ageMs }) {
   driving.letGo();
   cards.letGo();
   if (link.isUp) find("console").hidden = false;
-  else hand.cut(why, ageMs);
+  else { hand.cut(why, ageMs); cards.cut(); }
   if (is === "fresh") cards.watch();
   if (is === "refused") { find("console").hidden = true; login.ask(why); }
   blindness.look();
