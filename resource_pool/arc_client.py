@@ -344,10 +344,16 @@ class ArcClient:
             LinkError: The robot's RC did not say whether one does.
         """
         lifted = asyncio.Event()
-        hearing = watch_stops(self._bus, lambda state: None if state.is_stopped else lifted.set(), robot)
+
+        def heard(state: StopState) -> None:
+            self.heard_stop(state)
+            if not state.is_stopped:
+                lifted.set()
+
+        hearing = watch_stops(self._bus, heard, robot)
         try:
-            if (await ask_stop(self._bus, robot)).is_stopped:
-                await lifted.wait()
+            heard(await ask_stop(self._bus, robot))
+            await lifted.wait()
         finally:
             hearing.close()
 

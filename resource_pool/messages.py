@@ -49,7 +49,7 @@ class Drive(Message, frozen=True):
     Attributes:
         left_rad_s: Left wheel, forward is positive.
         right_rad_s: Right wheel.
-        after_stop: Number of the robot's last stop that whoever says this knows of; 0: of none.
+        after_stop: Number of the robot's last stop that whoever says this knows to be lifted; 0: of none.
     """
 
     left_rad_s: WheelSpeed
@@ -266,6 +266,8 @@ class LoadPacket(Message, frozen=True):
             A robot RC that hangs must not keep its robot moving through the radio.
         afterwards: What is repeated after the packet was sent once, or has lasted its time; empty: what was before.
         kind: Which of the ARC's streams on the radio it is sent in; if it has none of that kind: its first.
+        moves: True: it moves the robot; it is not sent once a packet of a later stop was loaded.
+        robot_stop: Number of the robot's last stop when this was made.
     """
 
     arc: Mention
@@ -278,6 +280,8 @@ class LoadPacket(Message, frozen=True):
     afterwards: Payload = b""
     lasts_s: Duration = 0.0
     kind: Mention = "drive"
+    moves: bool = False
+    robot_stop: Count = 0
 
 
 class PacketLoaded(Message, frozen=True):
@@ -425,6 +429,7 @@ class RadioPacket(Message, frozen=True):
         epoch: For the audit: the robot's epoch under which the payload was made.
         number: Of the packet among those of its radio since it was opened.
         air_time_s: How long its bits take.
+        robot_stop: For the audit: number of the robot's last stop when the payload was made.
     """
 
     radio: Mention
@@ -434,6 +439,7 @@ class RadioPacket(Message, frozen=True):
     epoch: Epoch = 0
     number: Count = 0
     air_time_s: Duration = 0.0
+    robot_stop: Count = 0
 
 
 class AskWorld(Message, frozen=True):

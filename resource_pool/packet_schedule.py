@@ -10,6 +10,7 @@ Rules of this file:
 * A request not done by its deadline, which is the next release unless the ARC named another, is an overrun. One that
   has not even begun by then is lost.
 * An ARC's packets reach only the robots it loaded packets for; several of its robots take turns.
+* What moves a robot and was made before its last stop is not sent, whether it waits here or comes later.
 
 Pure; times are mission seconds.
 
@@ -43,6 +44,8 @@ class Packet:
             the ARC's main stream; empty: what was before.
         kind: Which of the ARC's streams it belongs to; if it has none of that kind, to its first.
         ticket: Tells packets apart that are sent once; 0: it is repeated.
+        moves: True if the robot moves by it.
+        robot_stop: Number of the robot's last stop when it was made.
     """
 
     arc: str
@@ -54,12 +57,14 @@ class Packet:
     afterwards: bytes = b""
     kind: str = ""
     ticket: int = 0
+    moves: bool = False
+    robot_stop: int = 0
 
     def at(self, now_s: float) -> Packet:
         """Return what is to be sent at this time: itself, or what comes after it."""
         if now_s < self.until_s:
             return self
-        return replace(self, payload=self.afterwards or self.safe_payload, until_s=math.inf)
+        return replace(self, payload=self.afterwards or self.safe_payload, until_s=math.inf, moves=False)
 
 
 @dataclass(slots=True)
@@ -105,6 +110,22 @@ class _Stream:
             self.first_s = None
         return packet, release_s
 
+    def stopped(self, network_id: int, stop: int) -> list[int]:
+        """Drop what was to move the robot, and count the rest as made after the stop; return the tickets dropped."""
+        dropped = [once.ticket for once in self.urgent if once.network_id == network_id and once.moves]
+        self.urgent = deque(
+            replace(once, robot_stop=stop) if once.network_id == network_id else once
+            for once in self.urgent
+            if once.network_id != network_id or not once.moves
+        )
+        repeated = self.packets.get(network_id)
+        if repeated is not None:
+            still = repeated.at(math.inf) if repeated.moves else repeated
+            self.packets[network_id] = replace(still, robot_stop=stop)
+        if not self.packets and not self.urgent:
+            self.first_s = None
+        return dropped
+
     def _next_packet(self, now_s: float) -> Packet:
         if self.urgent:
             return self.urgent.popleft()
@@ -122,6 +143,7 @@ class _Sender:
     rank: int
     streams: list[_Stream]
     touched: dict[int, Packet] = field(default_factory=dict)
+    stops: dict[int, int] = field(default_factory=dict)
     worst_packet_s: float = 0.0
 
     def stream_of(self, kind: str) -> _Stream:
@@ -198,9 +220,25 @@ class PacketSchedule:
             return []
         air_time_s = max(stream.usage.packet_time_s for stream in sender.streams)
         return [
-            Sending(Packet(p.arc, p.network_id, p.safe_payload, p.safe_payload, p.robot_epoch), air_time_s)
+            Sending(
+                Packet(p.arc, p.network_id, p.safe_payload, p.safe_payload, p.robot_epoch, robot_stop=p.robot_stop),
+                air_time_s,
+            )
             for _, p in sorted(sender.touched.items())
         ]
+
+    def is_overtaken(self, packet: Packet) -> bool:
+        """Return whether the packet moves its robot and was made before a stop that is known here."""
+        sender = self._senders.get(packet.arc)
+        return packet.moves and sender is not None and packet.robot_stop < sender.stops.get(packet.network_id, 0)
+
+    def hear_stop(self, packet: Packet) -> list[int]:
+        """Take note of the stop that the packet was made after; return the tickets of what is not sent for it."""
+        sender = self._senders[packet.arc]
+        if packet.robot_stop <= sender.stops.get(packet.network_id, 0):
+            return []
+        sender.stops[packet.network_id] = packet.robot_stop
+        return [ticket for stream in sender.streams for ticket in stream.stopped(packet.network_id, packet.robot_stop)]
 
     def load(self, packet: Packet, now_s: float) -> None:
         """Send this packet at its stream's rate from now on."""

@@ -65,7 +65,8 @@ class SimulatedWorld(Component[WorldParameters]):
         self._robots = {scout.network_id: scout.name for scout in described.scouts}
         self._on_since: dict[str, tuple[str, int]] = {}
         self._epochs: dict[int, int] = {}
-        self._packets = self._stale = self._late_frames = 0
+        self._stops: dict[int, tuple[int, int]] = {}
+        self._packets = self._stale = self._overtaken = self._late_frames = 0
         self._jammed_frames = 0
         self._away_s = 0.0
 
@@ -107,7 +108,7 @@ class SimulatedWorld(Component[WorldParameters]):
         return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:
-        """Count packets, and what must never be: packets of an epoch that is over, frames with a jammed frequency."""
+        """Count packets, and what must never be: some of an epoch that is over or from before a stop, jammed frames."""
         lost, delivered = self._air.lost, self._air.delivered
         return {
             "packets": self._packets,
@@ -116,6 +117,7 @@ class SimulatedWorld(Component[WorldParameters]):
             **{f"packets_lost_{name}": lost.get(network_id, 0) for network_id, name in self._robots.items()},
             **{f"packets_delivered_{name}": delivered.get(network_id, 0) for network_id, name in self._robots.items()},
             "stale_packets": self._stale,
+            "overtaken_packets": self._overtaken,
             "jammed_frames": self._jammed_frames,
             "late_frames": self._late_frames,
             "away_s": self._away_s,
@@ -129,12 +131,20 @@ class SimulatedWorld(Component[WorldParameters]):
             self._stale += 1
             self.story.note(packet.arc, f"sent robot {packet.network_id} a packet of the past epoch {packet.epoch}")
         self._epochs[packet.network_id] = max(packet.epoch, self._epochs.get(packet.network_id, 0))
+        self._audit_stops(packet)
         robot = self._robots.get(packet.network_id)
         away_m = None if robot is None else distance_m(self._world.position_m(robot), self._antenna_m)
         sent = Sent(
             packet.radio, packet.number, packet.network_id, packet.payload, self.clock.now_s(), packet.air_time_s
         )
         self._air.send(sent, away_m)
+
+    def _audit_stops(self, packet: RadioPacket) -> None:
+        last, now = self._stops.get(packet.network_id, (0, 0)), (packet.epoch, packet.robot_stop)
+        if now < last and packet.epoch == last[0]:
+            self._overtaken += 1
+            self.story.note(packet.arc, f"sent robot {packet.network_id} a packet from before its stop {last[1]}")
+        self._stops[packet.network_id] = max(now, last)
 
     def _publish(self, frame: int, at_s: float) -> None:
         transmitting = self._world.transmitting()

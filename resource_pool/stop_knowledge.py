@@ -1,8 +1,8 @@
-"""What a commander knows of the stops of robots; its commands carry the number of the last stop it knows of.
+"""What a commander knows of the stops of robots; its commands carry the number of the last stop it knows to be lifted.
 
 Rules of this file: pure; no bus, no clock.
 
-A command that was given before a stop may arrive after the stop and its lift. Its number tells it from one that was
+A command that was given before a stop or before its lift may arrive after both. Its number tells it from one that was
 given afterwards: the robot's RC refuses every number but that of its last stop.
 """
 
@@ -19,7 +19,8 @@ class StopKnowledge:
 
     def number(self, robot: str) -> int:
         """Return the number that commands to this robot carry; 0: no stop of it is known."""
-        return self._last.get(robot, (0, True))[0]
+        number, is_lifted = self._last.get(robot, (0, True))
+        return number if is_lifted else number - 1  # one that cannot be right, also if the lift overtakes the command
 
     def heard(self, state: StopState) -> bool:
         """Take in how a robot is; return whether that is news. What is older than what is known changes nothing."""

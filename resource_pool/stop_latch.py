@@ -6,14 +6,13 @@ Rules of this file: pure; time is an argument; no bus.
   author, and has a number of its own.
 * Only the stop that was seen is lifted. A lift on its way while somebody stops again changes nothing.
 * Who holds the robot keeps it; its drives and jumps are refused with the author and the reason.
-* A command counts only if whoever gave it knew of the last stop: one that was on its way then is refused afterwards too.
+* A command counts only if whoever gave it knew that the last stop was lifted: one that was on its way then is refused.
 """
 
 from __future__ import annotations
 
 import msgspec
 
-from backbone.errors import Fact
 from resource_pool.messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
 MOST_AUTHORS = 16  # chosen: more people than look after one robot
@@ -76,23 +75,27 @@ class StopLatch:
         """Return if a command may move the robot.
 
         Args:
-            after_stop: Number of the last stop that whoever gave the command knew of.
+            after_stop: Number of the last stop that whoever gave the command knew to be lifted.
 
         Raises:
             EmergencyStopped: The robot may not move.
-            GivenBeforeStop: It may, and the command is older than its last stop.
+            GivenBeforeStop: It may, and the command is older than the lift of its last stop.
         """
         state = self.state
-        facts: dict[str, Fact] = {
-            "rc": state.rc,
-            "number": state.number,
-            "is_stopped": state.is_stopped,
-            "by": state.by,
-            "reason": state.reason,
-            "since_s": state.at_s,
-        }
         if state.is_stopped:
             why = f": {state.reason}" if state.reason else ""
-            raise EmergencyStopped(f"{state.rc} was stopped by {state.by}{why}", **facts)
+            raise self._refusal(EmergencyStopped, f"{state.rc} was stopped by {state.by}{why}")
         if after_stop != state.number:
-            raise GivenBeforeStop(f"{state.rc} was stopped after this command was given, and freed by {state.by}", **facts)
+            raise self._refusal(GivenBeforeStop, f"{state.rc} was stopped since then, and freed by {state.by}")
+
+    def _refusal(self, kind: type[EmergencyStopped], detail: str) -> EmergencyStopped:
+        state = self.state
+        return kind(
+            detail,
+            rc=state.rc,
+            number=state.number,
+            is_stopped=state.is_stopped,
+            by=state.by,
+            reason=state.reason,
+            since_s=state.at_s,
+        )

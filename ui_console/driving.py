@@ -43,8 +43,23 @@ class GiveBack:
     """Release the robot."""
 
 
+@dataclass(frozen=True, slots=True)
+class StopRobot:
+    """Emergency stop of one robot, whoever holds it."""
+
+    robot: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StopAll:
+    """Emergency stop of all robots."""
+
+    reason: str = ""
+
+
 Command = Drive | Halt | Jump
-Wish = Command | GiveBack
+Wish = Command | GiveBack | StopRobot | StopAll
 
 Direction = Literal["forward", "backward", "left", "right"]
 
@@ -115,8 +130,8 @@ class DriveSpan:
 class DeadMan:
     """Turns key presses into commands that repeat while a key is held, and one halt after it.
 
-    Laws: a command is due only within the hold of a press; every drive is followed by a halt; from ``require_let_go`` on
-    a control that is held moves nothing until it was let go and pressed anew.
+    Laws: a command is due only within the hold of a press; every drive is followed by a halt; from ``require_let_go``
+    on a control that is held moves nothing until it was let go and pressed anew.
     """
 
     def __init__(self) -> None:

@@ -28,8 +28,11 @@ class Grip:
         self._waits = True
 
     def let_go(self) -> None:
-        """The control says that it is held no longer."""
-        self._until_s, self._waits = -math.inf, False
+        """The control says that it is held no longer: the next press counts, unless that is required anew.
+
+        What was held a moment ago may still be when it is required right afterwards: screens say so for other reasons.
+        """
+        self._waits = False
 
     def press(self, now_s: float, lasts_s: float) -> bool:
         """The control is held, for the first time or still; return whether that counts.

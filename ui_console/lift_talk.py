@@ -68,7 +68,7 @@ class LiftTalk:
         try:
             question = AskLift(robot, author.by, self._user)
             consent = await bus.ask(author.console, question, Consent, within_s=ANSWER_TIME_S)
-        except NoResponder:  # who left in any way cannot be asked; that is why the stop says by which console it was set
+        except NoResponder:  # who left in whatever way cannot be asked, and keeps no robot standing
             consent = Consent(True, name, "is not here any more")
         except LinkError:
             consent = Consent(False, name, "does not answer")

@@ -35,7 +35,7 @@ class Observer(Component[P], Generic[P]):
         signs_in: Tell the mission that its operator came and left; False where somebody else does.
         user: Who sits at it, for the record; empty: the console's name.
         answers: What its operator is asked; None: something of its own.
-        answers_of: Returns where a person of this name is asked, None if they are not there; None: one person sits here.
+        answers_of: Returns where a person of this name is asked, None if they left; None: one person sits here.
     """
 
     accepts: ClassVar[types.UnionType | type[Any] | None] = AskLift

@@ -470,8 +470,11 @@ class TeamModel:
         self._stops[stop.rc] = stop
         unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
         line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
-        remedy = "Lift the stop when the robot may move."
-        self._so(stop.is_stopped, AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+        if stop.is_stopped:
+            remedy = "Lift the stop when the robot may move."
+            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+        else:
+            self.alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
 
     def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
         self._radios[radio] = values

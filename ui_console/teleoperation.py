@@ -119,9 +119,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         user: str = "",
         answers: ConsentAnswers | None = None,
     ) -> None:
-        super().__init__(
-            launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers
-        )
+        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
         self._claimed: tuple[str, dict[str, Any]] | None = None
@@ -204,17 +202,16 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._touched.set()
 
     def leave(self) -> None:
-        """The operator turned away, or the window is no longer in front: the wheels stop, and what is held is let go."""
+        """The operator turned away, or the window is no longer in front: the wheels stop, and nothing held counts."""
         if self._is_attended:
             self._is_attended = False
             self.show(Attention(self.clock.now_s(), False))
-        self.stop()
         self.require_let_go()
 
     def require_let_go(self) -> None:
         """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop.
 
-        When: a dialog opens or closes. A stop, a lift, a grant, the loss of the robot and of the link require it anyway.
+        When: a dialog opens or closes. Stops, lifts, grants, and the loss of robot or link require it anyway.
         """
         self._controls.require_let_go()
 
@@ -386,15 +383,17 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._keeping is None:
             log.info("%s was granted after it was given back", notice.arc)
             return  # its wish for no time reached the RC manager later than its turn did; that takes the RCs back
+        robot = notice.rcs.get(ROBOT_KIND, "no robot")
+        self.require_let_go()
+        await self._ear.listen(robot)
+        if not self.is_held or self._arc is None or self._arc.granted is not notice:
+            return  # it went again meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
         now_s = self.clock.now_s()
-        robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.report(f"drives {robot}")
         if not again:
             self.tell(robot, f"was taken over by {self.user}")
         self._holding = robot
-        self.require_let_go()
-        self._ear.listen(robot)
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 

@@ -72,8 +72,10 @@ class RadioDriver(Protocol):
     async def open(self) -> None:
         """Get hold of the device. When: once, before readiness. Raise ``HardwareFault`` if it is not there."""
 
-    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> float | None:
-        """Return when the packet is on the air. Not: queue it. ``arc`` and ``robot_epoch`` are for audits only.
+    async def transmit(
+        self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
+    ) -> float | None:
+        """Return when the packet is on the air. Not: queue it. All behind ``payload`` is for audits only.
 
         Returns:
             How long it really occupies the air from the call on, mission seconds; None: as long as this call took.

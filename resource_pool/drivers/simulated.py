@@ -66,7 +66,9 @@ class SimulatedRadio:
     async def open(self) -> None:
         """Wait for nothing: packets into a world that is not there are lost, as on the air."""
 
-    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> float | None:
+    async def transmit(
+        self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
+    ) -> float | None:
         """Put the packet on the air; nobody acknowledges it, as on the air. Return how long its bytes take."""
         air_time_s = radio_link.packet_bits(payload) / self._bits_per_s
         packet = RadioPacket(
@@ -77,6 +79,7 @@ class SimulatedRadio:
             robot_epoch,
             number=next(self._numbers),
             air_time_s=air_time_s,
+            robot_stop=robot_stop,
         )
         self._site.bus.publish(self._world, Conversation.COMMAND, packet)
         return air_time_s

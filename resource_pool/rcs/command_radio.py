@@ -31,6 +31,7 @@ from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
+    GivenBeforeStop,
     HardwareFault,
     ImpossibleUse,
     LoadPacket,
@@ -124,7 +125,14 @@ class CommandRadio(ResourceController[RcParameters]):
             until_s=now_s + order.lasts_s if order.lasts_s > 0 else math.inf,
             afterwards=order.afterwards,
             kind=order.kind,
+            moves=order.moves,
+            robot_stop=order.robot_stop,
         )
+        if self._schedule.is_overtaken(packet):
+            self.applied -= 1
+            raise self._overtaken(packet)
+        for ticket in self._schedule.hear_stop(packet):
+            self._settle(self._waiting.get(ticket), self._overtaken(packet))
         if order.at_once:
             await self._send_once(packet)
         else:
@@ -163,6 +171,7 @@ class CommandRadio(ResourceController[RcParameters]):
         Raises:
             NoTurnSoon: Its stream is too slow; nothing will be sent.
             StaleEpoch: The ARC lost the radio before the packet's turn: nothing was sent.
+            GivenBeforeStop: The robot was stopped before the packet's turn: nothing was sent.
             HardwareFault: It was not sent.
         """
         wait_s = self._schedule.next_turn_s(packet.arc, packet.kind, self.clock.now_s()) - self.clock.now_s()
@@ -178,8 +187,14 @@ class CommandRadio(ResourceController[RcParameters]):
             self.applied -= 1
             self.refused_stale += 1
             raise
+        except GivenBeforeStop:
+            self.applied -= 1
+            raise
         finally:
             del self._waiting[ticket]
+
+    def _overtaken(self, packet: Packet) -> GivenBeforeStop:
+        return GivenBeforeStop(f"{self.name}: robot {packet.network_id} was stopped after this packet was made")
 
     def _settle(self, waiting: _Once | None, fault: Refusal | None = None) -> None:
         """Let who waits for the packet know what became of it."""
@@ -218,6 +233,8 @@ class CommandRadio(ResourceController[RcParameters]):
             waiting = self._waiting.get(sending.packet.ticket)
             try:
                 await self._transmit(sending)
+            except GivenBeforeStop as overtaken:
+                self._settle(waiting, overtaken)
             except HardwareFault as fault:
                 if waiting is None:
                     raise
@@ -230,15 +247,22 @@ class CommandRadio(ResourceController[RcParameters]):
 
         Raises:
             HardwareFault: It was not sent.
+            GivenBeforeStop: The robot was stopped while it waited for the air; it was not sent.
         """
         await self.clock.sleep_until_s(self._air_free_s)
+        if self._schedule.is_overtaken(sending.packet):
+            raise self._overtaken(sending.packet)
         begun_s = self.clock.now_s()
         self._air_free_s = begun_s + sending.air_time_s
         packet = sending.packet
         try:
             async with asyncio.timeout(TRANSMIT_WITHIN_S):
                 reported_s = await self._driver.transmit(
-                    packet.network_id, packet.payload, arc=packet.arc, robot_epoch=packet.robot_epoch
+                    packet.network_id,
+                    packet.payload,
+                    arc=packet.arc,
+                    robot_epoch=packet.robot_epoch,
+                    robot_stop=packet.robot_stop,
                 )
         except TimeoutError:
             raise HardwareFault(f"{self.name} took no packet within {TRANSMIT_WITHIN_S} s") from None

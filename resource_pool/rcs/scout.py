@@ -34,6 +34,7 @@ from resource_pool.messages import (
     Drive,
     EmergencyQuestion,
     EmergencyStop,
+    GivenBeforeStop,
     Halt,
     Jump,
     LiftStop,
@@ -149,9 +150,8 @@ class Scout(ResourceController[ScoutParameters]):
                 # Before the packet goes: while it does, the hold may end, or the answer of the radio be lost.
                 self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
                 self._driven.set()
-                await self._load(
-                    hold, self._protocol.drive(left, right), lasts_s=COMMAND_TIMEOUT_S, afterwards=self._protocol.halt()
-                )
+                packet, still = self._protocol.drive(left, right), self._protocol.halt()
+                await self._move(hold, order.command, packet, lasts_s=COMMAND_TIMEOUT_S, afterwards=still)
                 return self._applied(hold, "drive", {"left_rad_s": left, "right_rad_s": right})
             case Halt():
                 await self._load(hold, self._protocol.halt())
@@ -160,7 +160,8 @@ class Scout(ResourceController[ScoutParameters]):
             case Jump():
                 # Repeating the last drive or halt would trip the robot or call the jump off.
                 as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
-                await self._load(hold, self._protocol.jump(), at_once=True, afterwards=as_it_is, kind="jump")
+                packet = self._protocol.jump()
+                await self._move(hold, order.command, packet, at_once=True, afterwards=as_it_is, kind="jump")
                 self._stopped(hold)
                 return self._applied(hold, "jump", {})
             case SwitchTransmitter(on=on, frequency=frequency):
@@ -229,6 +230,18 @@ class Scout(ResourceController[ScoutParameters]):
         if self._holder is not None and self._holder.epoch == hold.epoch:
             self._halt_at_s = None
 
+    async def _move(self, hold: Hold, command: Drive | Jump, payload: bytes, **how: Any) -> None:
+        """Load a packet that moves the robot.
+
+        Raises:
+            EmergencyStopped: It was stopped meanwhile, and perhaps freed again; the packet is not sent.
+        """
+        try:
+            await self._load(hold, payload, moves=True, **how)
+        except GivenBeforeStop:
+            self._latch.require_moving(command.after_stop)
+            raise
+
     async def _load(
         self,
         hold: Hold,
@@ -238,6 +251,7 @@ class Scout(ResourceController[ScoutParameters]):
         afterwards: bytes = b"",
         lasts_s: float = 0.0,
         kind: str = "drive",
+        moves: bool = False,
     ) -> None:
         epoch = hold.companions.get(self._radio)
         if epoch is None:
@@ -253,6 +267,8 @@ class Scout(ResourceController[ScoutParameters]):
             afterwards,
             lasts_s,
             kind,
+            moves,
+            self._latch.state.number,
         )
         radio = address(Subsystem.RESOURCE_POOL, self._radio)
         await self.bus.ask(radio, order, PacketLoaded, within_s=RADIO_REPLY_S)

@@ -42,7 +42,15 @@ class AuditedRadio:
     async def open(self) -> None:
         """Nothing to get hold of."""
 
-    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> None:
+    async def transmit(
+        self,
+        network_id: int,
+        payload: bytes,
+        *,
+        arc: str,
+        robot_epoch: int,
+        robot_stop: int = 0,  # noqa: ARG002  nobody stops robots there
+    ) -> None:
         """Keep the packet."""
         command = payload[:1].decode("ascii")
         self._audit.note(self._name, "packet", robot=network_id, command=command, arc=arc, epoch=robot_epoch)

@@ -100,13 +100,15 @@ class WiretappedRadio(SimulatedRadio):
     async def open(self) -> None:
         self.opened += 1
 
-    async def transmit(self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int) -> float | None:
+    async def transmit(
+        self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
+    ) -> float | None:
         if self.breaks:
             raise HardwareFault("the antenna fell off")
         if self.hangs:
             await asyncio.Event().wait()
         self.heard.append(OnAir(self.clock.now_s(), network_id, payload, arc, robot_epoch))
-        took_s = await super().transmit(network_id, payload, arc=arc, robot_epoch=robot_epoch)
+        took_s = await super().transmit(network_id, payload, arc=arc, robot_epoch=robot_epoch, robot_stop=robot_stop)
         return took_s if self.slow_s is None else self.slow_s
 
     async def close(self) -> None:

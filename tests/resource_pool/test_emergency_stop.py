@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+import math
+import random
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +16,10 @@ from hypothesis import strategies as st
 from pool_on_local_network import HARDWARE, Pool, a_pool
 
 from backbone.bus.clock import run_virtual
+from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
+from backbone.ranges import LONGEST_LEASE_S
 from backbone.rc_manager.messages import Connect, Connected, RcUse, Usage
 from resource_pool.arc_client import (
     EmergencyStopped,
@@ -22,10 +29,24 @@ from resource_pool.arc_client import (
     stop_robot,
     watch_stops,
 )
-from resource_pool.messages import COMMAND_TIMEOUT_S, Applied, CommandScout, Drive, NotFromYou, OtherStop
+from resource_pool.messages import (
+    COMMAND_TIMEOUT_S,
+    Applied,
+    CommandScout,
+    Drive,
+    GivenBeforeStop,
+    Jump,
+    LoadPacket,
+    NotFromYou,
+    NoTurnSoon,
+    OtherStop,
+    PacketLoaded,
+    Stopper,
+)
 from resource_pool.rcs.scout import Scout
+from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
-from scout_model.radio_link import encode_drive, encode_halt
+from scout_model.radio_link import encode_drive, encode_halt, encode_jump, encode_transmitter_on
 
 RCS = ["scout1", "scout2", "radio"]
 OPERATOR = "ui_console/console-1"
@@ -41,8 +62,8 @@ def test_a_robot_moves_only_if_its_last_stop_was_lifted_by_its_number(steps: lis
     latch, stopped, number = StopLatch("scout1"), False, 0
     for now_s, (step, given_number) in enumerate(steps):
         if step == "stop":
-            assert latch.stop(f"user{now_s}", "why", float(now_s)) is not stopped
-            number += not stopped
+            assert latch.stop("anna", "why", float(now_s)) is not stopped
+            number += 1
             stopped = True
         elif given_number != number:
             with pytest.raises(OtherStop):
@@ -53,9 +74,54 @@ def test_a_robot_moves_only_if_its_last_stop_was_lifted_by_its_number(steps: lis
         assert (latch.state.is_stopped, latch.state.number) == (stopped, number)
         if stopped:
             with pytest.raises(EmergencyStopped):
-                latch.require_moving()
+                latch.require_moving(number)
         else:
-            latch.require_moving()
+            latch.require_moving(number)
+            with pytest.raises(GivenBeforeStop):
+                latch.require_moving(number + 1 if number == 0 else number - 1)
+
+
+def test_all_who_stop_a_robot_are_named_once_until_it_may_move_again() -> None:
+    latch = StopLatch("scout1")
+    latch.stop("anna", "", 1.0, "ui_console/a")
+    for who in ("ben", "anna", "ben"):
+        latch.stop(who, "", 2.0, f"ui_console/{who[0]}")
+    assert (latch.state.by, latch.state.also) == ("anna", [Stopper("ben", "ui_console/b")])
+    latch.lift(latch.state.number, "ben", 3.0)
+    latch.stop("cleo", "", 4.0)
+    assert (latch.state.by, latch.state.also) == ("cleo", [])
+
+
+def test_a_lift_of_what_was_seen_before_somebody_else_stopped_too_lifts_nothing() -> None:
+    """Who presses stop sees it done, also if it was done already: nobody frees the robot without having seen that."""
+    latch = StopLatch("scout1")
+    latch.stop("anna", "", 1.0)
+    seen = latch.state.number
+    latch.stop("ben", "", 2.0)
+    with pytest.raises(OtherStop):
+        latch.lift(seen, "anna", 3.0)
+    assert latch.state.is_stopped
+
+
+# ---------------------------------------------------------------------- what a commander knows
+@given(st.lists(st.tuples(st.integers(1, 5), st.booleans()), max_size=20))
+def test_commands_carry_the_number_of_the_newest_stop_only_once_it_is_known_to_be_lifted(
+    heard: list[tuple[int, bool]],
+) -> None:
+    known = StopKnowledge()
+    for number, is_stopped in heard:
+        known.heard(StopState("scout1", is_stopped, number, "anna", "", 0.0))
+    newest = max((number for number, _ in heard), default=0)
+    is_lifted = (newest, False) in heard or not heard
+    assert (known.number("scout1") == newest) is is_lifted
+    assert known.number("scout2") == 0
+
+
+def test_a_lift_is_news_and_told_again_it_is_none() -> None:
+    known, lifted = StopKnowledge(), StopState("scout1", False, 1, "anna", "", 2.0)
+    stopped = StopState("scout1", True, 1, "anna", "", 1.0)
+    told = [known.heard(one) for one in (stopped, stopped, lifted, lifted, stopped)]
+    assert told == [True, False, True, False, False]
 
 
 def test_the_first_to_stop_is_the_one_who_is_named() -> None:
@@ -233,3 +299,147 @@ def test_a_full_disk_keeps_no_wheel_turning_and_it_is_told_that_the_stop_is_not_
                 assert any("will not know that scout1 is stopped" in one.what for one in scout.story.of("scout1"))
 
     run_virtual(main())
+
+
+# ---------------------------------------------------------------------- what was on its way
+@asynccontextmanager
+async def held_by_hand(pool: Pool, drive_period_s: float = 0.05) -> AsyncIterator[Bus]:
+    """Give the voice of an ARC that holds scout1 and the radio, whose commands the test sends when it likes."""
+    streams = [Usage(drive_period_s, 0.002), Usage(0.25, 0.002, kind="jump")]
+    companions = {"scout1": 5, "radio": 6}
+    for rc, use in (("radio", RcUse(streams)), ("scout1", RcUse())):
+        order = Connect("one", companions[rc], LONGEST_LEASE_S, use, companions)
+        await pool.manager_voice.ask(f"resource_pool/{rc}", order, Connected, within_s=1)
+    yield pool.voice("one")
+
+
+async def command(voice: Bus, what: Drive | Jump) -> Applied:
+    return await voice.ask("resource_pool/scout1", CommandScout("one", 5, what), Applied, within_s=1)
+
+
+def test_a_drive_sent_before_a_stop_that_arrives_after_its_lift_is_never_applied(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, RCS, manager=False) as pool, held_by_hand(pool) as voice:
+            before = Drive(4.0, 4.0)
+            operator = pool.voice_of(OPERATOR)
+            stop = await stop_robot(operator, "scout1", "", "anna")
+            await lift_stop(operator, stop)
+            with pytest.raises(EmergencyStopped) as refusal:
+                await command(voice, before)
+            assert (refusal.value.code, refusal.value.facts["number"]) == (GivenBeforeStop.code, stop.number)
+            await pool.clock.sleep_s(0.5)
+            assert set(payloads(pool, 1)) <= {encode_halt()}
+            await command(voice, Drive(4.0, 4.0, stop.number))
+            await pool.clock.sleep_s(0.1)
+            assert payloads(pool, 1)[-1] == encode_drive(4.0, 4.0)
+
+    run_virtual(main())
+
+
+def test_a_jump_that_waits_at_the_radio_when_the_stop_comes_is_not_sent(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, RCS, manager=False) as pool, held_by_hand(pool) as voice:
+            await command(voice, Jump())
+            jumping = asyncio.create_task(command(voice, Jump()))
+            await pool.clock.sleep_s(0.05)
+            jumps = payloads(pool, 1).count(encode_jump())
+            operator = pool.voice_of(OPERATOR)
+            stop = await stop_robot(operator, "scout1", "", "anna")
+            with pytest.raises(EmergencyStopped):
+                await jumping
+            await lift_stop(operator, stop)
+            await pool.clock.sleep_s(1.0)
+            assert payloads(pool, 1).count(encode_jump()) == jumps == 1
+
+    run_virtual(main())
+
+
+def test_a_packet_that_overtook_the_stop_on_its_way_to_the_radio_is_refused_there(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, RCS, manager=False) as pool, held_by_hand(pool):
+            await stop_robot(pool.voice_of(OPERATOR), "scout1", "", "anna")
+            await pool.clock.sleep_s(0.1)
+            late = LoadPacket("one", 6, 1, encode_drive(9.0, 9.0), encode_halt(), 5, moves=True, robot_stop=0)
+            with pytest.raises(GivenBeforeStop):
+                await pool.voice("scout1").ask("resource_pool/radio", late, PacketLoaded, within_s=1)
+            await pool.clock.sleep_s(0.2)
+            assert set(payloads(pool, 1)) == {encode_halt()}
+
+    run_virtual(main())
+
+
+def test_a_picture_that_is_being_switched_on_comes_although_the_robot_is_stopped(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, ["scout1", "radio", "video"]) as pool:
+            operator = pool.voice_of(OPERATOR)
+            owner = await pool.owner("patrol")
+            claiming = pool.arc(owner, "video_drive", "scout1")
+            arc, stop = await asyncio.gather(claiming, stop_robot(operator, "scout1", ""))
+            await arc.wait_granted()
+            assert stop.is_stopped
+            assert encode_transmitter_on("video") in payloads(pool, 1)
+
+    run_virtual(main())
+
+
+def test_a_commander_that_was_refused_for_a_stop_it_did_not_know_of_knows_of_it_then(local_mission: Any) -> None:
+    async def main() -> None:
+        async with a_pool(local_mission, RCS) as pool:
+            arc = await pool.arc(await pool.owner("patrol"), "drive", "scout1")
+            await arc.wait_granted()
+            operator = pool.voice_of(OPERATOR)
+            await lift_stop(operator, await stop_robot(operator, "scout1", ""))
+            with pytest.raises(GivenBeforeStop):
+                await arc.drive(1.0, 1.0)
+            assert (await arc.drive(1.0, 1.0)).command == "drive"
+
+    run_virtual(main())
+
+
+def speed_for(known: int) -> float:
+    """A wheel speed that tells on the air which stop its command was given after."""
+    return 1.0 + known / 200
+
+
+def test_in_a_thousand_random_stops_nothing_from_before_a_stop_is_on_the_air_after_it(local_mission: Any) -> None:
+    """By what the radio sent, and by the world's own audit of the numbers that packets carry."""
+    rng = random.Random(12)
+
+    async def main() -> None:
+        async with a_pool(local_mission, RCS, manager=False) as pool, held_by_hand(pool, drive_period_s=0.02) as voice:
+            operator, known = pool.voice_of(OPERATOR), 0
+            stopped_s: dict[int, float] = {}
+            sent: list[tuple[int, asyncio.Task[Applied]]] = []
+            for _stop in range(1000):
+                for _command in range(rng.randrange(4)):
+                    what = Jump(known) if rng.random() < 0.3 else Drive(speed_for(known), 1.0, known)
+                    sent.append((known, asyncio.create_task(late(pool, rng.uniform(0, 0.08), voice, what))))
+                await pool.clock.sleep_s(rng.uniform(0, 0.12))
+                stop = await stop_robot(operator, "scout1", "")
+                stopped_s[known] = pool.clock.now_s()
+                if rng.random() < 0.5:
+                    await pool.clock.sleep_s(rng.uniform(0, 0.12))
+                known = (await lift_stop(operator, stop)).number
+                if rng.random() < 0.3:
+                    await pool.clock.sleep_s(0.1)
+            await pool.clock.sleep_s(1.0)
+            drives = {encode_drive(speed_for(number), 1.0): number for number in range(known + 1)}
+            driven = [
+                (packet, drives[packet.payload]) for packet in pool.radio_driver.heard_by(1) if packet.payload in drives
+            ]
+            assert len({number for _, number in driven}) > 300
+            assert not [packet for packet, number in driven if packet.at_s > stopped_s.get(number, math.inf)]
+            done = [(number, task.result()) for number, task in sent if task.exception() is None]
+            assert {applied.command for _, applied in done} == {"drive", "jump"}
+            assert not [one for number, one in done if one.at_s > stopped_s.get(number, math.inf)]
+            refusals = {type(task.exception()) for _, task in sent} - {type(None)}
+            assert refusals == {EmergencyStopped, GivenBeforeStop, NoTurnSoon}
+            assert pool.audit["overtaken_packets"] == 0
+
+    run_virtual(main())
+
+
+async def late(pool: Pool, on_the_way_s: float, voice: Bus, what: Drive | Jump) -> Applied:
+    """A command that takes its time on the way."""
+    await pool.clock.sleep_s(on_the_way_s)
+    return await command(voice, what)

@@ -220,7 +220,7 @@ def test_all_robots_are_stopped_also_those_not_heard_of_and_a_silent_one_is_name
                 assert (state.is_stopped, state.by, state.reason) == (True, "anna", "fire")
             lines = [alarm.line for alarm in on.model.team.alarms.views()]
             assert any("scout2 did not confirm the stop" in line for line in lines)
-            assert await console.lift_stop(one.latch.state)
+            assert await console.lift_stop("scout1", one.latch.state.number)
             assert on.model.team.stop_of("scout1") is None
             assert not one.latch.state.is_stopped
 
@@ -238,7 +238,7 @@ def test_each_thing_an_operator_does_is_one_event_with_the_name(stage: Callable[
                 await on.until(lambda: "schedule" in on.words())
                 await console.stop_robot("scout1", "child in the room")
                 await console.stop_all("fire")
-                await console.lift_stop(robot.latch.state)
+                await console.lift_stop("scout1", robot.latch.state.number)
                 await console.set_parameter("watch1", "threshold", 30)
                 await console.set_parameter("watch1", "threshold", "high")
                 console.acknowledged(2)
@@ -251,7 +251,7 @@ def test_each_thing_an_operator_does_is_one_event_with_the_name(stage: Callable[
             (OperatorAction.ATTACH, "console-1", "to watch"),
             (OperatorAction.STOP_ROBOT, "scout1", "child in the room"),
             (OperatorAction.STOP_ALL, "robots", "scout1, scout2, fire"),
-            (OperatorAction.LIFT_STOP, "scout1", "stop 1 by anna"),
+            (OperatorAction.LIFT_STOP, "scout1", "stop 2 by anna"),
             (OperatorAction.SET_PARAMETER, "watch1", "threshold = 30"),
             (OperatorAction.SET_PARAMETER, "watch1", "threshold = 'high', which it did not take"),
             (OperatorAction.ACKNOWLEDGE, "alarms", "all 2"),

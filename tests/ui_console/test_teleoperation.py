@@ -364,6 +364,7 @@ def test_a_release_nobody_confirms_ends_with_four(placer_world: Any) -> None:
             "at_s": 0,
             "reason": "the script is over",
             "confirmed": False,
+            "wanted": True,
         }
         assert code == 4
 

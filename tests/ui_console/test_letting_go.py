@@ -1,0 +1,400 @@
+"""After a stop, a grant or a loss a control that is still held moves nothing until it was let go and pressed anew."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from fake_resource_pool import FakeArc, FakePlacer
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.component.launch import Launch
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.wire import Envelope, Message
+from resource_pool.arc_client import EmergencyStopped
+from resource_pool.messages import AskStop, EmergencyStop, LiftStop
+from resource_pool.messages import Drive as ArcDrive
+from resource_pool.messages import Halt as ArcHalt
+from resource_pool.messages import Jump as ArcJump
+from resource_pool.stop_latch import StopLatch
+from ui_console.console_model import ConsoleModel
+from ui_console.driving import FIRST_HOLD_S, STICK_LASTS_S, DeadMan, Drive, Halt, drive_towards
+from ui_console.scripted import ScriptDriver
+from ui_console.teleoperation import Teleoperation
+
+FORWARD = drive_towards("forward", 4.0)
+REPEAT_S = 0.05
+
+
+# ---------------------------------------------------------------------- the law
+@given(
+    st.lists(
+        st.tuples(st.sampled_from(["key", "stick", "let go", "require"]), st.floats(0.01, 0.8)),
+        max_size=40,
+    )
+)
+def test_a_press_counts_only_if_its_control_was_let_go_since_that_was_required(played: list[tuple[str, float]]) -> None:
+    hand, now_s = DeadMan(), 0.0
+    silence_s = {"key": FIRST_HOLD_S, "stick": STICK_LASTS_S}
+    until_s = dict.fromkeys(silence_s, -1.0)
+    is_clean = dict.fromkeys(silence_s, True)  # let go since it was required last
+    for what, pause_s in played:
+        now_s += pause_s
+        for control, end_s in until_s.items():
+            is_clean[control] = is_clean[control] or now_s >= end_s
+        match what:
+            case "require":
+                hand.require_let_go()
+                is_clean = {control: now_s >= until_s[control] for control in until_s}
+            case "let go":
+                hand.stop()
+                is_clean["stick"] = True
+            case control:
+                counts = hand.press(FORWARD, now_s, STICK_LASTS_S if control == "stick" else None)
+                assert counts is is_clean[control]
+                until_s[control] = now_s + silence_s[control]
+        if not any(is_clean[control] and now_s < end_s for control, end_s in until_s.items()):
+            assert not isinstance(hand.due(now_s), Drive)
+
+
+def test_what_is_held_when_letting_go_is_required_halts_at_once() -> None:
+    hand = DeadMan()
+    hand.press(FORWARD, 0.0)
+    assert hand.due(0.0) == FORWARD
+    hand.require_let_go()
+    assert hand.due(0.0) == Halt()
+    assert hand.due(0.1) is None
+
+
+def test_a_key_that_repeats_is_held_back_until_it_pauses() -> None:
+    hand = DeadMan()
+    hand.press(FORWARD, 0.0)
+    hand.require_let_go()
+    for repeat in range(1, 100):
+        assert not hand.press(FORWARD, repeat * REPEAT_S)
+        assert hand.is_held_back(repeat * REPEAT_S)
+    last_s = 99 * REPEAT_S
+    assert not hand.is_held_back(last_s + FIRST_HOLD_S)
+    assert hand.press(FORWARD, last_s + FIRST_HOLD_S)
+    assert hand.due(last_s + FIRST_HOLD_S) == FORWARD
+
+
+def test_a_stick_says_that_it_was_let_go_and_a_stop_key_does_not_say_it_for_keys() -> None:
+    hand = DeadMan()
+    hand.press(FORWARD, 0.0)
+    hand.press(FORWARD, 0.0, STICK_LASTS_S)
+    hand.require_let_go()
+    assert not hand.press(FORWARD, 0.1, STICK_LASTS_S)
+    hand.stop()
+    assert not hand.press(FORWARD, 0.15)
+    assert hand.press(FORWARD, 0.15, STICK_LASTS_S)
+
+
+def test_a_jump_key_that_is_held_jumps_no_more_until_it_was_let_go() -> None:
+    hand = DeadMan()
+    assert [hand.press_jump(n * REPEAT_S) for n in range(3)] == [True] * 3
+    hand.require_let_go()
+    assert not hand.press_jump(3 * REPEAT_S)
+    assert hand.press_jump(3 * REPEAT_S + FIRST_HOLD_S)
+
+
+# ---------------------------------------------------------------------- a console that holds a robot
+class Stage:
+    """A console whose screens show what it hears, and the RC of the robot that it holds."""
+
+    def __init__(self, placer: FakePlacer, *, is_scripted: bool = False) -> None:
+        self.placer, self.clock = placer, placer.clock
+        self.model = ConsoleModel("console-7", "anna")
+        if not is_scripted:
+            self.make_console(show=self.model.apply)
+        self.latch = StopLatch("scout1")
+        self.rc = placer.network.join("resource_pool/scout1", placer.clock)
+        self.rc.serve("resource_pool/scout1", AskStop | EmergencyStop | LiftStop, self._answer)
+        self.rc.declare_alive("resource_pool/scout1")
+
+    def make_console(self, **options: Any) -> None:
+        parameters = {"robot": "scout1", "kind": "drive", "priority": 100}
+        launch = Launch(
+            "iros2001",
+            Subsystem.UI_CONSOLE,
+            "console-7",
+            "console",
+            "in this process",
+            "local",
+            "",
+            0.0,
+            1.0,
+            parameters,
+        )
+        bus = self.placer.network.join(launch.address, self.clock)
+        self.console = Teleoperation(launch, bus, self.clock, watches=False, user="anna", **options)
+
+    @property
+    def arc(self) -> FakeArc:
+        return self.placer.arcs["console-7-drive"]
+
+    def stop(self, by: str = "ben", reason: str = "") -> None:
+        """Somebody stops the robot: its commands are refused from now on, and everybody hears of it."""
+        self.latch.stop(by, reason, self.clock.now_s(), f"ui_console/{by}")
+        for arc in self.placer.arcs.values():
+            arc.refusal = EmergencyStopped(
+                "scout1 was stopped", rc="scout1", number=self.latch.state.number, is_stopped=True
+            )
+        self.rc.publish("resource_pool/scout1", Conversation.EVENTS, self.latch.state)
+
+    def lift(self) -> None:
+        self.latch.lift(self.latch.state.number, "ben", self.clock.now_s())
+        self.arc.refusal = None
+        self.rc.publish("resource_pool/scout1", Conversation.EVENTS, self.latch.state)
+
+    async def held(self) -> None:
+        await self.placer.wait(lambda: self.placer.arcs)
+        await self.arc.grant()
+        await self.clock.sleep_s(0.1)
+
+    async def hold_key(self, seconds: float, lasts_s: float | None = None) -> None:
+        """Hold a control for so long."""
+        until_s = self.clock.now_s() + seconds
+        while self.clock.now_s() < until_s:
+            self.console.hold(FORWARD, lasts_s)
+            await self.clock.sleep_s(REPEAT_S)
+
+    def drives(self) -> list[ArcDrive]:
+        return [command for _at_s, _epoch, command in self.arc.commands if isinstance(command, ArcDrive)]
+
+    async def _answer(self, asked: Envelope[Any]) -> Message:
+        match asked.body:
+            case EmergencyStop(user=user, reason=reason):
+                self.stop(user, reason)
+        return self.latch.state
+
+
+Scene = Callable[[Stage], Awaitable[None]]
+
+
+@pytest.fixture
+def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
+    def run(scene: Scene) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network:
+                placer = FakePlacer(network, VirtualClock(), {})
+                on = Stage(placer)
+                try:
+                    async with beside(on.console):
+                        await on.held()
+                        await scene(on)
+                finally:
+                    await on.rc.close()
+                    await placer.close()
+
+        run_virtual(main())
+
+    return run
+
+
+@pytest.fixture
+def scripted(local_mission: Any) -> Callable[[Scene], None]:
+    """Like ``stage``, with a console that the scene starts."""
+
+    def run(scene: Scene) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network:
+                placer = FakePlacer(network, VirtualClock(), {})
+                on = Stage(placer, is_scripted=True)
+                try:
+                    await scene(on)
+                finally:
+                    await on.rc.close()
+                    await placer.close()
+
+        run_virtual(main())
+
+    return run
+
+
+HANDS = [pytest.param(None, id="key"), pytest.param(STICK_LASTS_S, id="stick")]
+
+
+@pytest.mark.parametrize("lasts_s", HANDS)
+def test_after_a_lift_a_held_control_moves_nothing_until_it_is_pressed_anew(
+    stage: Callable[[Scene], None], lasts_s: float | None
+) -> None:
+    async def scene(on: Stage) -> None:
+        await on.hold_key(1.0, lasts_s)
+        assert on.drives()
+        on.stop()
+        await on.hold_key(1.0, lasts_s)
+        on.arc.commands.clear()
+        on.lift()
+        await on.hold_key(2.0, lasts_s)
+        assert not on.drives()
+        assert on.model.own(on.clock.now_s()).must_let_go
+        await on.clock.sleep_s(FIRST_HOLD_S + 0.05)
+        assert not on.model.own(on.clock.now_s()).must_let_go
+        await on.hold_key(0.5, lasts_s)
+        assert on.drives()
+        assert {drive.after_stop for drive in on.drives()} == {on.latch.state.number}
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("lasts_s", HANDS)
+def test_a_stop_and_lift_nobody_told_of_are_learned_from_the_refusal_and_need_a_fresh_press_too(
+    stage: Callable[[Scene], None], lasts_s: float | None
+) -> None:
+    async def scene(on: Stage) -> None:
+        await on.hold_key(1.0, lasts_s)
+        on.arc.refusal = EmergencyStopped("scout1 was stopped", rc="scout1", number=4, is_stopped=True)
+        await on.hold_key(0.3, lasts_s)
+        on.arc.refusal = None
+        on.arc.commands.clear()
+        await on.hold_key(1.0, lasts_s)
+        assert not on.drives()
+
+    stage(scene)
+
+
+@pytest.mark.parametrize("lasts_s", HANDS)
+@pytest.mark.parametrize("change", ["loss and grant", "own stop", "dialog", "window left"])
+def test_a_control_held_through_a_change_moves_nothing_until_it_is_pressed_anew(
+    stage: Callable[[Scene], None], lasts_s: float | None, change: str
+) -> None:
+    async def scene(on: Stage) -> None:
+        await on.hold_key(1.0, lasts_s)
+        match change:
+            case "loss and grant":
+                await on.arc.suspend("higher", "console-9", deadline_s=0.0)
+                await on.hold_key(0.5, lasts_s)
+                await on.arc.grant()
+            case "own stop":
+                assert await on.console.stop_robot("scout1")
+                on.lift()
+            case "dialog":
+                on.console.require_let_go()
+            case "window left":
+                on.console.leave()
+        on.arc.commands.clear()
+        await on.hold_key(1.0, lasts_s)
+        assert not on.drives()
+        await on.clock.sleep_s(FIRST_HOLD_S + 0.05)
+        await on.hold_key(0.3, lasts_s)
+        assert on.drives()
+
+    stage(scene)
+
+
+def test_stopping_twice_with_a_stick_held_does_not_count_as_letting_it_go(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        await on.hold_key(0.5, STICK_LASTS_S)
+        for _press in range(2):
+            on.console.stop()  # screens stop the wheels by it as well
+            await on.console.stop_robot("scout1")
+            await on.hold_key(0.2, STICK_LASTS_S)
+        on.arc.commands.clear()
+        on.lift()
+        await on.hold_key(1.0, STICK_LASTS_S)
+        assert not on.drives()
+
+    stage(scene)
+
+
+def test_a_jump_key_held_through_a_stop_does_not_jump_after_the_lift(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        for repeat in range(40):
+            if repeat == 10:
+                on.stop()
+            if repeat == 20:
+                on.arc.commands.clear()
+                on.lift()
+            on.console.jump()
+            await on.clock.sleep_s(REPEAT_S)
+        assert not [command for _at_s, _epoch, command in on.arc.commands if isinstance(command, ArcJump)]
+        await on.clock.sleep_s(FIRST_HOLD_S + 0.05)
+        on.console.jump()
+        await on.clock.sleep_s(0.1)
+        assert [type(command) for _at_s, _epoch, command in on.arc.commands][-1] is ArcJump
+
+    stage(scene)
+
+
+def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_the_first_press(
+    stage: Callable[[Scene], None],
+) -> None:
+    """Who takes it knows of the stop from the beginning, so that nobody has to press twice."""
+
+    async def scene(on: Stage) -> None:
+        await on.console.give_back()
+        on.latch.stop("ben", "", on.clock.now_s())
+        on.latch.lift(on.latch.state.number, "ben", on.clock.now_s())
+        on.console.take()
+        await on.held()
+        await on.hold_key(0.3)
+        assert {drive.after_stop for drive in on.drives()} == {on.latch.state.number}
+        assert on.drives()
+
+    stage(scene)
+
+
+# ---------------------------------------------------------------------- scripts
+async def play(on: Stage, lines: list[tuple[float, str | None]]) -> tuple[int, list[str]]:
+    """Write these lines into the script's pipe, each after its pause; return how it ended and the words it said."""
+    said: list[bytes] = []
+    driver = ScriptDriver(said.append)
+    on.make_console(show=driver.show, work=driver.drive)
+    living = asyncio.create_task(on.console.run())
+    for pause_s, line in lines:
+        await on.clock.sleep_s(pause_s)
+        driver.feed(line)
+    await living
+    return driver.exit_code(on.console), [json.loads(line)["event"] for line in said]
+
+
+def test_a_script_drives_on_after_a_lift_only_when_it_halted_first(scripted: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        drive = '{"at_s":%s,"left_rad_s":4,"right_rad_s":4}'
+        playing = asyncio.create_task(
+            play(
+                on, [(0.0, drive % 0), (3.0, drive % 3), (1.0, '{"at_s":4,"halt":true}'), (1.0, drive % 5), (1.0, None)]
+            )
+        )
+        await on.held()
+        await on.clock.sleep_s(1.0)
+        assert on.drives()
+        on.stop()
+        await on.clock.sleep_s(0.5)
+        on.lift()
+        on.arc.commands.clear()
+        await on.clock.sleep_s(2.0)
+        assert not on.drives(), "neither the line that was repeated nor the next one"
+        arc = on.arc
+        code, words = await playing
+        drives = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcDrive)]
+        halts = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcHalt)]
+        assert drives
+        assert min(drives) > max(halts)
+        assert (code, "stop" in words) == (5, True)
+
+    scripted(scene)
+
+
+def test_a_script_stops_robots_before_its_grant_and_at_once(scripted: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        playing = asyncio.create_task(
+            play(
+                on,
+                [(0.5, '{"stop_robot":"scout1","reason":"a child"}'), (2.0, '{"at_s":0,"release":true}'), (0.0, None)],
+            )
+        )
+        await on.clock.sleep_s(0.6)
+        state = on.latch.state
+        assert (state.is_stopped, state.by, state.reason) == (True, "anna", "a child")
+        await on.held()
+        await playing
+
+    scripted(scene)
