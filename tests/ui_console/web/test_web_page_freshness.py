@@ -1,4 +1,4 @@
-"""What a page says of itself when it is cut off: across the screen, within a second, and with what else stops robots."""
+"""What a page says of itself when it is cut off: across the screen, within a second, and what else stops robots."""
 
 from __future__ import annotations
 
