@@ -6,7 +6,6 @@ the ARC, which asks by them, everything else to the component itself.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +31,7 @@ from backbone.rc_manager.messages import (
     UnknownRequest,
     Usage,
 )
+from backbone.spoken import value_text
 
 PRIORITY, PARENT = "priority", "parent"
 RUN_TIMES = ("minimum_runtime_s", "maximum_runtime_s")
@@ -65,7 +65,7 @@ class Shown:
         lines = [line for request in self.requests for line in _request_lines(request)]
         if self.parameters is not None:
             lines.append(f"{self.name}: parameters")
-            lines += [f"  {name:<19}{json.dumps(value)}" for name, value in self.parameters.items()]
+            lines += [f"  {name:<19}{value_text(value)}" for name, value in self.parameters.items()]
             if not self.parameters:
                 lines.append("  none")
         return lines
@@ -77,7 +77,7 @@ class Shown:
             WrongAttribute: There is none of this name.
         """
         if self.parameters is not None and attribute in self.parameters:
-            return [f"{self.name}: {attribute} is {json.dumps(self.parameters[attribute])}"]
+            return [f"{self.name}: {attribute} is {value_text(self.parameters[attribute])}"]
         lines = [
             f"{request.arc}: {attribute} is {told}" for request in self.requests for told in _told(request, attribute)
         ]
@@ -162,7 +162,7 @@ async def _set_parameter(bus: Bus, name: str, parameter: str, value: Any, user: 
     now = await bus.ask(
         await _address(bus, name), SetParameter(parameter, value, user), Parameters, within_s=REPLY_TIME_S
     )
-    return [f"{name}: {parameter} is {json.dumps(now.values[parameter])}"]
+    return [f"{name}: {parameter} is {value_text(now.values[parameter])}"]
 
 
 async def _address(bus: Bus, name: str) -> str:

@@ -29,7 +29,7 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.companion import Companion
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, Stop, Stopping
+from backbone.component.messages import Absence, LogLevel, Stop, Stopping
 from backbone.component.process import run_with_heartbeat
 from backbone.core_launches import UpOptions, core_launches, launcher_launch, service_launch
 from backbone.creator.messages import (
@@ -49,6 +49,7 @@ from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health_watch import HealthWatch
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
+from backbone.mission_log import AskLog, LogKeeper
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
@@ -121,7 +122,7 @@ class Observer(Protocol):
 class Launcher(Component[NoParameters]):
     """Starts core services and mission, restarts core services, stops all."""
 
-    accepts: ClassVar[Any] = ListProcesses
+    accepts: ClassVar[Any] = ListProcesses | AskLog
 
     def __init__(
         self,
@@ -141,6 +142,7 @@ class Launcher(Component[NoParameters]):
         self._wishes: list[Wish] = []
         self._awaited: set[str] = set()
         self._health_watch = HealthWatch(bus, clock, self.changed, self._own_absences)
+        self._log = LogKeeper(bus)
         self.outcome = Outcome()
         self._others = OtherHosts(description, clock.now_s())
         self._others_changed = asyncio.Event()
@@ -185,9 +187,12 @@ class Launcher(Component[NoParameters]):
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Tell of the core services' processes."""
-        if isinstance(asked.body, ListProcesses):
-            return Processes(self.launch.host, [], self._keeper.processes())
+        """Tell of the core services' processes, and of what happened in the mission."""
+        match asked.body:
+            case ListProcesses():
+                return Processes(self.launch.host, [], self._keeper.processes())
+            case AskLog() as wanted:
+                return self._log.log.told(wanted)
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
@@ -370,10 +375,11 @@ class Launcher(Component[NoParameters]):
 
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
-        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
+        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
 
     def _core_service_silent(self, name: str, silent_s: float) -> None:
-        self.tell(name, f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again")
+        said = f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again"
+        self.tell(name, said, LogLevel.WARNING)
         self.changed()
 
     @contextlib.asynccontextmanager

@@ -10,6 +10,7 @@ import asyncio
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, suppress
@@ -19,9 +20,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from backbone.errors import BackboneError, LinkError, Refusal, code_of
+from backbone.component.messages import LogLevel
+from backbone.errors import BackboneError, HubUnreachable, LinkError, Refusal, code_of
 from backbone.printable import printable_lines
+from backbone.spoken import counted, value_text
 
 
 class ExitCode(IntEnum):
@@ -37,7 +41,25 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
+class WholeHelp(TyperGroup):
+    """Lists commands with all that is said of each; other lists cut it at the end of the line."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a row for each command."""
+        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
+        rows = [
+            (name, _first_paragraph(one.help or "")) for name, one in commands if one is not None and not one.hidden
+        ]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+def _first_paragraph(text: str) -> str:
+    return " ".join(text.partition("\n\n")[0].split())
+
+
 app = typer.Typer(
+    cls=WholeHelp,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -52,12 +74,68 @@ LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes secon
 LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer one is a slip of the hand
 MOST_SEEDS = 1_000_000  # chosen: a day of work
 LARGEST_SEED = 2**32 - 1  # as numpy has it
+MOST_EVENTS = 10_000  # as in mission_log
+LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link
 PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
 
+ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
+
+
+def hub_endpoint(value: str | None) -> str | None:
+    """Refuse what names no hub; for options that take an endpoint."""
+    if value is not None and ENDPOINT.fullmatch(value) is None:
+        raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
+    return value
+
+
+def complete_mission() -> list[str]:
+    """Return the missions that are up on this machine."""
+    from backbone.completion import missions_now
+
+    return missions_now()
+
+
+def picture_for(ctx: typer.Context) -> Any:
+    """Return how the mission is that the words typed so far are about; None if there is none."""
+    from backbone.completion import picture_now
+
+    return picture_now(ctx.params.get("mission"), ctx.params.get("connect"), ctx.params.get("secret_file"))
+
+
+def complete_name(ctx: typer.Context) -> list[str]:
+    """Return what can be asked about in the mission that is up."""
+    from backbone.completion import names_of
+
+    picture = picture_for(ctx)
+    return names_of(picture) if picture is not None else []
+
+
+def complete_resource(ctx: typer.Context) -> list[str]:
+    """Return the resources of the mission that is up."""
+    from backbone.completion import resources_of
+
+    picture = picture_for(ctx)
+    return resources_of(picture) if picture is not None else []
+
+
+def complete_person(ctx: typer.Context) -> list[str]:
+    """Return the people at the consoles of the mission that is up."""
+    from backbone.completion import people_of
+
+    picture = picture_for(ctx)
+    return people_of(picture) if picture is not None else []
+
+
 MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
-MissionName = Annotated[str | None, typer.Option("--mission", help="Name of the mission; needed if several are up.")]
+MissionName = Annotated[
+    str | None,
+    typer.Option("--mission", autocompletion=complete_mission, help="Name of the mission; needed if several are up."),
+]
 Endpoint = Annotated[
-    str | None, typer.Option("--connect", help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission.")
+    str | None,
+    typer.Option(
+        "--connect", callback=hub_endpoint, help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission."
+    ),
 ]
 SecretFile = Annotated[
     Path | None,
@@ -68,8 +146,13 @@ SecretFile = Annotated[
     ),
 ]
 NameOrCause = Annotated[
-    str, typer.Argument(help="A name, an address, or a cause as stories show it: backbone/rc_manager#112.")
+    str,
+    typer.Argument(
+        autocompletion=complete_name,
+        help="A component, resource, host, person or alarm; or a cause as stories show it: rc_manager#112.",
+    ),
 ]
+ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A component of the mission.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
@@ -104,8 +187,11 @@ def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
     """Return what a person reads of an error that ended a command, and the command's exit code."""
     match error:
         case Refusal():
-            code = ExitCode.NO_BACKBONE if code_of(error).startswith("run.") else ExitCode.REFUSED
+            codes = {"run": ExitCode.NO_BACKBONE, "usage": ExitCode.USAGE}
+            code = codes.get(code_of(error).partition(".")[0], ExitCode.REFUSED)
             return f"refused [{code_of(error)}]: {error}", code
+        case HubUnreachable():
+            return f"{error} (is the mission up there, and --secret-file the mission's?)", ExitCode.NO_BACKBONE
         case LinkError():
             return f"no answer: {error} (is the mission up? see 'scout-backbone status')", ExitCode.NO_BACKBONE
     return str(error), ExitCode.UNEXPECTED
@@ -188,8 +274,8 @@ def check(
         raise typer.BadParameter("--for and --trace need --dry-run")
     description = read_or_exit(mission_file)
     say(
-        f"{mission_file}: mission {description.name} is fine: {len(description.resources)} resources, "
-        f"{len(description.types)} component types on {len(description.hosts)} host(s)"
+        f"{mission_file}: mission {description.name} is fine: {counted(len(description.resources), 'resource')}, "
+        f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"
     )
     if dry_run:
         raise typer.Exit(int(_rehearse(description, for_s, trace)))
@@ -300,6 +386,7 @@ def why(
 @app.command()
 def story(
     name: NameOrCause,
+    as_json: AsJson = False,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
@@ -307,19 +394,65 @@ def story(
     """Tell the events that touched a component, request or resource, with their causes."""
 
     async def work() -> int:
+        from backbone.log_lines import story_json, story_lines
         from backbone.reasons import story_of
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
-        for event in told.events:
-            cause = f"   because of {event.cause}" if event.cause else ""
-            show([f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}{cause}"])
+        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(told.events))
         if not told.events:
             say(f"no component has an event about {name}")
         if told.missing:
-            say(f"incomplete: {len(told.missing)} did not tell their part")
+            say(f"incomplete: {counted(len(told.missing), 'component')} did not tell their part")
             for missing in told.missing:
                 say(f"  {missing}")
+        return ExitCode.DONE
+
+    run(work)
+
+
+@app.command()
+def log(
+    since: Annotated[
+        str, typer.Option("--since", help="Not before: 5m (s, m, h, d ago), 14:05 (time of day), 123.4 (mission time).")
+    ] = "0",
+    until: Annotated[str, typer.Option("--until", help="Not after; as --since.")] = "",
+    robot: Annotated[
+        str, typer.Option("--robot", autocompletion=complete_resource, help="Only what is about this robot, or name.")
+    ] = "",
+    person: Annotated[
+        str, typer.Option("--person", autocompletion=complete_person, help="Only what this person did, or is told of.")
+    ] = "",
+    level: Annotated[LogLevel, typer.Option("--level", help="Only what matters at least so much.")] = LogLevel.INFO,
+    text: Annotated[str, typer.Option("--text", help="Only what has this text in it.")] = "",
+    most: Annotated[int, typer.Option("--most", min=1, max=MOST_EVENTS, help="At most so many, the newest.")] = 1_000,
+    as_json: AsJson = False,
+    mission: MissionName = None,
+    connect: Endpoint = None,
+    secret_file: SecretFile = None,
+) -> None:
+    """Tell what happened in the mission and what people did: the newest that fit the options, oldest first."""
+
+    async def work() -> int:
+        from datetime import datetime
+
+        from backbone.log_lines import log_json, log_lines
+        from backbone.mission_log import AskLog, Log
+        from backbone.mission_picture import LAUNCHER
+        from backbone.moments import Now, moment
+
+        async with visiting(mission, connect, secret_file) as (bus, clock):
+            now = Now(clock.now_s(), datetime.now(), clock.rate)
+            since_s, until_s = moment(since, now), moment(until, now) if until else now.mission_s
+            asked = AskLog(since_s, until_s, robot, person, level, text, most)
+            told = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
+        show([json.dumps(log_json(told, now))] if as_json else log_lines(told, now))
+        if not told.events:
+            say("nothing of that kind happened")
+        if told.left_out:
+            say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
+        if told.since_s > since_s:
+            say(f"what was before {told.since_s:.1f} s is not kept any more")
         return ExitCode.DONE
 
     run(work)
@@ -363,7 +496,7 @@ def start(
 
 @app.command()
 def stop(
-    name: str,
+    name: ComponentName,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
@@ -385,7 +518,12 @@ def stop(
 
 @app.command(name="set", context_settings={"ignore_unknown_options": True})  # a priority may be below 0
 def set_(
-    name: Annotated[str, typer.Argument(help="A component, an ARC, a console, or a node of the behavior tree.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=complete_name, help="A component, an ARC, a console, or a node of the behavior tree."
+        ),
+    ],
     parameter: Annotated[
         str | None,
         typer.Argument(help="priority, parent, minimum_runtime_s, maximum_runtime_s, or a parameter of the component."),
@@ -407,7 +545,7 @@ def set_(
         async with visiting(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
                 lines = await change(bus, name, parameter, _value(value), login_name())
-                tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {_value(value)!r}")
+                tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}")
             else:
                 shown = await attributes_of(bus, name)
                 if as_json:
@@ -435,7 +573,7 @@ def down(mission: MissionName = None) -> None:
 @app.command()
 def creator(
     host: Annotated[str, typer.Option("--host", help="Name of this machine in the mission.")],
-    connect: Annotated[str, typer.Option("--connect", help="The mission's hub, tcp/HOST:PORT.")],
+    connect: Annotated[str, typer.Option("--connect", callback=hub_endpoint, help="The mission's hub, tcp/HOST:PORT.")],
     mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
     secret_file: SecretFile = None,
     tag: Annotated[list[str] | None, typer.Option("--tag", help="What this machine has; repeatable.")] = None,

@@ -15,7 +15,7 @@ from rich.text import Text
 from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import ExitCode, complaint_of
-from backbone.component.messages import StoryEvent
+from backbone.component.messages import ComponentState, StoryEvent
 from backbone.core_launches import UpOptions
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health import HealthWord, MissionHealth, line
@@ -23,10 +23,13 @@ from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
 from backbone.mission_picture import LAUNCHER, MissionPicture, holders_line, look
 from backbone.mission_screen import live_screen
+from backbone.naming import Subsystem
 from backbone.operators import OperatorActed
+from backbone.people import People
 from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import RequestState, Schedule
+from backbone.spoken import counted
 from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope
 
@@ -47,6 +50,7 @@ class ConsoleObserver:
     def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
         self._console, self._live, self._verdict = console, live, verdict
         self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
+        self._people = People()
         self._told = self._health_told = ""
         self._is_up, self._last_progress_s = False, 0.0
 
@@ -64,6 +68,8 @@ class ConsoleObserver:
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people, and to the mission's health."""
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
+        consoles = f"{Subsystem.UI_CONSOLE}/*"
+        bus.subscribe(consoles, Conversation.STATUS, ComponentState, self._heard_console, latest=True)
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
 
@@ -129,12 +135,16 @@ class ConsoleObserver:
 
     def _heard_act(self, envelope: Envelope[Any]) -> None:
         act: OperatorActed = printable_all(envelope.body)
-        self._show_event(StoryEvent(act.at_s, envelope.source, act.sentence, act.subject, envelope.cause))
+        self._show_event(act.event(envelope.source, envelope.cause))
 
     def _heard_event(self, envelope: Envelope[Any]) -> None:
         self._show_event(printable_all(envelope.body))
 
-    def _show_event(self, event: StoryEvent) -> None:
+    def _heard_console(self, envelope: Envelope[Any]) -> None:
+        self._people.heard(printable_all(envelope.body))
+
+    def _show_event(self, told: StoryEvent) -> None:
+        event = self._people.named_event(told)
         self._events.append(event)
         if not self._live:
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
@@ -143,7 +153,7 @@ class ConsoleObserver:
         schedule: Schedule = envelope.body
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
             return
-        line = holders_line(schedule)
+        line = self._people.named(holders_line(schedule))
         if line != self._told:
             self._told = line
             self._print(f"{schedule.at_s:9.2f} s  {line}")
@@ -186,4 +196,4 @@ def last_lines(outcome: Outcome) -> list[str]:
         lines.append("more than asking was needed: " + ", ".join(f"{end.name} ({end.by})" for end in outcome.pushed))
     if outcome.failure is not None:
         return [*lines, f"the mission failed: {outcome.failure}"]
-    return [*lines, f"down: {len(outcome.ended)} components ended, nothing is left"]
+    return [*lines, f"down: {counted(len(outcome.ended), 'component')} ended, nothing is left"]

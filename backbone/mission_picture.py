@@ -23,10 +23,12 @@ from backbone.health import Health, health
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
+from backbone.people import People
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, RequestState, Schedule
+from backbone.spoken import counted
 
 LAUNCHER = "backbone/launcher"
 LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
@@ -71,9 +73,14 @@ class MissionPicture:
         """The emergency stops in force, by the name of the component that was stopped."""
         return {component_of(at): c.stop for at, c in sorted(self.components.items()) if c.stop is not None}
 
+    @property
+    def people(self) -> People:
+        """Who sits at which console."""
+        return People(self.components.values())
+
     def stop_lines(self) -> list[str]:
         """Return one line for each emergency stop in force, for people."""
-        return [stop_line(name, stop, self.at_s) for name, stop in self.stops.items()]
+        return [self.people.named(stop_line(name, stop, self.at_s)) for name, stop in self.stops.items()]
 
     def remarks(self) -> list[str]:
         """Return the problems that are no absence, one line each."""
@@ -112,6 +119,7 @@ class MissionPicture:
                 "restarts": self.restarts(c),
                 "feedback": c.feedback,
                 "requester": c.requester,
+                "person": c.user,
             }
             for _, c in sorted(self.components.items())
         ]
@@ -203,9 +211,9 @@ def _lacks(listing: Components, processes: Mapping[str, ProcessState]) -> list[s
     running = {name for name, process in processes.items() if process.pid} - listed - unknown
     lines = []
     if unknown:
-        lines.append(f"the list is incomplete: {_count(unknown)} did not say yet how they are")
+        lines.append(f"the list is incomplete: no word yet from {_count(unknown)}")
     if running:
-        lines.append(f"the list is incomplete: {_count(running)} run and are not registered yet")
+        lines.append(f"the list is incomplete: running and not registered yet: {_count(running)}")
     elif not listing.complete and not unknown:
         lines.append("the list may be incomplete: the nameserver began a moment ago and components still come back")
     return lines
@@ -214,7 +222,7 @@ def _lacks(listing: Components, processes: Mapping[str, ProcessState]) -> list[s
 def _count(names: Iterable[str]) -> str:
     found = sorted(names)
     more = f" and {len(found) - NAMES_SHOWN} more" if len(found) > NAMES_SHOWN else ""
-    return f"{len(found)} components ({', '.join(found[:NAMES_SHOWN])}{more})"
+    return f"{counted(len(found), 'component')} ({', '.join(found[:NAMES_SHOWN])}{more})"
 
 
 def misses(

@@ -54,8 +54,8 @@ def live_screen(picture: MissionPicture, events: Iterable[StoryEvent] | None, he
     components = _component_lines(picture)
     right: list[RenderableType] = []
     right_lines = 0
-    if picture.schedule is not None:
-        resources, requests = _holder_lines(picture.schedule), _request_lines(picture.schedule, picture.at_s)
+    if (schedule := picture.people.named_all(picture.schedule)) is not None:
+        resources, requests = _holder_lines(schedule), _request_lines(schedule, picture.at_s)
         right = [_panel("resources", resources), _panel("schedule", requests)]
         right_lines = len(resources) + len(requests) + 2 * _FRAME_LINES
     left_lines = len(components) + _FRAME_LINES
@@ -86,7 +86,7 @@ def _head(picture: MissionPicture) -> Text:
 def _troubles(picture: MissionPicture) -> list[Text]:
     """Return what is absent, which stops are in force, and what the picture lacks, one line each."""
     style = _HEALTH_STYLE[picture.health.word]
-    lines = [Text(line, style=style) for line in picture.health.lines(picture.at_s)]
+    lines = [Text(picture.people.named(line), style=style) for line in picture.health.lines(picture.at_s)]
     lines += [Text(line, style="bold red") for line in picture.stop_lines()]
     lines += [Text(line, style="red") for line in picture.remarks()]
     for line in lines:
@@ -108,16 +108,16 @@ def _panel(title: str, lines: list[Text]) -> Panel:
 
 
 def _component_lines(picture: MissionPicture) -> list[Text]:
-    lines: list[Text] = []
+    people, lines = picture.people, list[Text]()
     for subsystem in Subsystem:
         members = picture.of_subsystem(subsystem)
         if members:
             lines.append(Text(str(subsystem), style="bold cyan"))
-        lines += [_component_line(picture, component) for component in members]
+        lines += [_component_line(picture, component, people.doing(component)) for component in members]
     return lines
 
 
-def _component_line(picture: MissionPicture, component: ComponentState) -> Text:
+def _component_line(picture: MissionPicture, component: ComponentState, doing: str) -> Text:
     is_ready = component.state is LifeState.READY
     line = Text.assemble(
         ("● " if is_ready else "○ ", "green" if is_ready else "yellow"),
@@ -128,7 +128,7 @@ def _component_line(picture: MissionPicture, component: ComponentState) -> Text:
         line.append(f"{component.state} ", style="yellow")
     if restarts := picture.restarts(component):
         line.append(f"restarted {restarts}× ", style="yellow")
-    line.append(component.feedback or component.type, style="" if component.feedback else "dim")
+    line.append(doing or component.type, style="" if doing else "dim")
     return line
 
 
@@ -175,8 +175,8 @@ def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> Render
     parts: list[RenderableType] = [_head(picture), *troubles]
     if picture.components:
         parts.append(components_table(picture))
-    if picture.schedule is not None:
-        parts += [rcs_table(picture.schedule), requests_table(picture.schedule, picture.at_s)]
+    if (schedule := picture.people.named_all(picture.schedule)) is not None:
+        parts += [rcs_table(schedule), requests_table(schedule, picture.at_s)]
     newest = list(events)
     if newest:
         parts.append(events_table(newest))
@@ -190,6 +190,7 @@ def components_table(picture: MissionPicture) -> Table:
         table.add_column(
             column, justify="right" if column in ("pid", "restarts") else "left", no_wrap=column != "doing"
         )
+    people = picture.people
     for subsystem in Subsystem:
         for number, c in enumerate(picture.of_subsystem(subsystem)):
             first = str(subsystem) if number == 0 else ""
@@ -202,7 +203,7 @@ def components_table(picture: MissionPicture) -> Table:
                 str(c.pid),
                 str(c.state),
                 str(restarts or ""),
-                c.feedback,
+                people.doing(c),
             )
     return table
 

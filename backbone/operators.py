@@ -7,6 +7,7 @@ import os
 from enum import StrEnum
 
 from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import LogLevel, StoryEvent
 from backbone.keys import Conversation
 from backbone.ranges import Instant, Mention, Text
 from backbone.wire import Message
@@ -65,6 +66,13 @@ _SENTENCES = {
 }
 
 
+_LEVELS = {
+    OperatorAction.STOP_ROBOT: LogLevel.ALARM,
+    OperatorAction.STOP_ALL: LogLevel.ALARM,
+    OperatorAction.ACKNOWLEDGE: LogLevel.INFO,
+}
+
+
 class OperatorActed(Message, frozen=True):
     """Published by the console or command through which a person acted, under ``Conversation.OPERATORS``.
 
@@ -92,6 +100,16 @@ class OperatorActed(Message, frozen=True):
         """
         said = _SENTENCES[self.action].format(user=self.user)
         return f"{said}: {self.detail}" if self.detail else said
+
+    def event(self, where: str, cause: str = "") -> StoryEvent:
+        """Return it as an event of the log.
+
+        Args:
+            where: Address of the console or command it was done by.
+            cause: Id of the message that led to it.
+        """
+        level = _LEVELS.get(self.action, LogLevel.NOTICE)
+        return StoryEvent(self.at_s, where, self.sentence, self.subject, cause, level, self.user)
 
 
 def login_name() -> str:

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, AskStory, ComponentState, Story, StoryEvent
+from backbone.component.story import LENGTH as STORY_LENGTH
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
 from backbone.health import line
+from backbone.log_lines import event_json
 from backbone.mission_picture import MissionPicture, look, stop_line
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import component_of
+from backbone.people import People, screens_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy, RequestState, UnknownRequest, Why
+from backbone.spoken import counted
 from backbone.wire import Message
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
@@ -48,6 +54,8 @@ class Reasons:
         component: What the component says of itself, if there is one.
         absence: That it is wanted and absent, if it is.
         led_to: If the name is a message's: the events that the message led to.
+        remarks: What else is known of the name: of a host, of a person, of a message that led to nothing.
+        people: Who sits at which console; they are called by their names.
     """
 
     name: str
@@ -56,15 +64,20 @@ class Reasons:
     component: ComponentState | None
     absence: Absence | None = None
     led_to: Sequence[StoryEvent] = ()
+    remarks: Sequence[str] = ()
+    people: People = field(default_factory=People)
 
     @property
     def is_known(self) -> bool:
         """Whether there is anything to tell."""
-        return any((self.why, self.placement, self.component, self.absence, self.led_to))
+        return any((self.why, self.placement, self.component, self.absence, self.led_to, self.remarks))
 
     def lines(self, now_s: float) -> list[str]:
         """Return the reasons for people."""
-        lines = [] if self.absence is None else [line(self.absence, now_s)]
+        return [self.people.named(line) for line in self._lines(now_s)]
+
+    def _lines(self, now_s: float) -> list[str]:
+        lines = [*self.remarks] if self.absence is None else [line(self.absence, now_s), *self.remarks]
         if self.component is not None and self.component.stop is not None:
             lines.append(stop_line(self.name, self.component.stop, now_s))
         if self.why is not None:
@@ -97,6 +110,8 @@ class Reasons:
             "placement": _fields(self.placement),
             "stop": _fields(self.component.stop) if self.component else None,
             "absent": _fields(self.absence),
+            "led_to": [event_json(event) for event in self.led_to],
+            "remarks": list(self.remarks),
         }
 
 
@@ -114,15 +129,15 @@ class Asked:
 
     @classmethod
     def of(cls, text: str) -> Asked:
-        """Return what is meant by a name, an address, or the id of a message as causes show it.
+        """Return what is meant by a name, an address, an alarm, or the id of a message, with its subsystem or without.
 
         Example:
-            >>> Asked.of("rc_manager").name, Asked.of("backbone/rc_manager").name
-            ('rc_manager', 'rc_manager')
-            >>> Asked.of("backbone/rc_manager#112")
-            Asked(name='rc_manager', message='backbone/rc_manager#112')
+            >>> Asked.of("rc_manager").name, Asked.of("backbone/rc_manager").name, Asked.of("lost:scout1").name
+            ('rc_manager', 'rc_manager', 'scout1')
+            >>> Asked.of("rc_manager#112")
+            Asked(name='rc_manager', message='rc_manager#112')
         """
-        address, number, _ = text.partition("#")
+        address, number, _ = text.rpartition(":")[2].partition("#")
         return cls(component_of(address), text if number else "")
 
 
@@ -143,6 +158,11 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         story_of(bus, text, clock) if asked.message else _nothing_told(),
     )
     absent = picture.health.absent if picture is not None else ()
+    remarks = [*host_remarks(name, picture), *person_remarks(name, picture)] if picture is not None else []
+    if asked.message and not told.events:
+        remarks.append(
+            f"nobody tells that {asked.message} led to anything; each tells of its newest {STORY_LENGTH} events"
+        )
     reasons = Reasons(
         name,
         why if isinstance(why, Why) else None,
@@ -150,11 +170,41 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         resolved.component if isinstance(resolved, Resolved) else None,
         next((absence for absence in absent if absence.name == name), None),
         told.events,
+        remarks,
+        picture.people if picture is not None else People(),
     )
     if not reasons.is_known:
         errors = (why, placement, resolved)
         raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), resolved)
     return printable_all(reasons)
+
+
+def host_remarks(name: str, picture: MissionPicture) -> list[str]:
+    """Return what is known of a machine of the mission; nothing if the name is none's."""
+    there = [component_of(at) for at, component in sorted(picture.components.items()) if component.host == name]
+    missed = [absence for absence in picture.health.absent if absence.name == creator_name(name)]
+    if not missed and not any(c.host == name and c.type == CREATOR for c in picture.components.values()):
+        return []
+    lines = [
+        f"{name} is a machine of the mission, with {counted(len(there), 'component')}: {', '.join(there) or 'none'}"
+    ]
+    return lines + [line(absence, picture.at_s) for absence in missed]
+
+
+def person_remarks(name: str, picture: MissionPicture) -> list[str]:
+    """Return at which consoles a person sits, and what comes of it; nothing if the name is none's."""
+    screens = screens_of(name, picture.components.values())
+    if not screens:
+        return []
+    lines = [f"{name} sits at {counted(len(screens), 'console')}"]
+    for screen in screens:
+        lines.append(f"  on {screen.host}: {screen.feedback or screen.state}")
+        lines += [
+            f"  {request.because.removeprefix(f'{request.arc} ')}"
+            for request in (picture.schedule.requests if picture.schedule is not None else [])
+            if request.owner == screen.address
+        ]
+    return lines
 
 
 @dataclass(frozen=True)
@@ -204,7 +254,7 @@ async def _nothing_told() -> Told:
 async def _look_or_none(bus: Bus, clock: Clock) -> MissionPicture | None:
     """Return how the mission is; None if the nameserver does not answer, which the other questions tell of."""
     try:
-        return await look(bus, clock.now_s(), rate=clock.rate, schedule=False)
+        return await look(bus, clock.now_s(), rate=clock.rate)
     except (Refusal, LinkError):
         return None
 

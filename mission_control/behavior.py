@@ -24,7 +24,7 @@ from backbone.component.asking import ask_until_answered
 from backbone.component.companion import Companion
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence, LifeState
+from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
@@ -241,7 +241,8 @@ class Behavior(Component[B], Generic[B]):
         self.status, self.payload = status, dict(payload or {})
         if status is BehaviorStatus.FAILURE and self._parent is None and not self._abandoned:
             self._abandon(self.name, self.payload)
-        self.tell(self.name, f"finished: {status}")
+        failed = status is BehaviorStatus.FAILURE
+        self.tell(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, Any]) -> None:
@@ -346,7 +347,7 @@ class Behavior(Component[B], Generic[B]):
 
     async def arc_suspended(self, notice: Suspended) -> None:
         """Pass it on; see ``ArcListener``."""
-        self.rcs, self._suspended_because = {}, f"{notice.reason} by {notice.by}"
+        self.rcs, self._suspended_because = {}, suspended_because(notice.reason, notice.by)
         self.times_suspended += 1
         self.story.note(self.name, f"suspended: {self._suspended_because}")
         self.report(f"suspended: {self._suspended_because}")
@@ -469,7 +470,7 @@ class Behavior(Component[B], Generic[B]):
                 patience_s=START_PATIENCE_S,
             )
         except Refusal as refusal:
-            self.tell(name, f"could not be started: {refusal}")
+            self.tell(name, f"could not be started: {refusal}", LogLevel.WARNING)
             self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
             return
         self.tell(name, f"is not wanted any more: {stopped}")
@@ -598,6 +599,20 @@ class Behavior(Component[B], Generic[B]):
             work.close()
             return None
         return self.start_task(work, name)
+
+
+def suspended_because(reason: str, by: str) -> str:
+    """Return why RCs were taken, as part of a sentence.
+
+    Args:
+        reason: The scheduler's word.
+        by: Because of whom; empty: of nobody.
+
+    Example:
+        >>> suspended_because("higher", "console-1"), suspended_because("silent", "")
+        ('higher by console-1', 'silent')
+    """
+    return f"{reason} by {by}" if by else reason
 
 
 async def _end_task(task: asyncio.Task[None] | None) -> None:

@@ -25,6 +25,7 @@ from backbone.component.asking import ask_until_answered
 from backbone.component.companion import Companion
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
@@ -321,12 +322,15 @@ class AggregateResourceController(Component[ArcParameters]):
                 within_s=REQUEST_WITHIN_S,
             )
         except (Refusal, LinkError) as error:
-            self.tell(self.name, f"cannot be scheduled: {error}")
-            await self._notify(Suspended(self.name, f"cannot be scheduled: {error}", "rc_manager", -1.0)).wait()
-            self.end(f"cannot be scheduled: {error}")
+            placeless = f"got no place in the schedule: {error}"
+            self.tell(self.name, placeless, LogLevel.WARNING)
+            await self._notify(Suspended(self.name, placeless, "", -1.0)).wait()
+            self.end(placeless)
             return
         self._choose(scheduled.rcs)
-        self.story.note(self.name, f"{scheduled.state}, position {scheduled.position}, behind {scheduled.blockers}")
+        behind = f", behind {', '.join(scheduled.blockers)}" if scheduled.blockers else ""
+        place = f", place {scheduled.position} in line" if scheduled.position else ""
+        self.story.note(self.name, f"is {scheduled.state}{place}{behind}")
 
     def _choose(self, rcs: Iterable[str]) -> None:
         """Take this set as the one that was chosen.
@@ -427,7 +431,7 @@ class AggregateResourceController(Component[ArcParameters]):
             reason = f"could not be prepared: {detail}"
             if self._gate.epochs == order.epochs:
                 self._gate.close(reason, self.name, -1.0)
-            self.tell(self.name, reason)
+            self.tell(self.name, reason, LogLevel.WARNING)
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0) from error
         if self._gate.epochs != order.epochs:
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
@@ -600,7 +604,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 continue
             await self.clock.sleep_until_s(self._lease_until_s)
             if self._gate.epochs and self.clock.now_s() >= self._lease_until_s:
-                self.tell(self.name, "its lease is over: nothing was renewed in time")
+                self.tell(self.name, "its lease is over: nothing was renewed in time", LogLevel.WARNING)
                 self._shut("lease", "rc_manager", -1.0)
                 if self._manager is not None and self._manager.is_there:
                     await self._ask_anew()

@@ -513,7 +513,7 @@ class SwappedOut(Refusal):
     """The ARC holds nothing now; facts: ``reason``, ``by``, ``expected_start_s``."""
 
     code = "arc.swapped_out"
-    remedy = "Wait for 'resumed'; the next expected slot is in the facts."
+    remedy = "Wait until it is granted again; 'scout-backbone why' tells when that will be."
 
 
 class NotMySet(Refusal):

@@ -20,6 +20,7 @@ import msgspec
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
@@ -324,7 +325,8 @@ class ResourceController(Component[R], Generic[R]):
         except (HardwareFault, TimeoutError) as error:
             detail = error.detail if isinstance(error, HardwareFault) else f"nothing within {SAFE_WITHIN_S} s"
             self._faults += 1
-            self.tell(hold.arc, f"disconnected ({reason}), but {self.name} is not safe: {detail}")
+            unsafe = f"disconnected ({reason}), but {self.name} is not safe: {detail}"
+            self.tell(hold.arc, unsafe, LogLevel.ALARM)
             self._report_holders()
             raise HardwareFault(f"{self.name} is not safe after {hold.arc}: {detail}", arc=hold.arc) from error
         del self._unsafe[hold.arc]

@@ -1,20 +1,26 @@
-"""Alarms: what an operator must know, kept until somebody has seen it.
+"""Alarms: what an operator must know now, few enough to be read.
 
 Rules of this file: no bus, no clock, no screen; times are arguments.
 
 * An alarm is told apart by its key. The same one again counts up and has to be seen again; a condition that goes on
   is one alarm.
+* What is over is none any more: the log has it. What merely happened fades, the sooner the less it matters.
+* While the operator was away nothing goes and nothing fades: it is marked, until somebody has seen it.
+* One cause is one line: what follows from another alarm is told below that one, and seen with it.
 * What nobody has acknowledged is never forgotten for what somebody has, nor what is so now for what is over.
-* While the operator is away alarms are kept and marked; acknowledging takes the mark away, coming back does not.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+
+import msgspec
 
 from ui_console.views import NONE_S, AlarmKind, AlarmView, Severity
 
 ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the recording
+FADES_AFTER_S = {Severity.NOTICE: 20.0, Severity.WARNING: 60.0}  # chosen: read twice; a real alarm never fades
 
 SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.STOPPED: Severity.ALARM,
@@ -33,7 +39,10 @@ SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.NOT_RECORDED: Severity.WARNING,
     AlarmKind.VISITOR: Severity.WARNING,
 }
+"""How much an alarm of a kind matters, unless it says otherwise itself."""
 _WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}
+_CAUSES = (AlarmKind.LINK, AlarmKind.ABSENT, AlarmKind.LOST, AlarmKind.RC_DOWN)
+"""Kinds from which others follow, the one that says most first."""
 
 
 @dataclass(slots=True)
@@ -42,88 +51,117 @@ class _Alarm:
     subject: str
     line: str
     remedy: str
+    severity: Severity
     first_s: float
     last_s: float
     count: int = 1
     is_active: bool = False
+    is_over: bool = False
     acknowledged_by: str = ""
     while_away: bool = False
 
 
 class AlarmBook:
-    """The alarms of one console, or of all who share one model."""
+    """The alarms of one console, or of all who share one model.
 
-    def __init__(self) -> None:
+    Args:
+        beside: A book whose operators' attention counts here too; None: this one has its own.
+    """
+
+    def __init__(self, beside: AlarmBook | None = None) -> None:
         self._alarms: dict[str, _Alarm] = {}
-        self._away_since_s = NONE_S
+        self._beside = beside
+        self._own_away_since_s = NONE_S
+        self._now_s = NONE_S
         self.forgotten = 0
         """How many were dropped because there are too many."""
 
     @property
     def away_since_s(self) -> float:
         """Since when nobody looks; negative: somebody does."""
-        return self._away_since_s
+        return self._beside.away_since_s if self._beside is not None else self._own_away_since_s
 
-    def happened(self, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "", key: str = "") -> None:
+    def happened(
+        self,
+        kind: AlarmKind,
+        subject: str,
+        line: str,
+        at_s: float,
+        remedy: str = "",
+        key: str = "",
+        severity: Severity | None = None,
+    ) -> None:
         """Something happened; told again it counts up."""
-        self._tell(kind, subject, line, at_s, remedy, key, is_active=False)
+        self._tell(kind, subject, line, at_s, remedy, key, severity, is_active=False)
 
-    def begin(self, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "", key: str = "") -> None:
-        """Something is so from now on until ``end``; told again while it is so, only the line may change."""
+    def begin(
+        self,
+        kind: AlarmKind,
+        subject: str,
+        line: str,
+        at_s: float,
+        remedy: str = "",
+        key: str = "",
+        severity: Severity | None = None,
+    ) -> None:
+        """Something is so from now on until ``end``; told again while it is so, only the words may change."""
         alarm = self._alarms.get(key or alarm_key(kind, subject))
         if alarm is not None and alarm.is_active:
-            alarm.line, alarm.remedy = line, remedy
+            alarm.line, alarm.remedy, alarm.severity = line, remedy, severity or SEVERITIES[kind]
             return
-        self._tell(kind, subject, line, at_s, remedy, key, is_active=True)
+        self._tell(kind, subject, line, at_s, remedy, key, severity, is_active=True)
 
     def end(self, kind: AlarmKind, subject: str, at_s: float, key: str = "") -> None:
-        """It is no longer so; the alarm stays until it is acknowledged."""
+        """It is no longer so: nothing is to be done about it any more."""
         alarm = self._alarms.get(key or alarm_key(kind, subject))
         if alarm is not None and alarm.is_active:
-            alarm.is_active, alarm.last_s = False, at_s
+            alarm.is_active, alarm.is_over, alarm.last_s, alarm.remedy = False, True, at_s, ""
 
     def retract(self, kind: AlarmKind, subject: str, key: str = "") -> None:
         """It was none: what explains it was heard later."""
         self._alarms.pop(key or alarm_key(kind, subject), None)
 
-    def acknowledge(self, user: str, key: str = "") -> int:
-        """Note that the user has seen one alarm, or with an empty key all; return how many that were new to people."""
-        seen = [alarm for own_key, alarm in self._alarms.items() if key in ("", own_key) and not alarm.acknowledged_by]
+    def acknowledge(self, user: str, keys: Sequence[str] = ()) -> int:
+        """Note that the user has seen these alarms, or without a key all; return how many that were new to people."""
+        seen = [alarm for key, alarm in self._alarms.items() if not keys or key in keys]
+        seen = [alarm for alarm in seen if not alarm.acknowledged_by and self._is_shown(alarm)]
         for alarm in seen:
             alarm.acknowledged_by, alarm.while_away = user, False
         return len(seen)
 
     def attention(self, is_there: bool, at_s: float) -> None:
         """The operator came, or went."""
-        if not is_there and self._away_since_s < 0:
-            self._away_since_s = at_s
+        if not is_there and self._own_away_since_s < 0:
+            self._own_away_since_s = at_s
         elif is_there:
-            self._away_since_s = NONE_S
+            self._own_away_since_s = NONE_S
+
+    def look(self, now_s: float) -> None:
+        """Let fade what time has passed over."""
+        self._now_s = max(self._now_s, now_s)
 
     def views(self) -> list[AlarmView]:
-        """Return what is not both over and acknowledged: unseen ones first, then by weight, newest first."""
-        shown = [(k, a) for k, a in self._alarms.items() if a.is_active or not a.acknowledged_by]
-        shown.sort(key=lambda item: (bool(item[1].acknowledged_by), _WEIGHT[SEVERITIES[item[1].kind]], -item[1].last_s))
-        return [
-            AlarmView(
-                key,
-                alarm.kind,
-                SEVERITIES[alarm.kind],
-                alarm.subject,
-                alarm.line,
-                alarm.remedy,
-                alarm.first_s,
-                alarm.last_s,
-                alarm.count,
-                alarm.is_active,
-                alarm.acknowledged_by,
-                alarm.while_away,
-            )
-            for key, alarm in shown
-        ]
+        """Return what is to be known: unseen ones first, then by weight, newest first."""
+        return in_order(_view(key, alarm) for key, alarm in self._alarms.items() if self._is_shown(alarm))
+
+    def _is_shown(self, alarm: _Alarm) -> bool:
+        if alarm.is_active or alarm.while_away:
+            return True
+        fades_after_s = FADES_AFTER_S.get(alarm.severity)
+        is_faded = fades_after_s is not None and self._now_s - alarm.last_s > fades_after_s
+        return not (alarm.is_over or alarm.acknowledged_by or is_faded)
 
     def _tell(
-        self, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str, key: str, *, is_active: bool
+        self,
+        kind: AlarmKind,
+        subject: str,
+        line: str,
+        at_s: float,
+        remedy: str,
+        key: str,
+        severity: Severity | None,
+        *,
+        is_active: bool,
     ) -> None:
         key = key or alarm_key(kind, subject)
         former = self._alarms.pop(key, None)
@@ -132,22 +170,25 @@ class AlarmBook:
             subject,
             line,
             remedy,
+            severity or SEVERITIES[kind],
             former.first_s if former else at_s,
             at_s,
             former.count + 1 if former else 1,
             is_active,
-            "",
-            self._away_since_s >= 0,
+            while_away=self.away_since_s >= 0,
         )
         if len(self._alarms) > ALARMS_KEPT:
             self._forget_one()
 
     def _forget_one(self) -> None:
-        """Forget the oldest of those that matter least: seen and over, then seen, then over."""
+        """Forget the oldest of those that matter least: no longer shown, then seen, then over."""
         oldest_first = list(self._alarms.items())
-        victim, alarm = min(oldest_first, key=lambda item: (not item[1].acknowledged_by, item[1].is_active))
+        victim, alarm = min(
+            oldest_first,
+            key=lambda item: (self._is_shown(item[1]), not item[1].acknowledged_by, item[1].is_active),
+        )
         del self._alarms[victim]
-        if not alarm.acknowledged_by:
+        if self._is_shown(alarm) and not alarm.acknowledged_by:
             self.forgotten += 1
 
 
@@ -159,3 +200,79 @@ def alarm_key(kind: AlarmKind, subject: str) -> str:
         'lost:scout1'
     """
     return f"{kind}:{subject}"
+
+
+def in_order(alarms: Iterable[AlarmView]) -> list[AlarmView]:
+    """Return the alarms as people read them: unseen ones first, then by weight, newest first."""
+    return sorted(alarms, key=lambda one: (bool(one.acknowledged_by), _WEIGHT[one.severity], -one.last_s))
+
+
+def one_line_for_one_cause(
+    alarms: Sequence[AlarmView], explained_by: Callable[[str], frozenset[str]]
+) -> list[AlarmView]:
+    """Return the alarms in order; those that follow from another are told with it.
+
+    Args:
+        alarms: Any.
+        explained_by: Names of that without which a subject cannot be well: its host's creator, what it uses.
+    """
+    causes = [one for one in alarms if one.is_active and one.kind in _CAUSES]
+    root_of = {one.key: _cause_of(one, causes, explained_by) for one in alarms}
+    below: dict[str, list[AlarmView]] = {}
+    for one in alarms:
+        root = one
+        while (cause := root_of[root.key]) is not None:
+            root = cause
+        below.setdefault(root.key, []).append(one)
+    roots = [one for one in alarms if root_of[one.key] is None]
+    return in_order(_with(root, [one for one in below[root.key] if one is not root]) for root in roots)
+
+
+def _cause_of(
+    one: AlarmView, causes: Sequence[AlarmView], explained_by: Callable[[str], frozenset[str]]
+) -> AlarmView | None:
+    """Return the alarm from which this one follows: of a higher rank, or equal and needing less, so never in a ring."""
+    rank, needs = _rank(one), explained_by(one.subject)
+
+    def explains(cause: AlarmView) -> bool:
+        if _rank(cause) == rank:
+            return cause.subject in needs and len(explained_by(cause.subject)) < len(needs)
+        is_near = cause.subject in {one.subject, *needs}
+        is_unseen = cause.kind is AlarmKind.LINK and one.last_s >= cause.first_s  # nothing is heard, so all looks lost
+        return _rank(cause) < rank and (is_near or is_unseen)
+
+    return min(filter(explains, causes), key=_rank, default=None)
+
+
+def _rank(alarm: AlarmView) -> int:
+    return _CAUSES.index(alarm.kind) if alarm.is_active and alarm.kind in _CAUSES else len(_CAUSES)
+
+
+def _with(root: AlarmView, others: Sequence[AlarmView]) -> AlarmView:
+    if not others:
+        return root
+    return msgspec.structs.replace(
+        root,
+        also=[one.line for one in others],
+        keys=[root.key, *(one.key for one in others)],
+        acknowledged_by=root.acknowledged_by if all(one.acknowledged_by for one in others) else "",
+        while_away=root.while_away or any(one.while_away for one in others),
+    )
+
+
+def _view(key: str, alarm: _Alarm) -> AlarmView:
+    return AlarmView(
+        key,
+        alarm.kind,
+        alarm.severity,
+        alarm.subject,
+        alarm.line,
+        alarm.remedy,
+        alarm.first_s,
+        alarm.last_s,
+        alarm.count,
+        alarm.is_active,
+        alarm.acknowledged_by,
+        alarm.while_away,
+        keys=[key],
+    )

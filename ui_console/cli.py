@@ -14,7 +14,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import ExitCode, SecretFile, finite, read_secret_option, run, say
+from backbone.cli import (
+    ExitCode,
+    SecretFile,
+    WholeHelp,
+    complete_mission,
+    finite,
+    hub_endpoint,
+    picture_for,
+    read_secret_option,
+    run,
+    say,
+)
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -40,6 +51,7 @@ SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
+    cls=WholeHelp,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -47,6 +59,15 @@ app = typer.Typer(
     help="Consoles of a mission. Exit codes: 0 done, 1 unexpected, 2 usage or wrong script, 4 backbone not reached, "
     "5 refused, 130 Ctrl-C.",
 )
+
+
+def complete_robot(ctx: typer.Context) -> list[str]:
+    """Return the robots of the mission that is up, for a shell."""
+    from ui_console.team_model import ROBOT_KIND
+
+    picture = picture_for(ctx)
+    rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
+    return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
 
 
 class Profile(StrEnum):
@@ -57,8 +78,13 @@ class Profile(StrEnum):
     MONITOR = "monitor"  # tables only; drives nothing
 
 
-Mission = Annotated[str | None, typer.Option("--mission", help="Name of a mission that is up on this machine.")]
-Connect = Annotated[str | None, typer.Option("--connect", help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")]
+Mission = Annotated[
+    str | None,
+    typer.Option("--mission", autocompletion=complete_mission, help="Name of a mission that is up on this machine."),
+]
+Connect = Annotated[
+    str | None, typer.Option("--connect", callback=hub_endpoint, help="Hub elsewhere, tcp/HOST:PORT; needs --mission.")
+]
 
 
 User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
@@ -117,7 +143,10 @@ class _Site:
 
 @app.command()
 def attach(
-    robot: Annotated[str, typer.Argument(help="Robot to take over; none: any free one with a camera.")] = "",
+    robot: Annotated[
+        str,
+        typer.Argument(autocompletion=complete_robot, help="Robot to take over; none: any free one with a camera."),
+    ] = "",
     priority: Annotated[
         int, typer.Option(min=LEAST_PRIORITY, max=MOST_PRIORITY, help="Beside the mission's own; larger is higher.")
     ] = 100,
@@ -267,16 +296,8 @@ def design(
     new: Annotated[bool, typer.Option("--new", help="Begin from nothing, whatever the file holds.")] = False,
 ) -> None:
     """Build or change a mission file by keys, checked while you build it; nothing needs to be up."""
-    from backbone.mission.reader import MissionInvalid
-    from ui_console.design.draft import Draft
-
     _need_a_terminal("design", "an editor and scout-backbone check")
-    try:
-        draft = Draft.opened(file) if Path(file).exists() and not new else Draft.new(file)
-    except MissionInvalid as invalid:
-        say(str(invalid))
-        raise typer.Exit(ExitCode.MISSION_INVALID) from invalid
-    run(lambda: _design(draft))
+    run(lambda: _design(file, is_new=new or not Path(file).exists()))
 
 
 def main() -> None:
@@ -321,7 +342,7 @@ async def _drive_by_script(where: _Where, wished: dict[str, Any], user: str, giv
 async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -> int:
     from ui_console.gamepad import find_gamepad
     from ui_console.teleoperation import Teleoperation
-    from ui_console.terminal import app as screens
+    from ui_console.terminal import keys
     from ui_console.terminal.session import TerminalSession
 
     pad = find_gamepad() if looks.has_gamepad else None
@@ -331,7 +352,7 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
         launch.name,
         launch.mission,
         looks.user,
-        profile=screens.Profile(looks.profile),
+        profile=keys.Profile(looks.profile),
         is_bare=looks.is_bare,
         sees=sees,
         gamepad=pad,
@@ -339,11 +360,11 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
     bus = await _open_bus(launch, clock, secret)
     see = session.see if sees else None
     console = Teleoperation(launch, bus, clock, show=session.show, see=see, keeps_arc=True, user=looks.user)
-    _end_on_signals(console)
-    await session.run(console)
+    interrupted = _end_on_signals(console)
+    ended = await session.run(console)
     if console.refusal is not None and console.given_back is None:
         raise console.refusal
-    return ExitCode.DONE
+    return ExitCode.INTERRUPTED if interrupted() else ended
 
 
 async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
@@ -367,9 +388,9 @@ async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
 
     session = TerminalSession(launch.name, launch.mission, user, sees=False)
     console = Observer(launch, bus, clock, show=session.show, user=user)
-    _end_on_signals(console)
-    await session.run(console)
-    return ExitCode.DONE
+    interrupted = _end_on_signals(console)
+    ended = await session.run(console)
+    return ExitCode.INTERRUPTED if interrupted() else ended
 
 
 async def _look_once(where: _Where, user: str) -> int:
@@ -514,12 +535,32 @@ def _shown(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-async def _design(draft: Draft) -> int:
+async def _design(file: str, *, is_new: bool) -> int:
+    from backbone.mission.reader import MissionInvalid
+    from ui_console.design.draft import Draft
     from ui_console.design.look_up import look_up
     from ui_console.design.screen import DesignApp
 
-    await DesignApp(draft, look_up).run_async()
-    return ExitCode.DONE
+    try:
+        draft = Draft.new(file) if is_new else Draft.opened(file)
+    except MissionInvalid as invalid:
+        say(str(invalid))
+        return ExitCode.MISSION_INVALID
+    screen = DesignApp(draft, look_up)
+    await screen.run_async()
+    if screen.return_code:
+        _rescue(screen.draft)
+    return screen.return_code or ExitCode.DONE
+
+
+def _rescue(draft: Draft) -> None:
+    """Write what a designer that crashed had not saved beside the mission file."""
+    from ui_console.design.file import save
+
+    if draft.is_changed:
+        beside = Path(f"{draft.source}.rescued")
+        save(draft, beside, overwrite=True)
+        say(f"what was not saved is in {beside}")
 
 
 def _user() -> str:

@@ -10,6 +10,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
+from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal, code_of
 from backbone.naming import component_of
 from backbone.operators import OperatorAction
@@ -134,7 +135,7 @@ class ConsentTalk:
         self._unanswered -= 1
         if not consent.is_given:
             because = consent.reason or "no reason given"
-            console.tell(question.robot, f"{consent.user} keeps it from {console.user}: {because}")
+            console.tell(question.robot, f"{consent.user} keeps it from {console.user}: {because}", LogLevel.NOTICE)
         now_s = console.clock.now_s()
         console.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
 

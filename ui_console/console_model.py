@@ -14,8 +14,9 @@ from typing import cast, get_args
 
 import msgspec
 
-from backbone.naming import Subsystem
+from backbone.naming import Subsystem, component_of
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
+from ui_console.alarms import AlarmBook
 from ui_console.consent import Sought, Topic
 from ui_console.console_events import (
     Asked,
@@ -39,10 +40,12 @@ from ui_console.console_events import (
     WhyHeard,
 )
 from ui_console.lifting import question_line
+from ui_console.losses import WANTED, why_lost
 from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.views import (
     NONE_S,
     AlarmKind,
+    AlarmView,
     ConsentView,
     ConsoleView,
     LinkView,
@@ -57,6 +60,7 @@ STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
 UNRENEWED = ("lost", "lease")  # reasons of a loss that nobody decided
+SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 _TEAM_EVENTS = get_args(TeamEvent)
@@ -70,9 +74,18 @@ class ConsoleModel:
         user: Who sits at it, for people.
         team: What is known of the mission; None: a model of its own.
         sees: True if pictures are to come while a robot is held: their absence is an alarm then.
+        alarms: Where what concerns this console is told; None: in a book that only its operator reads.
     """
 
-    def __init__(self, name: str, user: str = "", team: TeamModel | None = None, *, sees: bool = True) -> None:
+    def __init__(
+        self,
+        name: str,
+        user: str = "",
+        team: TeamModel | None = None,
+        *,
+        sees: bool = True,
+        alarms: AlarmBook | None = None,
+    ) -> None:
         self.name, self.user = name, user or name
         self.team = team or TeamModel()
         self.robot = ""
@@ -92,6 +105,8 @@ class ConsoleModel:
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
         self._blind = ""  # robot that is held without pictures to drive by
+        self.alarms = alarms or AlarmBook(beside=self.team.alarms)
+        """What concerns this console alone."""
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: ConsoleEvent) -> None:
@@ -104,18 +119,30 @@ class ConsoleModel:
     def look(self, now_s: float) -> None:
         """Find out what only time can tell; right before a view is taken."""
         self.team.look(now_s)
+        self.alarms.look(now_s)
         stale = self._stale_line(now_s)
         blind = self.robot if stale else ""
-        if self._blind not in ("", blind):  # others who share the team model may be blind to other robots
-            self.team.alarms.end(AlarmKind.STALE_VIDEO, self._blind, now_s)
+        if self._blind not in ("", blind):
+            self.alarms.end(AlarmKind.STALE_VIDEO, self._blind, now_s)
         self._blind = blind
         if blind:
             remedy = "Stop; do not drive by an old picture."
-            self.team.alarms.begin(AlarmKind.STALE_VIDEO, blind, stale, now_s, remedy)
+            self.alarms.begin(AlarmKind.STALE_VIDEO, blind, stale, now_s, remedy)
+
+    def alarm_views(self) -> list[AlarmView]:
+        """Return what this console's operator must know; right after ``look``."""
+        return self.team.alarm_views(self.alarms)
 
     def acknowledge(self, key: str = "") -> int:
-        """Note that this console's user has seen one alarm, or with an empty key all; return how many."""
-        return self.team.alarms.acknowledge(self.user, key)
+        """Note that this console's user has seen one alarm and what follows from it, or with an empty key all.
+
+        Returns:
+            How many that were.
+        """
+        keys = [one for view in self.alarm_views() if key in ("", view.key) for one in view.keys]
+        if not keys:
+            return 0
+        return self.team.alarms.acknowledge(self.user, keys) + self.alarms.acknowledge(self.user, keys)
 
     def dismiss_lost(self) -> None:
         """This console's user knows that a robot was lost, and does not want it back."""
@@ -134,7 +161,7 @@ class ConsoleModel:
             tree=team.tree(),
             requests=team.requests(),
             timeline=team.timeline(now_s),
-            alarms=team.alarms.views(),
+            alarms=self.alarm_views(),
             hosts=team.hosts(now_s),
             links=self.links(now_s),
             videos=self.videos(now_s),
@@ -157,16 +184,22 @@ class ConsoleModel:
             status=self.status_line(now_s),
             epoch=max(held.epochs.values(), default=0) if held is not None else 0,
             until_s=held.until_s if held is not None else NONE_S,
-            taken_because=f"{self.lost.reason} by {self.lost.by}" if self.lost is not None else "",
+            taken_because=self._why_lost(self.lost) if self.lost is not None else "",
             applied=_applied_line(self.applied),
             stop=self.team.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
             asked=self.asked_line(now_s),
+            other_screens=self.other_screens(),
             must_let_go=self._must_let_go and held is not None,
             lost=self._lost_view(now_s),
             link_down_s=link_down_s,
         )
+
+    def other_screens(self) -> list[str]:
+        """Return where else this console's person sits, and what they hold there, one line each."""
+        own = [screen for screen in self.team.screens_of(self.user) if component_of(screen.address) != self.name]
+        return [f"{screen.type} on {screen.host}: {screen.feedback or screen.state}" for screen in own]
 
     def consent(self, now_s: float) -> ConsentView | None:
         """Return what this operator is to decide first; None: nobody asks."""
@@ -190,10 +223,11 @@ class ConsoleModel:
             return ""
         if asked.topic is Topic.LIFT and now_s > asked.until_s + ANSWER_SHOWN_S:
             return ""
-        said = [_answer_line(heard) for heard in self._heard]
+        said = [self._answer_line(heard) for heard in self._heard]
         if len(said) < len(asked.of):
             what = asked.robot if asked.topic is Topic.TAKE else f"leave to lift the stop of {asked.robot}"
-            said.append(f"asked {', '.join(asked.of)} for {what}: {max(0.0, asked.until_s - now_s):.0f} s left")
+            whom, left_s = ", ".join(map(self.team.person, asked.of)), max(0.0, asked.until_s - now_s)
+            said.append(f"asked {whom} for {what}: {left_s:.0f} s left")
         return "; ".join(said)
 
     def robots(self, now_s: float) -> list[RobotView]:
@@ -236,21 +270,21 @@ class ConsoleModel:
             stop = self.team.stop_of(self.robot)
             if stop is not None:
                 return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
-            left_s = self.held.until_s - now_s
-            slice_end = f", slice {left_s:.0f} s" if left_s > 0 else ""
+            slice_end = _slice_end(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
         if self.asked is None:
-            return "watching; you hold no robot"
+            there = "; ".join(self.other_screens())
+            return f"watching; you hold no robot{f' here; your other screen, {there}' if there else ''}"
         wanted = self.robot or "a robot"
         if self.why is not None and self.why.why.lines:
-            return f"waiting for {wanted}: {self.why.why.lines[0]}"
+            return f"waiting for {wanted}: {self.team.people.named(self.why.why.lines[0])}"
         if self.lost is not None:
-            return f"waiting for {wanted}: {self.lost.reason} by {self.lost.by}"
+            return f"waiting for {wanted}: {self._why_lost(self.lost)}"
         return f"waiting for {wanted}"
 
     # ------------------------------------------------------------------ within
     def _apply_own(self, event: OwnEvent) -> None:
-        alarms = self.team.alarms
+        alarms = self.alarms
         match event:
             case ConsentAsked():
                 self._asked_whom, self._heard = event, []
@@ -271,13 +305,14 @@ class ConsoleModel:
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
                 self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
-            case Lost(at_s=at_s, reason=reason, by=by):
+            case Lost(at_s=at_s):
                 self.held, self.lost = None, event
-                if reason in UNRENEWED:
+                if event.reason in UNRENEWED:
                     self._went = RobotLost(at_s, self.robot, "the link to it was away for too long")
                 self._pictures.clear()
-                line = f"{self.robot or 'the robot'} was taken from {self.user}: {reason} by {by}"
-                alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
+                if event.reason != WANTED:
+                    line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
+                    alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
             case CommandApplied():
                 self.applied = event
             case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
@@ -302,7 +337,17 @@ class ConsoleModel:
             case WhyHeard():
                 self.why = event
             case Attention(at_s=at_s, is_there=is_there):
-                alarms.attention(is_there, at_s)
+                self.team.alarms.attention(is_there, at_s)
+
+    def _why_lost(self, lost: Lost) -> str:
+        return why_lost(lost.reason, self.team.person(lost.by))
+
+    def _answer_line(self, heard: ConsentHeard) -> str:
+        who, reason = self.team.person(heard.user), f": {self.team.people.named(heard.reason)}" if heard.reason else ""
+        if heard.topic is Topic.LIFT:
+            what = f"lets {heard.robot} move" if heard.is_given else f"keeps {heard.robot} stopped"
+            return f"{who} {what}{reason}"
+        return f"{who} {'lets you have' if heard.is_given else 'keeps'} {heard.robot}{reason}"
 
     def _is_held(self, now_s: float) -> bool:
         """Return whether keys move a robot, as far as can be known now."""
@@ -335,19 +380,18 @@ def _video(robot: str, seen: deque[PictureSeen], now_s: float) -> VideoView:
     return VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
 
 
+def _slice_end(until_s: float, now_s: float) -> str:
+    """Return what is left of a slice, for people; empty: it has no end, or ends now."""
+    left_s = until_s - now_s
+    if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
+        return ""
+    return f", slice {left_s:.0f} s" if left_s > 0 else ", beyond its slice"
+
+
 def _question_line(sought: Sought) -> str:
     if sought.topic is Topic.LIFT:
         return question_line(sought.user, sought.robot, sought.why)
     return f"{sought.user} asks for {sought.robot}{f': {sought.why}' if sought.why else ''}"
-
-
-def _answer_line(heard: ConsentHeard) -> str:
-    if heard.topic is Topic.LIFT:
-        said = "lets" if heard.is_given else "keeps"
-        what = f"{heard.robot} move" if heard.is_given else f"{heard.robot} stopped"
-        return f"{heard.user} {said} {what}{f': {heard.reason}' if heard.reason else ''}"
-    word = "lets you have" if heard.is_given else "keeps"
-    return f"{heard.user} {word} {heard.robot}{f': {heard.reason}' if heard.reason else ''}"
 
 
 def _applied_line(applied: CommandApplied | None) -> str:

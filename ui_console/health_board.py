@@ -10,7 +10,7 @@ from backbone.component.messages import Absence
 from backbone.health import Health, HealthWord
 from ui_console.alarms import AlarmBook
 from ui_console.console_events import HealthHeard
-from ui_console.views import AlarmKind, HealthView
+from ui_console.views import AlarmKind, HealthView, Severity
 
 LAUNCHER_NAME = "launcher"
 REMEDY = "Look after the terminal of 'scout-backbone up'; 'scout-backbone down' ends the mission."
@@ -69,7 +69,8 @@ class HealthBoard:
         for absence in absent:
             what = "; ".join(part for part in (absence.cause, absence.doing) if part)
             line = f"{absence.name} is absent: {what}"
-            self._alarms.begin(AlarmKind.ABSENT, absence.name, line, absence.since_s, absence.remedy)
+            severity = Severity.ALARM if absence.vital or not absence.doing else Severity.WARNING
+            self._alarms.begin(AlarmKind.ABSENT, absence.name, line, absence.since_s, absence.remedy, severity=severity)
         names = frozenset(absence.name for absence in absent)
         for name in self._absent - names:
             self._alarms.end(AlarmKind.ABSENT, name, at_s)

@@ -1,6 +1,6 @@
 """Whose stop is it, and who is asked before it is lifted?
 
-Rules of this file: no bus, no clock, no screen. Why it is so: docs/decisions/0017.
+Rules of this file: no bus, no clock, no screen. Why it is so: docs/decisions/0018.
 
 * To stop is one act, to lift another. A lift names the stop that was seen by its number: a newer one is never lifted.
 * Your own stop is lifted at once. Whoever else stopped the robot is asked first, each of them.

@@ -15,6 +15,7 @@ from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
+from backbone.spoken import value_text
 from backbone.wire import Envelope, Message
 from ui_console.consent import Consent, Topic, require_console
 from ui_console.consent_answers import ConsentAnswers
@@ -75,7 +76,7 @@ class Observer(Component[P], Generic[P]):
             user: Who did it; empty: who sits at this console.
         """
         act = OperatorActed(user or self.user, action, subject, detail, self.clock.now_s())
-        self.story.note(subject, act.sentence)
+        self.story.note(subject, act.sentence, act.event(self.address).level, act.user)
         self.bus.publish(self.address, Conversation.OPERATORS, act)
 
     # ------------------------------------------------------------------ verbs that need no grant
@@ -115,7 +116,7 @@ class Observer(Component[P], Generic[P]):
     async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
         """Have a component run with another value; return whether it does."""
         is_set = await self.feed.set_parameter(name, parameter, value, user or self.user)
-        detail = f"{parameter} = {value!r}{'' if is_set else ', which it did not take'}"
+        detail = f"{parameter} = {value_text(value)}{'' if is_set else ', which it did not take'}"
         self.acted(OperatorAction.SET_PARAMETER, name, detail, user)
         return is_set
 
@@ -129,6 +130,10 @@ class Observer(Component[P], Generic[P]):
         return await self.feed.why(name)
 
     # ------------------------------------------------------------------ the component's hooks
+    def person(self) -> str:
+        """Return who sits here; empty for a console that serves others, and bears its own name."""
+        return self.user if self.user != self.name else ""
+
     async def connect(self) -> None:
         """Listen to what the mission tells."""
         if self._watches:

@@ -16,12 +16,15 @@ from typing import assert_never
 
 import msgspec
 
-from backbone.component.messages import ComponentState, LifeState, StoryEvent
-from backbone.creator.messages import HostLoad
+from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
+from backbone.creator.messages import HostLoad, ProcessFell, creator_name
+from backbone.mission_log import AskLog, chosen
 from backbone.naming import Subsystem, component_of
+from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
+from backbone.spoken import value_text
 from resource_pool.arc_client import StopState
-from ui_console.alarms import AlarmBook
+from ui_console.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.console_events import (
     ActHeard,
     ComponentGone,
@@ -45,6 +48,7 @@ from ui_console.timeline import Timeline
 from ui_console.views import (
     NONE_S,
     AlarmKind,
+    AlarmView,
     ComponentRow,
     HealthView,
     HostView,
@@ -55,6 +59,7 @@ from ui_console.views import (
     ParameterView,
     RequestRow,
     RobotView,
+    Severity,
     StopView,
     TimelineView,
     WaitingView,
@@ -88,8 +93,10 @@ class TeamModel:
         self.schedule: Schedule | None = None
         """As last heard."""
         self.alarms = AlarmBook()
+        self.people = People()
+        """Who sits at which console."""
         self._health = HealthBoard(self.alarms)
-        self._timeline = Timeline()
+        self._timeline = Timeline(self.person)
         self._components: dict[str, ComponentState] = {}
         self._lost: dict[str, float] = {}
         self._finished: dict[str, tuple[float, NodeState]] = {}
@@ -99,13 +106,15 @@ class TeamModel:
         self._leases_s = NONE_S
         self._renewed: dict[tuple[str, str, int], float] = {}
         self._stops: dict[str, StopState] = {}
+        self._needs: dict[str, frozenset[str]] = {}
+        self._left: set[str] = set()
         self._hosts: dict[str, tuple[float, HostLoad]] = {}
         self._overruns: dict[tuple[str, str], float] = {}
         self._radios: dict[str, Mapping[str, float]] = {}
         self._link = LinkHeard(0.0, True)
         self._link_heard_s = 0.0
         self._parameters: dict[tuple[str, str], ParameterView] = {}
-        self._log: deque[LogRow] = deque(maxlen=LOG_KEPT)
+        self._log: deque[StoryEvent] = deque(maxlen=LOG_KEPT)
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
@@ -118,7 +127,7 @@ class TeamModel:
             case StoryHeard(story=story):
                 self._take_story(story)
             case ActHeard(act=act, where=where):
-                self._note(act.at_s, act.subject, act.sentence, where)
+                self._log.append(act.event(where))
             case ComponentHeard(at_s=at_s, component=component):
                 self._take_component(component, at_s)
             case ComponentsListed(at_s=at_s, components=components, is_complete=is_complete):
@@ -126,11 +135,7 @@ class TeamModel:
             case ComponentGone(at_s=at_s, address=address):
                 self._gone(address, at_s)
             case ProcessFallen(at_s=at_s, fell=fell):
-                again = f"again in {fell.restart_in_s:.1f} s" if fell.restart_in_s >= 0 else "given up"
-                line = f"{fell.name} fell: {fell.how}; {again}"
-                remedy = fell.last_lines[-1] if fell.last_lines else ""
-                self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, remedy, f"fell:{fell.name}")
-                self._note(at_s, fell.name, f"fell: {fell.how}; {again}", "")
+                self._take_fall(fell, at_s)
             case LoadHeard(at_s=at_s, load=load):
                 self._take_load(load, at_s)
             case StopHeard(at_s=at_s, stop=stop):
@@ -148,13 +153,17 @@ class TeamModel:
 
     def look(self, now_s: float) -> None:
         """Find out what only time can tell."""
+        self.alarms.look(now_s)
         self._health.look(now_s)
+        owners = {request.arc: request.owner for request in self.schedule.requests} if self.schedule else {}
         self._so(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
-            starves = request.state is RequestState.WAITING and request.expected_start_s < 0 and waits_s >= STARVING_S
-            who = component_of(request.owner)
-            line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {_because(request)}"
+            is_wanted = bool(request.blockers) and all(is_console(owners.get(arc, "")) for arc in request.blockers)
+            is_endless = request.state is RequestState.WAITING and request.expected_start_s < 0
+            starves = is_endless and not is_wanted and waits_s >= STARVING_S
+            who = self.person(request.owner)
+            line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {self._because(request)}"
             self._so(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
 
     # ------------------------------------------------------------------ views out
@@ -165,6 +174,18 @@ class TeamModel:
         requests = {request.arc: request for request in self.schedule.requests}
         rcs = sorted((rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND), key=lambda rc: rc.rc)
         return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
+
+    def person(self, console_name: str) -> str:
+        """Return the name of the person at a console, also of one that has left; any other name stays as it is.
+
+        Args:
+            console_name: Name or address of a console, or of what it claims.
+        """
+        return self.people.person(console_name)
+
+    def screens_of(self, user: str) -> list[ComponentState]:
+        """Return the consoles at which this person sits now."""
+        return screens_of(user, self._components.values())
 
     def link_down_s(self, now_s: float) -> float:
         """Return since when nothing is heard from the mission's hub; negative: the link is up."""
@@ -231,7 +252,7 @@ class TeamModel:
 
     def requests(self) -> list[RequestRow]:
         """Return the requests, running ones first, then by predicted start."""
-        rows = [_request_row(request) for request in (self.schedule.requests if self.schedule else [])]
+        rows = [self._request_row(request) for request in (self.schedule.requests if self.schedule else [])]
         return sorted(rows, key=_request_order)
 
     def timeline(self, now_s: float, past_s: float = PAST_S, next_s: float = NEXT_S) -> TimelineView:
@@ -266,15 +287,27 @@ class TeamModel:
 
     def components(self) -> list[ComponentRow]:
         """Return the components that are there, by address."""
-        return [_component_row(component) for _, component in sorted(self._components.items())]
+        return [self._component_row(component) for _, component in sorted(self._components.items())]
 
     def component(self, name: str) -> ComponentState | None:
         """Return the component of this name, if it is there."""
         return next((c for at, c in self._components.items() if component_of(at) == name), None)
 
-    def log(self, count: int = LOG_KEPT) -> list[LogRow]:
-        """Return the newest that happened, oldest first."""
-        return list(self._log)[-count:] if count else []
+    def log(self, count: int = LOG_KEPT, asked: AskLog | None = None) -> list[LogRow]:
+        """Return the newest that happened, oldest first.
+
+        Args:
+            count: At most so many.
+            asked: Only what fits; None: all.
+        """
+        events = chosen(map(self.people.named_event, self._log), asked) if asked is not None else self._log
+        newest = list(events)[-count:] if count else []
+        return [_log_row(self.people.named_event(event)) for event in newest]
+
+    def alarm_views(self, *own: AlarmBook) -> list[AlarmView]:
+        """Return the alarms of the mission and of these books: one line for one cause, by the names of people."""
+        views = [view for book in (self.alarms, *own) for view in book.views()]
+        return [self._located(view) for view in one_line_for_one_cause(views, self._explained_by)]
 
     # ------------------------------------------------------------------ the schedule
     def _take_schedule(self, schedule: Schedule) -> None:
@@ -287,7 +320,8 @@ class TeamModel:
         for arc in before - now:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
-            self._so(rc.state == "down", AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
+            is_down = rc.state == "down" and rc.rc not in self._left  # who was told to end is not missed
+            self._so(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
         self._renewed = {
             (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
             for rc in schedule.rcs
@@ -306,7 +340,7 @@ class TeamModel:
         component = self._components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
         starts_s = dict(zip(rc.next, rc.next_s, strict=False))
         waiting = [
-            WaitingView(component_of(requests[arc].owner), arc, starts_s.get(arc, NONE_S))
+            WaitingView(self.person(requests[arc].owner), arc, starts_s.get(arc, NONE_S))
             for arc in rc.next
             if arc in requests
         ]
@@ -328,7 +362,7 @@ class TeamModel:
             waiting=waiting,
             stop=self.stop_view(rc.rc, now_s),
             video=None,
-            feedback=component.feedback if component is not None else "",
+            feedback=self.people.named(component.feedback) if component is not None else "",
         )
         if not rc.holders:
             return free
@@ -339,24 +373,47 @@ class TeamModel:
         age_s = max(0.0, now_s - renewed_s)
         return msgspec.structs.replace(
             free,
-            holder=component_of(request.owner) if request else holder.arc,
+            holder=self.person(request.owner if request else holder.arc),
             arc=holder.arc,
-            is_console=request is not None and _is_in(Subsystem.UI_CONSOLE, request.owner),
-            priority=request.priority if request else "",
+            is_console=request is not None and is_console(request.owner),
+            priority=self.people.named(request.priority) if request else "",
             epoch=holder.epoch,
             since_s=holder.since_s,
             until_s=request.until_s if request else NONE_S,
             lease_left_s=max(0.0, lease_s - age_s),
             lease_age_s=age_s,
-            because=_because(request) if request else "",
+            because=self._because(request) if request else "",
+        )
+
+    def _because(self, request: RequestView) -> str:
+        return self.people.named(request.because.removeprefix(f"{request.arc} {request.state}: "))
+
+    def _request_row(self, request: RequestView) -> RequestRow:
+        named = self.people.named
+        return RequestRow(
+            request.arc,
+            self.person(request.owner),
+            is_console(request.owner),
+            str(request.state),
+            request.rcs,
+            named(request.priority),
+            request.since_s,
+            request.until_s,
+            request.expected_start_s,
+            self._because(request),
+            named(request.would_change),
+            request.blockers,
         )
 
     # ------------------------------------------------------------------ components
     def _take_component(self, component: ComponentState, at_s: float) -> None:
+        self.people.heard(component)
+        self._learn_needs(component)
         known = self._components.get(component.address)
         if known is not None and known.pid == component.pid and known.since_s > component.since_s:
             return
         name = component_of(component.address)
+        (self._left.add if component.state in LEAVING else self._left.discard)(name)
         if component.state is LifeState.STOPPED:
             if self._lost.pop(component.address, None) is not None or known is None:
                 self._components.pop(component.address, None)
@@ -392,20 +449,26 @@ class TeamModel:
         if component is None or component.state in LEAVING:
             self._forget(name)
             return
-        self._note(at_s, name, "is lost", "")
+        self._log.append(StoryEvent(at_s, "", "is lost", name, "", LogLevel.WARNING))
         is_arc = name in self._arcs
         self._arcs.discard(name)
-        if is_arc or _is_in(Subsystem.UI_CONSOLE, address):  # nobody restarts these by themselves
-            self.alarms.happened(AlarmKind.LOST, name, f"{name} is lost: it ended without a word", at_s)
+        if is_arc and is_console(component.requester):
+            return  # it ends with its console, which is told of
+        if is_arc or is_console(address):  # nobody restarts these by themselves, and nothing is left to be mended
+            who = f"the console of {component.user}" if component.user else name
+            line = f"{who} is lost: it ended without a word"
+            self.alarms.happened(AlarmKind.LOST, name, line, at_s, severity=Severity.NOTICE)
             return
         self._lost[address] = at_s
-        self.alarms.begin(AlarmKind.LOST, name, f"{name} ({component.type}) on {component.host} is lost", at_s)
+        line = f"{name} ({component.type}) on {component.host} is lost"
+        self.alarms.begin(AlarmKind.LOST, name, line, at_s)
         if _is_in(Subsystem.MISSION_CONTROL, address):
             self._components[address] = component  # its place in the tree is kept until it is back
 
     def _forget(self, name: str) -> None:
         """Forget what was known of one that left for good: consoles and their ARCs come and go all day."""
         self._arcs.discard(name)
+        self._needs.pop(name, None)
         self._finished.pop(name, None)
         self._priorities.pop(name, None)
         for key in [key for key in self._parameters if key[0] == name]:
@@ -435,10 +498,62 @@ class TeamModel:
             priority,
             state,
             since_s,
-            node.feedback,
+            self.people.named(node.feedback),
             request.arc if request is not None else "",
-            _because(request) if request is not None else "",
+            self._because(request) if request is not None else "",
         )
+
+    def _component_row(self, component: ComponentState) -> ComponentRow:
+        return ComponentRow(
+            component_of(component.address),
+            component.address,
+            component.address.partition("/")[0],
+            component.type,
+            component.host,
+            component.pid,
+            str(component.state),
+            component.since_s,
+            self.people.doing(component),
+        )
+
+    # ------------------------------------------------------------------ what alarms are about
+    def _learn_needs(self, component: ComponentState) -> None:
+        """Remember without what a component cannot be well: its machine, and whoever claimed it."""
+        name = component_of(component.address)
+        needs = {component_of(component.requester)} if is_console(component.requester) else set[str]()
+        if not is_console(component.address):
+            needs.add(creator_name(component.host))
+        self._needs[name] = frozenset(needs - {name})
+
+    def _explained_by(self, subject: str) -> frozenset[str]:
+        uses = [
+            set(request.rcs) for request in (self.schedule.requests if self.schedule else []) if request.arc == subject
+        ]
+        return self._needs.get(subject, frozenset()).union(*uses)
+
+    def _located(self, alarm: AlarmView) -> AlarmView:
+        named, component = self.people.named, self.component(alarm.subject)
+        where, uses = "", [alarm.subject, *self._explained_by(alarm.subject)]
+        if component is not None:
+            where = f"{component.type} on {component.host}, process {component.pid}"
+        elif alarm.subject in self._hosts:
+            where = "machine of the mission"
+        robots = self.robot_names()
+        return msgspec.structs.replace(
+            alarm,
+            line=named(alarm.line),
+            also=[named(line) for line in alarm.also],
+            where=where,
+            robot=next((name for name in uses if name in robots), ""),
+        )
+
+    def _take_fall(self, fell: ProcessFell, at_s: float) -> None:
+        is_over = fell.restart_in_s < 0
+        again = "given up" if is_over else f"again in {fell.restart_in_s:.1f} s"
+        said = f" (it said: {fell.last_lines[-1]})" if fell.last_lines else ""
+        severity = Severity.ALARM if is_over else Severity.WARNING
+        line = f"{fell.name} fell: {fell.how}; {again}{said}"
+        self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
     def _is_there(self, address: str) -> bool:
         """Return whether this component is there; True as long as nothing was heard of who is."""
@@ -458,7 +573,7 @@ class TeamModel:
         self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
     def _take_story(self, story: StoryEvent) -> None:
-        self._note(story.at_s, story.subject, story.what, story.where)
+        self._log.append(story)
         head, _, status = story.what.partition(": ")
         if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
             self._finished[story.subject] = (story.at_s, NodeState(status))
@@ -495,7 +610,7 @@ class TeamModel:
         name = component_of(event.address)
         for parameter, value in event.values.items():
             key = (name, parameter)
-            shown = msgspec.json.encode(value).decode()
+            shown = value_text(value)
             former = self._parameters.get(key)
             if parameter == event.changed:
                 before = former.value if former is not None else ""
@@ -504,9 +619,6 @@ class TeamModel:
                 )
             elif former is None or former.value != shown:
                 self._parameters[key] = ParameterView(name, event.address, parameter, shown)
-
-    def _note(self, at_s: float, subject: str, what: str, where: str) -> None:
-        self._log.append(LogRow(at_s, subject, what, where))
 
     def _so(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
         """Begin or end an alarm of a condition."""
@@ -520,43 +632,12 @@ def _is_in(subsystem: Subsystem, address: str) -> bool:
     return address.startswith(f"{subsystem}/")
 
 
-def _because(request: RequestView) -> str:
-    return request.because.removeprefix(f"{request.arc} {request.state}: ")
-
-
-def _request_row(request: RequestView) -> RequestRow:
-    return RequestRow(
-        request.arc,
-        component_of(request.owner),
-        _is_in(Subsystem.UI_CONSOLE, request.owner),
-        str(request.state),
-        request.rcs,
-        request.priority,
-        request.since_s,
-        request.until_s,
-        request.expected_start_s,
-        _because(request),
-        request.would_change,
-        request.blockers,
-    )
+def _log_row(event: StoryEvent) -> LogRow:
+    return LogRow(event.at_s, event.subject, event.what, event.where, str(event.level), event.user)
 
 
 def _request_order(row: RequestRow) -> tuple[bool, bool, float, str]:
     return row.state != RequestState.RUNNING, row.expected_start_s < 0, row.expected_start_s, row.arc
-
-
-def _component_row(component: ComponentState) -> ComponentRow:
-    return ComponentRow(
-        component_of(component.address),
-        component.address,
-        component.address.partition("/")[0],
-        component.type,
-        component.host,
-        component.pid,
-        str(component.state),
-        component.since_s,
-        component.feedback,
-    )
 
 
 def _priorities(requests: Iterable[RequestView]) -> dict[str, int]:

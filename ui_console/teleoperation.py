@@ -18,7 +18,7 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
-from backbone.component.messages import LifeState
+from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
@@ -55,6 +55,7 @@ from ui_console.console_events import (
 from ui_console.controls import Controls
 from ui_console.driving import Command, Drive, Halt, Jump
 from ui_console.feed import REPLY_TIME_S
+from ui_console.hand_over import AskHandOver, HandOver
 from ui_console.lifting import AskLift
 from ui_console.observer import Observer
 from ui_console.stop_ear import StopEar
@@ -101,7 +102,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskLift
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskHandOver | AskLift
 
     def __init__(
         self,
@@ -133,6 +134,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._decided = asyncio.Event()
         self._controls = Controls(self)
         self._consent = ConsentTalk(self, self.give_back)
+        self._hand_over = HandOver(self, self.give_back)
         self._ear = StopEar(self, self._heard_stop)
         self._asking_why: asyncio.Task[None] | None = None
         self._touched = asyncio.Event()
@@ -340,6 +342,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
+        if isinstance(asked.body, AskHandOver):
+            holds, by_script = self._holding if self.is_held else "", self._work is not None
+            return await self._hand_over.answer(asked.body, holds, self._asked_s, by_script=by_script)
         if isinstance(asked.body, AskLift) and self._work is not None:
             return Consent(False, self.user, "a script drives, and stopped it")
         if not isinstance(asked.body, ArcNotice):
@@ -392,7 +397,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         now_s = self.clock.now_s()
         self.report(f"drives {robot}")
         if not again:
-            self.tell(robot, f"was taken over by {self.user}")
+            self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
@@ -462,8 +467,15 @@ class Teleoperation(Observer[TeleoperationParameters]):
         else:
             if not self.is_held:
                 self.show(WhyHeard(self.clock.now_s(), why))
+                await self._settle_with_other_screens()
         finally:
             self._asking_why = None
+
+    async def _settle_with_other_screens(self) -> None:
+        try:
+            await self._hand_over.settle(self.parameters.robot, self._asked_s)
+        except LinkError as error:
+            log.info("other screens: %s", error)
 
     # ------------------------------------------------------------------ hands
     async def _give_back_when_away(self) -> None:

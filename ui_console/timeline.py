@@ -10,9 +10,11 @@ Rules of this file: no bus, no clock, no screen. Schedules go in, in the order o
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from backbone.naming import Subsystem, component_of
+from backbone.naming import component_of
+from backbone.people import is_console
 from backbone.rc_manager.messages import RcView, RequestView, Schedule
 from ui_console.views import Certainty, SliceView, TimelineRow, TimelineView
 
@@ -23,7 +25,7 @@ TURNS_KEPT = 400  # chosen: bounds the memory of a resource that changes hands t
 @dataclass(slots=True)
 class _Turn:
     arc: str
-    who: str
+    owner: str
     is_console: bool
     epoch: int
     from_s: float
@@ -41,9 +43,14 @@ class _Row:
 
 
 class Timeline:
-    """The turns of every resource."""
+    """The turns of every resource.
 
-    def __init__(self) -> None:
+    Args:
+        person: Returns the name of the person at a console; who is there may be heard later than what they hold.
+    """
+
+    def __init__(self, person: Callable[[str], str] = component_of) -> None:
+        self._person = person
         self._rows: dict[str, _Row] = {}
         self._at_s = 0.0
 
@@ -73,10 +80,20 @@ class Timeline:
         """
         from_s, to_s = now_s - past_s, now_s + next_s
         rows = [
-            TimelineRow(name, row.kind, row.is_sharable, _slices(row, from_s, now_s, to_s))
+            TimelineRow(name, row.kind, row.is_sharable, self._slices(row, from_s, now_s, to_s))
             for name, row in sorted(self._rows.items())
         ]
         return TimelineView(from_s, now_s, to_s, rows)
+
+    def _slices(self, row: _Row, from_s: float, now_s: float, to_s: float) -> list[SliceView]:
+        past = [self._slice(turn, Certainty.PAST, turn.to_s) for turn in row.past if turn.to_s >= from_s]
+        running = [self._slice(turn, Certainty.NOW, max(now_s, turn.to_s)) for turn in row.now.values()]
+        following = [self._slice(turn, Certainty.NEXT, turn.to_s) for turn in row.following if turn.from_s <= to_s]
+        return sorted([*past, *running, *following], key=lambda one: (one.from_s, one.to_s, one.arc))
+
+    def _slice(self, turn: _Turn, certainty: Certainty, to_s: float) -> SliceView:
+        who, to_s = self._person(turn.owner), max(turn.from_s, to_s)
+        return SliceView(who, turn.arc, turn.epoch, turn.from_s, to_s, certainty, turn.is_console)
 
 
 def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float) -> None:
@@ -110,15 +127,4 @@ def _begun(
 
 def _turn(arc: str, requests: dict[str, RequestView], epoch: int, from_s: float, to_s: float) -> _Turn:
     owner = requests[arc].owner if arc in requests else arc
-    return _Turn(arc, component_of(owner), owner.startswith(f"{Subsystem.UI_CONSOLE}/"), epoch, from_s, to_s)
-
-
-def _slices(row: _Row, from_s: float, now_s: float, to_s: float) -> list[SliceView]:
-    past = [_slice(turn, Certainty.PAST, turn.to_s) for turn in row.past if turn.to_s >= from_s]
-    running = [_slice(turn, Certainty.NOW, max(now_s, turn.to_s)) for turn in row.now.values()]
-    following = [_slice(turn, Certainty.NEXT, turn.to_s) for turn in row.following if turn.from_s <= to_s]
-    return sorted([*past, *running, *following], key=lambda one: (one.from_s, one.to_s, one.arc))
-
-
-def _slice(turn: _Turn, certainty: Certainty, to_s: float) -> SliceView:
-    return SliceView(turn.who, turn.arc, turn.epoch, turn.from_s, max(turn.from_s, to_s), certainty, turn.is_console)
+    return _Turn(arc, owner, is_console(owner), epoch, from_s, to_s)

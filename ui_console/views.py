@@ -275,13 +275,17 @@ class AlarmView(msgspec.Struct, frozen=True):
         severity: How much it matters.
         subject: Name to ask ``why`` about.
         line: What happened.
-        remedy: What to do about it; may be empty.
+        remedy: What to do about it now; empty: nothing, or it is over.
         first_s: When it happened first.
         last_s: When it happened last, or since when it has been over.
         count: How often.
         is_active: True while it is so; False: it is over, or was an event.
         acknowledged_by: Who has seen it; empty: nobody.
         while_away: True if it came while the operator was away and is not acknowledged.
+        where: Where to look, for people: what the subject is, on which machine; empty: nowhere.
+        robot: The robot it is about, whose row and picture to show; empty: none.
+        also: What follows from the same cause, one line each.
+        keys: What this line and those are acknowledged by.
     """
 
     key: str
@@ -296,6 +300,10 @@ class AlarmView(msgspec.Struct, frozen=True):
     is_active: bool
     acknowledged_by: str
     while_away: bool
+    where: str = ""
+    robot: str = ""
+    also: list[str] = []
+    keys: list[str] = []
 
 
 class HostView(msgspec.Struct, frozen=True):
@@ -378,12 +386,16 @@ class LogRow(msgspec.Struct, frozen=True):
         subject: The name it is about.
         what: Past tense, one line.
         where: Address of the component that told it.
+        level: How much it matters: ``alarm``, ``warning``, ``notice``, ``info``.
+        person: Who did it; empty: nobody in person.
     """
 
     at_s: float
     subject: str
     what: str
     where: str
+    level: str = "info"
+    person: str = ""
 
 
 class ConsentView(msgspec.Struct, frozen=True):
@@ -442,6 +454,7 @@ class OwnView(msgspec.Struct, frozen=True):
         away_since_s: Since when the operator is away.
         consent: What this operator is asked; None: nothing.
         asked: In one line what came of asking others; empty: nobody was asked.
+        other_screens: Where else the same person sits, one line each: one person with several screens.
         must_let_go: True: a control is held that moves nothing before it is let go and pressed anew.
         lost: The robot that went without the operator asking for it, until they take one or dismiss it.
         link_down_s: Since when this console hears nothing from the mission's hub; negative: the link is up.
@@ -461,6 +474,7 @@ class OwnView(msgspec.Struct, frozen=True):
     away_since_s: float
     consent: ConsentView | None = None
     asked: str = ""
+    other_screens: list[str] = []
     must_let_go: bool = False
     lost: LostView | None = None
     link_down_s: float = NONE_S

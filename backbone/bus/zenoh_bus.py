@@ -137,6 +137,13 @@ def _is_hub(config: zenoh.Config) -> bool:
     return bool(json.loads(config.get_json("mode")) == "router")
 
 
+def _unreachable(config: zenoh.Config, error: zenoh.ZError) -> HubUnreachable:
+    """Return what to tell of a session that did not open; zenoh's own words name its source lines."""
+    if _is_hub(config):
+        return HubUnreachable(str(error))
+    return HubUnreachable(f"no hub answers at {', '.join(json.loads(config.get_json('connect/endpoints')))}")
+
+
 def open_session(config: zenoh.Config) -> zenoh.Session:
     """Return a new session.
 
@@ -146,7 +153,7 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
-        raise HubUnreachable(str(error)) from error
+        raise _unreachable(config, error) from error
 
 
 async def close_session(session: zenoh.Session) -> None:
@@ -207,7 +214,7 @@ class ZenohBus(Speaker):
             opening.add_done_callback(_close_unwanted)
             raise
         except zenoh.ZError as error:
-            raise HubUnreachable(str(error)) from error
+            raise _unreachable(config, error) from error
         return cls(mission, source, clock, session, is_hub=_is_hub(config))
 
     # ------------------------------------------------------------------ questions

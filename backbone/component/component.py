@@ -33,6 +33,7 @@ from backbone.component.messages import (
     CommonQuestion,
     ComponentState,
     LifeState,
+    LogLevel,
     MissionTime,
     Parameters,
     SetParameter,
@@ -44,11 +45,12 @@ from backbone.component.messages import (
 )
 from backbone.component.story import StoryBook
 from backbone.door import secret_of
-from backbone.errors import Refusal
+from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import NameTaken, Register, Registered
 from backbone.naming import claim_address
+from backbone.spoken import value_text
 from backbone.wire import Envelope, Message, UnknownMessage
 
 log = logging.getLogger(__name__)
@@ -180,6 +182,10 @@ class Component(Generic[P]):
         """Return the emergency stop in force on this component; call ``changed`` when the answer changes."""
         return None
 
+    def person(self) -> str:
+        """Return the name of the person who sits at this component; empty: nobody does."""
+        return ""
+
     def publish_news(self) -> None:
         """Publish what spectators should know now.
 
@@ -232,9 +238,9 @@ class Component(Generic[P]):
         """Have ``publish_news`` called soon."""
         self._news.set()
 
-    def tell(self, subject: str, what: str) -> None:
+    def tell(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
         """Keep that this happened to the subject, and let people who watch the mission see it."""
-        self.bus.publish(self.address, Conversation.LOG, self.story.note(subject, what))
+        self.bus.publish(self.address, Conversation.LOG, self.story.note(subject, what, level))
 
     def end(self, reason: str) -> None:
         """Leave in good order; ``run`` returns when that is done."""
@@ -248,7 +254,8 @@ class Component(Generic[P]):
             self._bug = bug
             self.feedback = _complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
-            log.error("%s failed", self.address, exc_info=bug)
+            is_told = isinstance(bug, BackboneError)  # it says in a sentence what a traceback would only surround
+            log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_told else bug)
         self._end.set()
 
     def component_state(self) -> ComponentState:
@@ -265,6 +272,7 @@ class Component(Generic[P]):
             launch.requester,
             self.absences() if self._state is LifeState.READY else [],
             self.standing_stop(),
+            self.person(),
         )
 
     # ------------------------------------------------------------------ the shell
@@ -431,7 +439,7 @@ class Component(Generic[P]):
         except Refusal:
             self.parameters = before
             raise
-        self.story.note(name, f"{user} set {name} from {old[name]!r} to {value!r}")
+        self.story.note(name, f"{user} set {name} from {value_text(old[name])} to {value_text(value)}")
         return Parameters(msgspec.to_builtins(self.parameters))
 
 

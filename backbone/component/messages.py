@@ -75,6 +75,7 @@ class ComponentState(Message, frozen=True):
         requester: Address of whoever had it started.
         absent: Components that this one wants and that are absent.
         stop: The emergency stop in force on it; None: there is none.
+        user: The person who sits at it, as they call themselves; empty: nobody does.
     """
 
     address: Address
@@ -87,6 +88,7 @@ class ComponentState(Message, frozen=True):
     requester: Mention = ""
     absent: Annotated[list[Absence], MANY] = []
     stop: StandingStop | None = None
+    user: Mention = ""
 
 
 class AskTime(Message, frozen=True):
@@ -149,6 +151,15 @@ class AskStory(Message, frozen=True):
     subject: Mention = ""
 
 
+class LogLevel(StrEnum):
+    """How much something that happened matters, most first."""
+
+    ALARM = "alarm"  # a robot may do what it should not, or nothing any more
+    WARNING = "warning"  # the mission goes on, less well
+    NOTICE = "notice"  # what people and behaviors did or found
+    INFO = "info"
+
+
 class StoryEvent(Message, frozen=True):
     """One thing that happened.
 
@@ -158,6 +169,8 @@ class StoryEvent(Message, frozen=True):
         what: Past tense, one line.
         subject: The name it is about.
         cause: Id of the message that led to it, empty for a first cause.
+        level: How much it matters.
+        user: The person who did it; empty: nobody in person.
     """
 
     at_s: Instant
@@ -165,6 +178,8 @@ class StoryEvent(Message, frozen=True):
     what: Text
     subject: Mention
     cause: Mention
+    level: LogLevel = LogLevel.INFO
+    user: Mention = ""
 
 
 class Story(Message, frozen=True):

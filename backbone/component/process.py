@@ -6,8 +6,9 @@ import asyncio
 import faulthandler
 import importlib
 import logging
+import re
 import signal
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
 import uvloop
@@ -18,9 +19,11 @@ from backbone.component.component import Component
 from backbone.component.heartbeat import Heartbeat
 from backbone.component.launch import Launch
 from backbone.component.logs import ComponentLog
-from backbone.errors import BackboneError, Refusal
+from backbone.errors import BackboneError, Refusal, code_of, revive
 
 EXIT_BUG, EXIT_REFUSED, EXIT_NO_HUB = 1, 5, 4  # as the command line's (ARCHITECTURE.md, section 5)
+_REFUSED = "%s ended, refused [%s]: %s (remedy: %s)"
+_REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (.*)\)$")
 
 
 class WrongClassPath(Refusal):
@@ -87,7 +90,7 @@ def exit_code_of(error: BaseException, address: str) -> int:
     log = logging.getLogger(__name__)
     match error:
         case Refusal():
-            log.error("%s ended: %s: %s", address, error.code, error)
+            log.error(_REFUSED, address, code_of(error), error.detail, error.remedy)
             return EXIT_REFUSED
         case BackboneError():
             log.error("%s ended: %s: %s", address, type(error).__name__, error)
@@ -95,6 +98,27 @@ def exit_code_of(error: BaseException, address: str) -> int:
         case _:
             log.error("%s ended by a bug", address, exc_info=error)
             return EXIT_BUG
+
+
+def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
+    """Return the refusal that ended a component, as ``exit_code_of`` logged it; None: it did not end by one.
+
+    Args:
+        lines: Of the log, oldest first.
+        address: Of the component.
+
+    Example:
+        >>> line = "12:00 ERROR x: resource_pool/x ended, refused [a.b]: no scout is named 'y' (remedy: See status.)"
+        >>> found = refusal_in_log([line], "resource_pool/x")
+        >>> found.detail, found.remedy
+        ("no scout is named 'y'", 'See status.')
+    """
+    told = None
+    for line in lines:
+        found = _REFUSED_LINE.search(line)
+        if found is not None and found[1] == address:
+            told = revive(found[2], found[3], found[4], {})
+    return told
 
 
 async def _live(component_class: type[Component[Any]], launch: Launch) -> None:

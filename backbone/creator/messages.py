@@ -200,7 +200,10 @@ class ProcessFell(Message, frozen=True):
 
 
 class StartFailed(Refusal):
-    """The component did not become ready; the end of its log is in the detail."""
+    """The component did not become ready; the detail is what it refused with, or else the end of its log.
+
+    Facts: ``name``, ``how`` it ended, and ``refused``, the code of its own refusal if it was one.
+    """
 
     code = "creator.start_failed"
     remedy = "Read the log lines; mend the component or its parameters and start it again."
@@ -217,7 +220,7 @@ class AlreadyHere(Refusal):
     """A component of this name runs, starts or ends under this creator, by another order."""
 
     code = "creator.already_here"
-    remedy = "Choose another name, or end the component that has it first."
+    remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
 
 
 class UnlistedType(Refusal):

@@ -22,7 +22,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, LogLevel
 from backbone.creator.kept_creator import KeepsCreator, KeptCreator, Offered
 from backbone.creator.messages import (
     ListProcesses,
@@ -94,7 +94,7 @@ class Offer(Component[NoParameters]):
         await self._creator.close()
 
     def _creator_fell(self, fell: ProcessFell) -> None:
-        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:g} s")
+        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
         self.changed()
 
     async def _watch_link(self) -> None:

@@ -35,6 +35,7 @@ from backbone.component.membership import (
     read_process_address,
 )
 from backbone.component.messages import Absence, Stop, Stopping
+from backbone.component.process import EXIT_REFUSED, refusal_in_log
 from backbone.creator.decisions import (
     AskToStop,
     Fork,
@@ -72,9 +73,9 @@ from backbone.creator.shared_processes import (
     SignalProcess,
 )
 from backbone.creator.silence import LOOK_EVERY_S, Silence
-from backbone.creator.supervision import Phase, Supervision
+from backbone.creator.supervision import Phase, Supervision, describe
 from backbone.creator.zygote import NoProcess
-from backbone.errors import BackboneError, Refusal
+from backbone.errors import BackboneError, Refusal, code_of
 from backbone.naming import IllegalName, Subsystem, component_of
 
 log = logging.getLogger(__name__)
@@ -537,7 +538,12 @@ class ProcessKeeper:
         return self._clock.now_s() / self._clock.rate
 
     def _start_failed(self, name: str, how: str) -> StartFailed:
-        return StartFailed("\n".join([f"{name}: {how}", *self._last_lines(name)]), name=name, how=how)
+        lines, kept = self._last_lines(name), self._kept.get(name)
+        if kept is not None and how == describe(EXIT_REFUSED):  # it said in a sentence why it cannot be
+            refusal = refusal_in_log(lines, kept.launch.address)
+            if refusal is not None:
+                return StartFailed(refusal.detail, remedy=refusal.remedy, name=name, how=how, refused=code_of(refusal))
+        return StartFailed("\n".join([f"{name}: {how}", *lines]), name=name, how=how)
 
     def _last_lines(self, name: str) -> list[str]:
         kept = self._kept.get(name)

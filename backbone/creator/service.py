@@ -17,7 +17,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.heartbeat import read_vitals
 from backbone.component.launch import Launch
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, LogLevel
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import (
     AlreadyHere,
@@ -96,7 +96,9 @@ class Creator(Component[CreatorParameters]):
     async def connect(self) -> None:
         """Watch for readiness; get a zygote if this process could not fork one."""
         self._zygote = self._given or await Zygote.spawn_fresh(preload=self.parameters.preload)
-        self._zygote.on_lost = lambda: self.tell(self.name, "lost its zygote and with it everything it ran")
+        self._zygote.on_lost = lambda: self.tell(
+            self.name, "lost its zygote and with it everything it ran", LogLevel.ALARM
+        )
         self._keeper = ProcessKeeper(self._zygote, self.clock, self._read_vitals, self.pid)
         self._keeper.on_fell = self._component_fell
         self._keeper.on_silent = self._component_silent
@@ -202,12 +204,13 @@ class Creator(Component[CreatorParameters]):
 
     def _component_fell(self, fell: ProcessFell) -> None:
         self._fell += 1
-        then = f"restarts in {fell.restart_in_s:g} s" if fell.restart_in_s >= 0 else "its owner asks for another one"
-        self.tell(fell.name, f"fell, {fell.how}; {then}")
+        then = f"restarts in {fell.restart_in_s:.2g} s" if fell.restart_in_s >= 0 else "its owner asks for another one"
+        self.tell(fell.name, f"fell, {fell.how}; {then}", LogLevel.WARNING)
         self.bus.publish(self.address, Conversation.EVENTS, fell)
 
     def _component_silent(self, name: str, silent_s: float) -> None:
-        self.tell(name, f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again")
+        said = f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again"
+        self.tell(name, said, LogLevel.WARNING)
         self._processes_changed()
 
     def _processes_changed(self) -> None:

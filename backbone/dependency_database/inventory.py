@@ -82,6 +82,7 @@ class Inventory:
             names = [resource.name for resource in kind]
             raise NoSuchHardware(
                 f"no {role} is named {name!r}{did_you_mean(str(name), names)}; there is {_listed(names)}",
+                remedy=f"Use one of these names, or add the {role} to the mission file.",
                 role=role,
                 name=str(name),
             )

@@ -163,7 +163,9 @@ class _Parse:
             where = Place(error.lineno, error.offset + 1)
             still_open = f"; <{self._open[-1].tag}> of line {self._open[-1].place.line} is open" if self._open else ""
             reason = expat.ErrorString(error.code)
-            self._report.fault(where, f"no well-formed XML: {reason}{still_open}", "Mend the XML here, or just before.")
+            self._report.fault(
+                where, f"not well-formed XML: {reason}{still_open}", "Mend the XML here, or just before."
+            )
             return None
         return self._root
 

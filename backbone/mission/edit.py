@@ -136,7 +136,7 @@ def outline(data: bytes) -> Node:
     """Return the root of a mission file's text.
 
     Raises:
-        MissionInvalid: It is no well-formed XML, or is hostile; with the reader's faults.
+        MissionInvalid: It is not well-formed XML, or is hostile; with the reader's faults.
     """
     report = Report("mission")
     if parse(data, report) is None:

@@ -47,7 +47,7 @@ def room_text(mission_file: str, name: str) -> str:
             raise RoomInvalid("has a document type declaration", "Remove <!DOCTYPE …> from the room's file")
         root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False))
     except (UnicodeDecodeError, etree.XMLSyntaxError) as error:
-        raise RoomInvalid(f"is no well-formed XML: {error}", "Mend the room's file") from error
+        raise RoomInvalid(f"is not well-formed XML: {error}", "Mend the room's file") from error
     if root.tag != "mujoco":
         raise RoomInvalid(f"begins with <{root.tag}>, so it is no MJCF", "The room's file must begin with <mujoco>")
     for element in root.iter(etree.Element):

@@ -79,7 +79,7 @@ class NameTaken(Refusal):
     """A living component has this name."""
 
     code = "nameserver.taken"
-    remedy = "Choose another name, or stop the component that has it."
+    remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
 
 
 class UnknownName(Refusal):

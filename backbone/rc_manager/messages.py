@@ -557,7 +557,7 @@ class UnknownRequest(SchedulingRefusal):
     """The RC manager knows no request, node or RC of this name."""
 
     code = "scheduling.unknown"
-    remedy = "Send a SchedulingRequest first; see 'scout-backbone status' for names."
+    remedy = "See 'scout-backbone status' for the names that are there."
 
 
 class NotMovable(SchedulingRefusal):

@@ -21,6 +21,7 @@ from typing import Any, assert_never
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
@@ -147,7 +148,7 @@ class RcManager(Component[RcManagerParameters]):
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
-        self._context_switch = ContextSwitch(bus, clock, self.story.note, lambda rc: rc not in self._running_rcs)
+        self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._roll_call = RollCall(bus, clock)
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
@@ -317,7 +318,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _trace_stopped(self) -> None:
         """Let people know; the mission goes on without a trace."""
-        self.tell(self.name, self._why_no_trace())
+        self.tell(self.name, self._why_no_trace(), LogLevel.WARNING)
         self.changed()
 
     def _why_no_trace(self) -> str:
@@ -336,11 +337,21 @@ class RcManager(Component[RcManagerParameters]):
             self._meet_in_a_while(failed)
 
     async def _revoke(self, order: RevokeArc) -> None:
-        for rc in await self._context_switch.revoke(order):
+        release_s = max(self._resources[rc].disconnect_s for rc in order.epochs)
+        for rc in await self._context_switch.revoke(order, self.parameters.grace_s + release_s):
+            self._does_not_answer(rc)
+        self.happened(Freed(order.arc))
+
+    def _may_leave(self, rc: str, arc: str) -> bool:
+        """Say whether nobody but this ARC would lose anything if the RC were down."""
+        return rc not in self._running_rcs or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
+
+    def _does_not_answer(self, rc: str) -> None:
+        """Count the RC as down from now on, until it answers and is cleared."""
+        if rc in self._running_rcs:
             self._running_rcs.discard(rc)
             self.happened(RcWentDown(rc))
-            self._meet_in_a_while(rc)
-        self.happened(Freed(order.arc))
+            self.start_task(self._meet_again(rc), f"meet {rc}")
 
     def _measure_switch(self, order: ConnectArc) -> None:
         """Keep the time since these RCs were revoked from another ARC, settling not counted."""
@@ -386,8 +397,9 @@ class RcManager(Component[RcManagerParameters]):
         state = await self._ask_rc(rc)
         if state is None:
             return False
-        if rc not in self._running_rcs:
-            await self._context_switch.clear(rc, [(rc, holder.arc, holder.epoch) for holder in state.holders])
+        holds = [(rc, holder.arc, holder.epoch) for holder in state.holders]
+        if rc not in self._running_rcs and not await self._context_switch.clear(rc, holds):
+            return False
         if rc not in self._running_rcs:
             if self._faults.pop(rc, ""):
                 self.story.note(rc, "makes sense again")
@@ -420,7 +432,7 @@ class RcManager(Component[RcManagerParameters]):
         if self._faults.get(rc) != fault:
             self._faults[rc] = fault
             log.warning("%s is put aside: %s", rc, fault)
-            self.tell(rc, f"is put aside: {fault}")
+            self.tell(rc, f"is put aside: {fault}", LogLevel.WARNING)
             self.happened(RcWentDown(rc, fault))
         self._meet_in_a_while(rc)
 
@@ -503,7 +515,8 @@ class RcManager(Component[RcManagerParameters]):
             self._failing_rcs.discard(rc)
 
     async def _meet_again(self, rc: str) -> None:
-        await self._meet_rc(rc)
+        if not await self._meet_rc(rc):
+            self._meet_in_a_while(rc)
 
     def _heard_rc(self, envelope: Envelope[Any]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
@@ -619,7 +632,7 @@ class RcManager(Component[RcManagerParameters]):
         try:
             await self._request(current.request)  # its own question was lost, or is still on its way
         except (Refusal, LinkError) as error:
-            self.story.note(arc, f"cannot be scheduled: {error}")
+            self.story.note(arc, f"got no place in the schedule: {error}")
 
 
 def _has_lines(trace: Path) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from mission_control.behavior import BehaviorParameters
+from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, Stage, glimpse
 from mission_control.behaviors.driver import Driver
 from mission_control.behaviors.motion import MOST_M_S, STILL
@@ -94,7 +94,7 @@ class Hide(Driver[HideParameters]):
         self._search.interrupt()
         self._motion = STILL
         self._fresh.clear()
-        self.report(f"suspended: {reason} by {by}; {self._seen()}")
+        self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
         """Begin anew with the new parameters."""

@@ -14,7 +14,7 @@ import math
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from mission_control.behavior import BehaviorParameters
+from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, Obstacle, Stage
 from mission_control.behaviors.motion import MOST_M_S, Motion, read_places
@@ -101,7 +101,7 @@ class JumpOver(Driver[JumpOverParameters]):
     async def suspended(self, reason: str, by: str) -> None:
         """Keep what is known; where the robot is then says how to go on."""
         self._course.interrupt()
-        self.report(f"suspended: {reason} by {by}; {self._course.jumps} jumps until now")
+        self.report(f"suspended: {suspended_because(reason, by)}; {self._course.jumps} jumps until now")
 
     def parameters_changed(self) -> None:
         """Begin anew with the new parameters."""

@@ -15,7 +15,7 @@ import math
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
-from mission_control.behavior import BehaviorParameters
+from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
 from mission_control.behaviors.motion import MOST_M_S, read_places
 from mission_control.behaviors.patrol_route import PatrolRoute, Visit
@@ -87,7 +87,7 @@ class Patrol(Driver[PatrolParameters]):
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the record; go on later from wherever the robot is then."""
         self._route.interrupt()
-        self.report(f"suspended: {reason} by {by}; {self._seen()}")
+        self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
         """Begin a new patrol by the new parameters; way points of the old one stay published."""

@@ -20,7 +20,7 @@ import numpy as np
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
-from mission_control.behavior import BehaviorParameters
+from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.servo_law import STOP_M, Stage
@@ -114,7 +114,7 @@ class Servo(Driver[S]):
 
     async def suspended(self, reason: str, by: str) -> None:
         """Say how far it was; see ``Behavior.suspended``."""
-        self.report(f"suspended: {reason} by {by}; {self._servo.approaches} approaches until now")
+        self.report(f"suspended: {suspended_because(reason, by)}; {self._servo.approaches} approaches until now")
 
     def parameters_changed(self) -> None:
         """Begin anew with the new parameters."""

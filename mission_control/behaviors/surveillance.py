@@ -11,6 +11,7 @@ from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.keys import Conversation
 from backbone.wire import Envelope
 from mission_control.behavior import Behavior, BehaviorParameters
@@ -49,7 +50,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
         """Start a failed watcher again some times, then go on without it."""
         if status is BehaviorStatus.FAILURE:
             self._failures[child] += 1
-            self.tell(child, f"failed: {payload.get('detail', 'no reason given')}")
+            self.tell(child, f"failed: {payload.get('detail', 'no reason given')}", LogLevel.WARNING)
         retry = status is BehaviorStatus.FAILURE and self._failures[child] <= self.parameters.retries
         return Decision.RETRY if retry else Decision.NEXT
 

@@ -14,9 +14,10 @@ import numpy as np
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from mission_control.behavior import Behavior, BehaviorParameters
+from mission_control.behavior import Behavior, BehaviorParameters, suspended_because
 from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
 from mission_control.messages import MotionSeen, Region
@@ -91,7 +92,7 @@ class WatchForMotion(Behavior[WatchParameters]):
 
     async def suspended(self, reason: str, by: str) -> None:
         """Say what was seen until now."""
-        self.report(f"suspended: {reason} by {by}; {self._seen()}")
+        self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def see(self, frame: Frame) -> None:
         """Look for motion in the picture, publish it as soon as it is certain, and again while it goes on."""
@@ -105,7 +106,9 @@ class WatchForMotion(Behavior[WatchParameters]):
             self._events += 1
             region = Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px)
             self.bus.publish(self.address, Conversation.EVENTS, MotionSeen(frame.captured_s, frame.robot, region))
-            self.tell(frame.robot, f"motion seen through {frame.robot} at x {blob.x_px}, y {blob.y_px}")
+            self.tell(
+                frame.robot, f"motion seen through {frame.robot} at x {blob.x_px}, y {blob.y_px}", LogLevel.NOTICE
+            )
             self.tell_parent(self._found())
             self._say()
         elif self._detector.frames % REPORT_EVERY_FRAMES == 0:

@@ -174,22 +174,22 @@ def test_without_a_nameserver_there_is_no_first_picture() -> None:
         (
             Components(LISTED, False, 9.5, [f"resource_pool/arc{n:03}" for n in range(307)]),
             (),
-            "the list is incomplete: 307 components (arc000, arc001",
+            "the list is incomplete: no word yet from 307 components (arc000, arc001",
         ),
         (
             Components(LISTED, True, 9.5, ["resource_pool/scout2"]),
             (),
-            "the list is incomplete: 1 components (scout2) did not say yet how they are",
+            "the list is incomplete: no word yet from 1 component (scout2)",
         ),
         (
             Components(LISTED, False, 9.5),
             (process("scout1"), process("scout3")),
-            "the list is incomplete: 1 components (scout3) run and are not registered yet",
+            "the list is incomplete: running and not registered yet: 1 component (scout3)",
         ),
         (
             Components(LISTED, True, 9.5),
             tuple(process(f"scout{number}") for number in range(2, 309)),
-            "the list is incomplete: 307 components (scout10, scout100",
+            "the list is incomplete: running and not registered yet: 307 components (scout10, scout100",
         ),
     ],
     ids=["hub began a moment ago", "many unknown", "one that hangs", "do not come back", "come back too late"],

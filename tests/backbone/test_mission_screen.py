@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from rich.console import Console
 
@@ -129,3 +131,20 @@ def test_the_whole_picture_tells_until_when_an_rc_is_held_who_follows_and_what_e
     assert "│ 8.0 s │" in shown
     assert "m:1 (risen by 1)" in shown
     assert "it waits for guard-capture (rule 9); until guard-capture releases or idles" in shown
+
+
+@pytest.mark.parametrize("draw", [screen, lambda picture: live_screen(picture, [], 60)], ids=["whole", "live"])
+def test_a_person_at_a_console_is_shown_by_name_wherever_the_console_holds_or_waits(draw: Any) -> None:
+    arc, owner = "console-7-drive", "ui_console/console-7"
+    console = ComponentState(owner, "console", "base", 7, LifeState.READY, 1.0, "drives scout1", user="anna")
+    held = RcView("scout1", "scout", "up", False, 1.0, [Holder(arc, 3, 1.0, 2.0)], 3, [], [5.0], [])
+    because = f"{arc} running: since 1.00 s"
+    request = RequestView(
+        arc, owner, RequestState.RUNNING, ["scout1"], 1.0, 5.0, -1.0, because, [], 5.0, "console-7:100", 1
+    )
+    picture = MissionPicture("m", 2.0, {owner: console}, schedule=Schedule(2.0, [held], [request], []))
+    shown = drawn(draw(picture))
+    assert arc not in shown
+    assert "anna:100" in shown
+    assert "anna drives scout1" in shown
+    assert picture.to_json()["components"][0]["person"] == "anna"

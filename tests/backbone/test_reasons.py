@@ -18,7 +18,7 @@ from backbone.component.messages import (
     Story,
     StoryEvent,
 )
-from backbone.component.story import StoryBook
+from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
@@ -36,6 +36,17 @@ SCOUT = ComponentState(
     absent=[Absence("radio", 3.0, "killed by SIGKILL", "starts again in 0.1 s", "Nothing.")],
 )
 SILENT = ComponentState("resource_pool/scout2", "scout", "base", 4712, LifeState.READY, 1.0)
+CREATOR = ComponentState("backbone/creator-base", "creator", "base", 4713, LifeState.READY, 1.0)
+ANNA = ComponentState(
+    "ui_console/console-7",
+    "console",
+    "base",
+    4714,
+    LifeState.READY,
+    1.0,
+    "drives scout1, not console-7-drive",
+    user="anna",
+)
 EVENTS = [
     StoryEvent(1.0, SCOUT.address, "connected", "scout1", CAUSE),
     StoryEvent(2.0, SCOUT.address, "disconnected", "scout1", "backbone/rc_manager#113"),
@@ -45,7 +56,7 @@ EVENTS = [
 def mission(complete: bool = True, unknown: tuple[str, ...] = ()) -> Bus:
     """Return a bus to a mission with a nameserver, a Scout that answers and one that does not."""
     network = LocalNetwork("m")
-    states = {state.address.partition("/")[2]: state for state in (SCOUT, SILENT)}
+    states = {state.address.partition("/")[2]: state for state in (SCOUT, SILENT, CREATOR, ANNA)}
 
     async def names(asked: Any) -> Any:
         match asked.body:
@@ -58,7 +69,7 @@ def mission(complete: bool = True, unknown: tuple[str, ...] = ()) -> Bus:
 
     async def tells(asked: Any) -> Story:
         of = asked.body.subject
-        return Story([event for event in EVENTS if of in ("", event.subject, event.cause)])
+        return Story([event for event in EVENTS if not of or is_about(event, of)])
 
     network.join(NAMESERVER, VirtualClock()).serve(NAMESERVER, ListComponents | Resolve, names)
     network.join(SCOUT.address, VirtualClock()).serve(SCOUT.address, AskStory, tells)
@@ -126,3 +137,29 @@ def test_a_story_book_finds_what_a_message_led_to() -> None:
     run_virtual(main())
     assert [event.what for event in book.of(CAUSE)] == ["connected"]
     assert len(book.of("scout1")) == 2
+
+
+@pytest.mark.parametrize("text", ["rc_manager#112", "backbone/rc_manager#112"])
+def test_an_events_cause_may_be_typed_with_or_without_its_subsystem(text: str) -> None:
+    assert story(text).events == EVENTS[:1]
+    assert "  1.000 s  resource_pool/scout1  scout1: connected" in why(text).lines(5.0)
+
+
+def test_a_message_that_led_to_nothing_says_so() -> None:
+    assert why("scout1#7").lines(5.0)[0].startswith("nobody tells that scout1#7 led to anything")
+
+
+def test_an_alarm_means_what_it_is_about() -> None:
+    assert why("lost:scout1").component == SCOUT
+    assert why("deadline:radio1:scout1").component == SCOUT
+
+
+def test_a_machine_is_known_with_what_runs_there() -> None:
+    here, absent = why("base").lines(5.0)
+    assert here == "base is a machine of the mission, with 4 components: creator-base, scout1, scout2, anna"
+    assert absent.startswith("creator-base is absent for 0.0 s: no answer")
+
+
+def test_a_person_is_known_with_every_screen_and_called_by_name() -> None:
+    assert why("anna").lines(5.0) == ["anna sits at 1 console", "  on base: drives scout1, not anna"]
+    assert why("console-7").lines(5.0) == ["anna is ready on base: drives scout1, not anna"]

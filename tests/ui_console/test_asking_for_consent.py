@@ -199,10 +199,9 @@ def test_behaviors_cannot_be_asked_and_who_does_not_wait_asks_nobody(stage: Call
             (on.ben, "no operator stands in the way of ben, but watch"),
             (on.anna, "anna does not wait for a robot"),
         ):
-            alarms = person.model.team.alarms
             person.console.begin_ask_consent()
-            await on.until(alarms.views)
-            assert remark in alarms.views()[0].line
+            await on.until(person.model.alarm_views)
+            assert remark in person.model.alarm_views()[0].line
         assert on.consents() == []
 
     stage(scene)

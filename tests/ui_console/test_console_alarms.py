@@ -1,12 +1,13 @@
-"""Alarms are kept until somebody has seen them, and the unseen ones longest."""
+"""Alarms are few: what is over is none, what merely happened fades, one cause is one line, and nobody misses any."""
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.alarms import ALARMS_KEPT, AlarmBook, alarm_key
-from ui_console.views import AlarmKind
+from ui_console.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause
+from ui_console.views import AlarmKind, AlarmView, Severity
 
 KIND = AlarmKind.LOST
 STEPS = st.lists(
@@ -14,37 +15,39 @@ STEPS = st.lists(
 )
 
 
-def play(steps: list[tuple[str, int]]) -> tuple[AlarmBook, dict[str, str], set[str]]:
-    """Return the book, who is unseen by the plain rule, and which conditions are so."""
-    book, unseen, active = AlarmBook(), {}, set()
+def play(steps: list[tuple[str, int]]) -> tuple[AlarmBook, set[str], set[str]]:
+    """Return the book, what is unseen by the plain rule, and which conditions are so."""
+    book, unseen, active = AlarmBook(), set[str](), set[str]()
     for at_s, (step, number) in enumerate(steps):
         subject = f"s{number}"
         key = alarm_key(KIND, subject)
         match step:
             case "happened":
                 book.happened(KIND, subject, "line", at_s)
-                unseen[key] = subject
+                unseen.add(key)
                 active.discard(key)
             case "begin":
                 book.begin(KIND, subject, "line", at_s)
                 if key not in active:
-                    unseen[key] = subject
+                    unseen.add(key)
                 active.add(key)
             case "end":
                 book.end(KIND, subject, at_s)
+                if key in active:
+                    unseen.discard(key)
                 active.discard(key)
             case "acknowledge":
-                assert book.acknowledge("anna", key) == (key in unseen)
-                unseen.pop(key, None)
+                assert book.acknowledge("anna", [key]) == (key in unseen)
+                unseen.discard(key)
     return book, unseen, active
 
 
 @given(STEPS)
-def test_what_is_shown_is_what_is_unseen_or_still_so(steps: list[tuple[str, int]]) -> None:
+def test_what_is_shown_is_what_is_so_and_what_happened_unseen(steps: list[tuple[str, int]]) -> None:
     book, unseen, active = play(steps)
     views = book.views()
-    assert {view.key for view in views} == unseen.keys() | active
-    assert {view.key for view in views if not view.acknowledged_by} == unseen.keys()
+    assert {view.key for view in views} == unseen | active
+    assert {view.key for view in views if not view.acknowledged_by} == unseen
     assert {view.key for view in views if view.is_active} == active
 
 
@@ -78,3 +81,116 @@ def test_a_condition_that_goes_on_is_one_alarm_and_one_that_comes_back_has_to_be
     book.begin(KIND, "s", "fourth", 5.0)
     [view] = book.views()
     assert (view.count, view.acknowledged_by, view.first_s) == (2, "", 1.0)
+
+
+def test_what_is_over_is_no_alarm_though_nobody_has_seen_it() -> None:
+    book = AlarmBook()
+    book.begin(AlarmKind.STOPPED, "scout1", "scout1 was stopped by ben", 1.0, "Lift the stop when the robot may move.")
+    book.end(AlarmKind.STOPPED, "scout1", 2.0)
+    assert book.views() == []
+
+
+def test_what_was_over_before_the_operator_came_back_is_told_without_a_remedy() -> None:
+    book = AlarmBook()
+    book.attention(False, 0.0)
+    book.begin(AlarmKind.STOPPED, "scout1", "scout1 was stopped by ben", 1.0, "Lift the stop when the robot may move.")
+    book.end(AlarmKind.STOPPED, "scout1", 2.0)
+    book.attention(True, 3.0)
+    book.look(1000.0)
+    [view] = book.views()
+    assert (view.while_away, view.is_active, view.remedy) == (True, False, "")
+    assert book.acknowledge("anna") == 1
+    assert book.views() == []
+
+
+@pytest.mark.parametrize("kind", [AlarmKind.REFUSED, AlarmKind.NO_ANSWER])
+def test_what_merely_happened_fades_the_sooner_the_less_it_matters(kind: AlarmKind) -> None:
+    book = AlarmBook()
+    book.happened(kind, "scout1", "no", 10.0)
+    [view] = book.views()
+    book.look(10.0 + FADES_AFTER_S[view.severity])
+    assert book.views() == [view]
+    book.look(10.1 + FADES_AFTER_S[view.severity])
+    assert book.views() == []
+
+
+def test_a_real_alarm_never_fades() -> None:
+    book = AlarmBook()
+    book.happened(AlarmKind.LOST, "scout1", "scout1 failed", 10.0, severity=Severity.ALARM)
+    book.look(1e6)
+    assert book.views()
+
+
+# ---------------------------------------------------------------------- one cause, one line
+NEEDS = {
+    "scout1": frozenset({"creator-base"}),
+    "scout2": frozenset({"creator-base"}),
+    "anna-capture": frozenset({"anna", "scout1", "creator-base"}),
+}
+
+
+def needs(name: str) -> frozenset[str]:
+    return NEEDS.get(name, frozenset())
+
+
+def told(*alarms: tuple[AlarmKind, str]) -> list[AlarmView]:
+    book = AlarmBook()
+    for at_s, (kind, subject) in enumerate(alarms):
+        book.begin(kind, subject, f"{subject} {kind}", at_s)
+    return one_line_for_one_cause(book.views(), needs)
+
+
+def test_a_robot_that_is_gone_is_one_line_with_all_that_follows() -> None:
+    [view] = told(
+        (AlarmKind.STALE_VIDEO, "scout1"),
+        (AlarmKind.LOST, "scout1"),
+        (AlarmKind.RC_DOWN, "scout1"),
+        (AlarmKind.STARVING, "anna-capture"),
+        (AlarmKind.ABSENT, "scout1"),
+    )
+    assert view.line == "scout1 absent"
+    assert sorted(view.also) == ["anna-capture starving", "scout1 lost", "scout1 rc_down", "scout1 stale_video"]
+    assert len(view.keys) == 5
+
+
+def test_a_machine_that_is_gone_is_one_line_for_all_that_ran_there() -> None:
+    [view] = told((AlarmKind.LOST, "scout1"), (AlarmKind.LOST, "scout2"), (AlarmKind.LOST, "creator-base"))
+    assert (view.line, sorted(view.also)) == ("creator-base lost", ["scout1 lost", "scout2 lost"])
+
+
+def test_without_a_link_what_seems_lost_is_told_with_it_but_not_what_was_before() -> None:
+    views = told((AlarmKind.STOPPED, "scout2"), (AlarmKind.LINK, "hub"), (AlarmKind.LOST, "scout1"))
+    assert [(view.line, view.also) for view in views] == [
+        ("hub link", ["scout1 lost"]),
+        ("scout2 stopped", []),
+    ]
+
+
+def test_two_causes_are_two_lines() -> None:
+    assert len(told((AlarmKind.LOST, "scout1"), (AlarmKind.LOST, "scout2"))) == 2
+
+
+def test_a_line_is_seen_with_all_it_stands_for() -> None:
+    book = AlarmBook()
+    book.begin(AlarmKind.LOST, "scout1", "lost", 1.0)
+    book.begin(AlarmKind.RC_DOWN, "scout1", "down", 2.0)
+    [view] = one_line_for_one_cause(book.views(), needs)
+    assert book.acknowledge("anna", view.keys) == 2
+    [view] = one_line_for_one_cause(book.views(), needs)
+    assert view.acknowledged_by == "anna"
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(list(AlarmKind)), st.sampled_from("abcde")), max_size=12),
+    st.dictionaries(st.sampled_from("abcde"), st.frozensets(st.sampled_from("abcde"))),
+)
+def test_whatever_explains_whatever_every_alarm_is_told_exactly_once(
+    alarms: list[tuple[AlarmKind, str]], explained: dict[str, frozenset[str]]
+) -> None:
+    book = AlarmBook()
+    for at_s, (kind, subject) in enumerate(alarms):
+        book.begin(kind, subject, f"{kind}:{subject}", at_s)
+    views = one_line_for_one_cause(book.views(), lambda name: explained.get(name, frozenset()))
+    lines = [line for view in views for line in (view.line, *view.also)]
+    assert sorted(lines) == sorted(view.line for view in book.views())
+    assert sorted(key for view in views for key in view.keys) == sorted(view.key for view in book.views())

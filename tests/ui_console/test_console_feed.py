@@ -165,13 +165,13 @@ def test_a_death_is_an_alarm_and_a_good_end_is_none(stage: Callable[[Scene], Non
             async with on.beside(on.robot("scout1")):
                 await on.until(lambda: on.model.team.component("scout1"))
             await on.until(lambda: on.model.team.component("scout1") is None)
-            assert on.model.team.alarms.views() == []
+            assert on.model.alarm_views() == []
             dying = on.robot("scout2")
             async with on.beside(dying):
                 await on.until(lambda: on.model.team.component("scout2"))
                 await dying.bus.close()
-                await on.until(on.model.team.alarms.views)
-            [alarm] = on.model.team.alarms.views()
+                await on.until(on.model.alarm_views)
+            [alarm] = on.model.alarm_views()
             assert (alarm.kind, alarm.subject) == (AlarmKind.LOST, "scout2")
 
     stage(scene)
@@ -188,7 +188,7 @@ def test_hosts_and_what_fell_there_are_heard_from_their_creators(stage: Callable
             creator.bus.publish(creator.address, Conversation.EVENTS, fell)
             await on.until(lambda: {"load", "fell"} <= on.words())
             assert on.model.team.hosts(0.0)[0].host == "local"
-            assert "given up" in on.model.team.alarms.views()[0].line
+            assert "given up" in on.model.alarm_views()[0].line
 
     stage(scene)
 
@@ -218,7 +218,7 @@ def test_all_robots_are_stopped_also_those_not_heard_of_and_a_silent_one_is_name
             for robot in (one, other):
                 state = robot.latch.state
                 assert (state.is_stopped, state.by, state.reason) == (True, "anna", "fire")
-            lines = [alarm.line for alarm in on.model.team.alarms.views()]
+            lines = [alarm.line for alarm in on.model.alarm_views()]
             assert any("scout2 did not confirm the stop" in line for line in lines)
             assert await console.lift_stop("scout1", one.latch.state.number)
             assert on.model.team.stop_of("scout1") is None
@@ -253,7 +253,7 @@ def test_each_thing_an_operator_does_is_one_event_with_the_name(stage: Callable[
             (OperatorAction.STOP_ALL, "robots", "scout1, scout2, fire"),
             (OperatorAction.LIFT_STOP, "scout1", "stop 2 by anna"),
             (OperatorAction.SET_PARAMETER, "watch1", "threshold = 30"),
-            (OperatorAction.SET_PARAMETER, "watch1", "threshold = 'high', which it did not take"),
+            (OperatorAction.SET_PARAMETER, "watch1", 'threshold = "high", which it did not take'),
             (OperatorAction.ACKNOWLEDGE, "alarms", "all 2"),
             (OperatorAction.DETACH, "console-1", ""),
         ]
@@ -278,7 +278,7 @@ def test_a_parameter_is_told_changed_and_refused(stage: Callable[[Scene], None])
             assert not await console.set_parameter("watch1", "nothing", 1)
             assert not await console.feed.ask_parameters("nobody")
             assert watcher.parameters.threshold == 30
-            assert on.model.team.alarms.views()
+            assert on.model.alarm_views()
 
     stage(scene)
 

@@ -301,7 +301,7 @@ def test_a_lift_of_a_stop_that_is_not_in_force_any_more_lifts_nothing_and_says_s
         await anna.console.stop_robot("scout1")
         assert not await anna.console.lift_stop("scout1", seen)
         assert on.robot.latch.state.is_stopped
-        lines = [alarm.line for alarm in anna.model.team.alarms.views()]
+        lines = [alarm.line for alarm in anna.model.alarm_views()]
         assert any("scout1 was stopped again since" in line for line in lines)
 
     stage(scene)
@@ -340,6 +340,6 @@ def test_rows_say_whose_stop_it_is_and_the_alarm_ends_with_it_for_those_who_came
         await on.clock.sleep_s(0.1)
         for person in on.people.values():
             assert person.model.team.stop_of("scout1") is None
-            assert not [alarm for alarm in person.model.team.alarms.views() if alarm.is_active]
+            assert not [alarm for alarm in person.model.alarm_views() if alarm.is_active]
 
     stage(scene)

@@ -16,7 +16,7 @@ import numpy as np
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
-from backbone.component.messages import LifeState
+from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.operators import OperatorAction
@@ -66,7 +66,7 @@ class WebHub:
             launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
         )
         self.guests: dict[Operator, None] = {}
-        self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False)
+        self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False, alarms=self.team.alarms)
         self._launch, self._bus, self._join = launch, bus, join
         self._kind, self._away_after_s = kind, away_after_s
         self._arcs: dict[str, str] = {}
@@ -123,7 +123,7 @@ class WebHub:
             self._told_s[offence.fault] = now_s
             log.warning("%s", line)
             if self.observer.state is LifeState.READY:
-                self.observer.tell("web", line)
+                self.observer.tell("web", line, LogLevel.WARNING)
 
     async def tell_all(self) -> None:
         """Keep every operator's view fresh; until cancelled. Nobody there: nothing is done."""

@@ -186,7 +186,7 @@ class Operator:
         put("own", view_json(model.own(now_s)))
         put("robots", _encode(model.robots(now_s)))
         put("links", _encode(model.links(now_s)))
-        put("alarms", _encode(model.team.alarms.views()))
+        put("alarms", _encode(model.alarm_views()))
         put("drawn", msgspec.json.encode({robot: round(at, 3) for robot, at in sorted(self._latency_s.items())}))
         self.news.set()
 
@@ -279,6 +279,7 @@ class Operator:
             return
         try:
             self._console = await self._hands.new_console(self, robot)
+            self.model.name = self._console.name  # others of this person are other screens
         except LinkError as error:
             self.show(LinkTrouble(self._hands.clock.now_s(), str(error)))
             return

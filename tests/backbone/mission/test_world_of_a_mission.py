@@ -79,13 +79,13 @@ def test_a_room_of_ones_own_travels_with_the_mission(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        ("<mujoco>", "no well-formed XML"),
+        ("<mujoco>", "not well-formed XML"),
         ("<robot/>", "begins with <robot>"),
         ('<mujoco><include file="walls.xml"/></mujoco>', "needs the file 'walls.xml' in line 1"),
         ('<mujoco><asset>\n<texture name="t" file="t.png"/></asset></mujoco>', "needs the file 't.png' in line 2"),
         ("<!DOCTYPE mujoco><mujoco/>", "document type declaration"),
         ("<mujoco/>" + " " * MAX_BYTES, "is larger than"),
-        ("\udcff", "no well-formed XML"),
+        ("\udcff", "not well-formed XML"),
     ],
 )
 def test_a_room_file_that_cannot_be_used_is_refused_with_a_remedy(tmp_path: Path, content: str, told: str) -> None:

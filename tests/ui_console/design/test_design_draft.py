@@ -375,7 +375,7 @@ def test_a_folder_that_is_not_there_refuses_and_leaves_nothing(tmp_path: Path) -
 def test_what_is_no_xml_is_told_as_check_tells_it(tmp_path: Path) -> None:
     file = tmp_path / "mission.xml"
     file.write_text("<mission")
-    with pytest.raises(MissionInvalid, match=rf"{file}:1:1: no well-formed XML"):
+    with pytest.raises(MissionInvalid, match=rf"{file}:1:1: not well-formed XML"):
         Draft.opened(str(file))
 
 

@@ -25,7 +25,7 @@ def test_a_file_that_is_no_xml_is_told_as_check_tells_it(tmp_path: Path) -> None
     file.write_text("<mission")
     code, told = serve(file)
     assert code == 3
-    assert f"{file}:1:1: no well-formed XML" in told
+    assert f"{file}:1:1: not well-formed XML" in told
 
 
 def test_a_draft_that_cannot_be_read_is_refused_and_left_alone(tmp_path: Path) -> None:

@@ -244,7 +244,7 @@ async def test_what_somebody_else_wrote_is_kept_until_it_is_told_to_overwrite(fi
         write(file, b"<mission")
         answer = await anna.change(do="reread")
         assert answer is not None
-        assert "no well-formed XML" in answer["refused"]
+        assert "not well-formed XML" in answer["refused"]
         await anna.change(do="save", overwrite=True)
     assert read(file) == theirs
 

@@ -89,7 +89,7 @@ async def test_who_loses_the_robot_is_told_who_took_it_and_why(stage: Stage) -> 
         assert arc.name.startswith("ben-")
         await arc.suspend("higher priority", "anna-1", deadline_s=0.0)
         await ben.wait(lambda: not ben.is_held, "taken")
-        assert ben.view["own"]["taken_because"] == "higher priority by anna-1"
+        assert ben.view["own"]["taken_because"] == "higher priority, because of anna-1"
         await arc.grant()
         await ben.wait(lambda: ben.is_held, "back")
         assert ben.view["own"]["taken_because"] == ""

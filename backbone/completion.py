@@ -1,0 +1,71 @@
+"""Names of a mission that is up, for shells that complete them.
+
+A shell waits for the answer with the person: what cannot be had at once is left out, and nothing is ever complained of.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from pathlib import Path
+
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.door import read_secret_file
+from backbone.errors import BackboneError
+from backbone.mission_picture import MissionPicture, look
+from backbone.naming import component_of
+from backbone.people import is_console
+from backbone.run_files import find_all
+from backbone.visit import visiting
+
+WITHIN_S = 1.5  # chosen: a person who pressed Tab waits no longer
+
+
+def names_of(picture: MissionPicture) -> list[str]:
+    """Return what can be asked about: components, requests, resources, hosts and people, sorted, each once."""
+    schedule = picture.schedule
+    names = {component_of(at) for at in picture.components}
+    names |= {component.host for component in picture.components.values() if component.type == CREATOR}
+    names |= {component.user for component in picture.components.values() if is_word(component.user)}
+    names |= {rc.rc for rc in schedule.rcs} | {request.arc for request in schedule.requests} if schedule else set()
+    return sorted(names - {""})
+
+
+def resources_of(picture: MissionPicture) -> list[str]:
+    """Return the resources that can be held, sorted."""
+    return sorted(rc.rc for rc in picture.schedule.rcs) if picture.schedule else []
+
+
+def people_of(picture: MissionPicture) -> list[str]:
+    """Return the people who sit at consoles, sorted."""
+    return sorted({c.user for at, c in picture.components.items() if is_console(at) and is_word(c.user)})
+
+
+def is_word(text: str) -> bool:
+    """Say whether a shell takes the text as one word."""
+    return bool(text) and text.isprintable() and not any(each in text for each in " \t'\"\\$`&|;<>()*?[]#~=%!{}:")
+
+
+def picture_now(mission: str | None, connect: str | None, secret_file: Path | None) -> MissionPicture | None:
+    """Return how a mission is; None if there is none, or it does not answer ``WITHIN_S``."""
+
+    async def looked() -> MissionPicture:
+        secret = read_secret_file(secret_file) if connect is not None and secret_file is not None else ""
+        async with (
+            asyncio.timeout(WITHIN_S),
+            visiting(mission, connect, f"ui_console/complete-{os.getpid()}", secret) as (bus, clock),
+        ):
+            return await look(bus, clock.now_s(), rate=clock.rate)
+
+    try:
+        return asyncio.run(looked())
+    except (BackboneError, TimeoutError, OSError):
+        return None
+
+
+def missions_now() -> list[str]:
+    """Return the missions that are up on this machine."""
+    try:
+        return [run_file.mission for run_file in find_all()]
+    except (BackboneError, OSError):
+        return []

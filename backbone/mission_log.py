@@ -1,0 +1,144 @@
+"""The mission's log: what components told people and what people did, kept by the launcher for as long as it lives.
+
+A component's own story ends with it, and a console lives shorter than the question what was done at it. Therefore one
+place hears all that is told and keeps the newest ``EVENTS_KEPT``. Which of them are wanted is decided in one place,
+``wants``, for the command line and for the tables of consoles.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from typing import Annotated, Any
+
+import msgspec
+
+from backbone.bus.interface import Bus
+from backbone.component.messages import ComponentState, LogLevel, StoryEvent
+from backbone.component.story import is_about, speaks_of
+from backbone.keys import Conversation
+from backbone.naming import Subsystem
+from backbone.operators import OperatorActed
+from backbone.people import People
+from backbone.printable import printable_all
+from backbone.ranges import MANY, Count, Instant, Line, Mention
+from backbone.wire import Envelope, Message
+
+EVENTS_KEPT = 20_000  # chosen: hours of a busy mission, some megabytes
+MOST_TOLD = 10_000  # chosen: what one message carries with room to spare
+FOR_EVER_S = 1e12  # as the latest instant there is
+_ORDER = list(LogLevel)
+
+
+class AskLog(Message, frozen=True):
+    """What happened? Empty fields match all; what is asked must all be so.
+
+    Attributes:
+        since_s: Not before this mission time.
+        until_s: Not after it.
+        robot: Only what is about this name: a robot's, or any other.
+        person: Only what this person did, or what speaks of them.
+        level: Only what matters at least so much.
+        text: Only what has this text in it, in upper or lower case.
+        most: At most so many, the newest.
+    """
+
+    since_s: Instant = 0.0
+    until_s: Instant = FOR_EVER_S
+    robot: Mention = ""
+    person: Mention = ""
+    level: LogLevel = LogLevel.INFO
+    text: Line = ""
+    most: Annotated[int, msgspec.Meta(ge=1, le=MOST_TOLD)] = MOST_TOLD
+
+    def wants(self, event: StoryEvent) -> bool:
+        """Say whether the event is one of those asked for.
+
+        Example:
+            >>> stopped = StoryEvent(2.0, "ui_console/c", "anna stops it", "scout1", "", LogLevel.ALARM, "anna")
+            >>> AskLog(robot="scout1", person="Anna").wants(stopped), AskLog(robot="scout10").wants(stopped)
+            (True, False)
+        """
+        return (
+            self.reaches(event)
+            and (not self.robot or is_about(event, self.robot))
+            and (not self.person or _is_by_or_about(event, self.person))
+            and self.text.casefold() in f"{event.subject}: {event.what}".casefold()
+        )
+
+    def reaches(self, event: StoryEvent) -> bool:
+        """Say whether the event has the time and the level asked for, whatever it says."""
+        in_time = self.since_s <= event.at_s <= self.until_s
+        return in_time and _ORDER.index(event.level) <= _ORDER.index(self.level)
+
+
+class Log(Message, frozen=True):
+    """Answer to ``AskLog``.
+
+    Attributes:
+        events: Oldest first.
+        left_out: How many older ones would have fitted too.
+        since_s: What was before this mission time is not kept any more.
+    """
+
+    events: Annotated[list[StoryEvent], MANY]
+    left_out: Count = 0
+    since_s: Instant = 0.0
+
+
+class MissionLog:
+    """The newest of what happened. Pure.
+
+    Args:
+        kept: How many.
+    """
+
+    def __init__(self, kept: int = EVENTS_KEPT) -> None:
+        self._events: deque[StoryEvent] = deque(maxlen=kept)
+        self._since_s = 0.0
+        self.people = People()
+        """Who sits at which console: their names stand in what is told."""
+
+    def add(self, event: StoryEvent) -> None:
+        """Keep that this happened."""
+        if len(self._events) == self._events.maxlen:
+            self._since_s = self._events[1].at_s
+        self._events.append(event)
+
+    def told(self, asked: AskLog) -> Log:
+        """Return what is wanted, by the names of people."""
+        found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
+        return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)
+
+
+def chosen(events: Iterable[StoryEvent], asked: AskLog) -> list[StoryEvent]:
+    """Return the events asked for, by their times."""
+    return sorted(filter(asked.wants, events), key=lambda event: event.at_s)
+
+
+class LogKeeper:
+    """Hears what a mission tells.
+
+    Args:
+        bus: Of the component that keeps it.
+    """
+
+    def __init__(self, bus: Bus) -> None:
+        self.log = MissionLog()
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
+        bus.subscribe(f"{Subsystem.UI_CONSOLE}/*", Conversation.STATUS, ComponentState, self._heard_status, latest=True)
+
+    def _heard_event(self, envelope: Envelope[Any]) -> None:
+        self.log.add(printable_all(envelope.body))
+
+    def _heard_act(self, envelope: Envelope[Any]) -> None:
+        self.log.add(printable_all(envelope.body).event(envelope.source, envelope.cause))
+
+    def _heard_status(self, envelope: Envelope[Any]) -> None:
+        self.log.people.heard(printable_all(envelope.body))
+
+
+def _is_by_or_about(event: StoryEvent, person: str) -> bool:
+    called = person.casefold()
+    return called in (event.user.casefold(), event.subject.casefold()) or speaks_of(event.what.casefold(), called)

@@ -1,0 +1,64 @@
+"""Moments as people type them, in mission time. Pure: what time it is is told."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from backbone.errors import Refusal
+
+_AGO = re.compile(r"(\d+(?:\.\d+)?)(s|m|h|d)")
+_SECONDS = {"s": 1.0, "m": 60.0, "h": 3_600.0, "d": 86_400.0}
+_CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}))?")
+_MISSION_TIME = re.compile(r"\d+(?:\.\d+)?")
+
+
+class NoMoment(Refusal):
+    """The text tells no moment."""
+
+    code = "usage.moment"
+    remedy = "Say 5m (s, m, h, d ago), 14:05 or 14:05:30 (time of day), or 123.4 (mission time, as stories show it)."
+
+
+@dataclass(frozen=True)
+class Now:
+    """What time it is.
+
+    Attributes:
+        mission_s: In the mission.
+        here: On this machine.
+        rate: Mission seconds a second of the machine.
+    """
+
+    mission_s: float
+    here: datetime
+    rate: float = 1.0
+
+    def time_of_day(self, at_s: float) -> datetime:
+        """Return what this machine's clock showed at a mission time."""
+        return self.here - timedelta(seconds=(self.mission_s - at_s) / self.rate)
+
+
+def moment(text: str, now: Now) -> float:
+    """Return the mission time that is meant.
+
+    Example:
+        >>> now = Now(600.0, datetime(2026, 5, 4, 14, 10))
+        >>> moment("5m", now), moment("14:05", now), moment("123.4", now)
+        (300.0, 300.0, 123.4)
+
+    Raises:
+        NoMoment: None is.
+    """
+    if ago := _AGO.fullmatch(text):
+        return now.mission_s - float(ago[1]) * _SECONDS[ago[2]] * now.rate
+    if _MISSION_TIME.fullmatch(text):
+        return float(text)
+    if clock := _CLOCK.fullmatch(text):
+        hour, minute, second = int(clock[1]), int(clock[2]), int(clock[3] or 0)
+        if hour < 24 and minute < 60 and second < 60:
+            then = now.here.replace(hour=hour, minute=minute, second=second, microsecond=0)
+            then -= timedelta(days=1) if then > now.here else timedelta(0)  # the last time that it was so
+            return now.mission_s - (now.here - then).total_seconds() * now.rate
+    raise NoMoment(f"{text!r} is no moment", text=text)

@@ -1,0 +1,37 @@
+"""Numbers and values as people write them. Pure."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+
+def counted(number: int, noun: str) -> str:
+    """Return how many there are, in words that fit the number.
+
+    Example:
+        >>> counted(1, "component"), counted(2, "component"), counted(0, "alarm")
+        ('1 component', '2 components', '0 alarms')
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def value_text(value: Any) -> str:
+    """Return a value of a parameter as one types it, with no more digits than a person can use.
+
+    Example:
+        >>> value_text(50.83098785400034), value_text([1, 0.1 + 0.2]), value_text("base"), value_text(None)
+        ('50.831', '[1, 0.3]', '"base"', 'null')
+    """
+    return json.dumps(_rounded(value), ensure_ascii=False, default=str)
+
+
+def _rounded(value: Any) -> Any:
+    match value:
+        case float():
+            return float(f"{value:.6g}")
+        case list() | tuple():
+            return [_rounded(each) for each in value]
+        case dict():
+            return {name: _rounded(each) for name, each in value.items()}
+    return value
