@@ -441,8 +441,7 @@ async def test_a_dialog_asks_for_what_is_required_and_keeps_answers_that_were_re
             await Hands(page).see("behavior rounds patrol priority 7")
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", ["desktop", "phone"])
+@pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])
 async def test_axe_finds_nothing_serious_in_the_designer(tmp_path: Path, size: str, theme: str) -> None:
     file = tmp_path / "guard.xml"
     file.write_bytes((ROOT / "mission.xml").read_bytes())

@@ -13,8 +13,6 @@ from web_browser import Cable
 from web_page import Key, Wheels, card, page_at, take
 from web_stage import ANYBODY, Stage
 
-from ui_console.console_events import LinkHeard
-
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
 SAID_WITHIN_S = 1.0
@@ -79,14 +77,17 @@ async def test_a_page_that_is_cut_off_says_within_a_second_that_it_cannot_stop_a
         assert await card(page).locator("button.emergency").is_enabled()
 
 
-async def test_a_server_that_does_not_hear_the_mission_has_its_pages_say_so(stage: Stage) -> None:
+async def test_a_server_that_does_not_hear_the_mission_has_its_pages_say_so(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async with page_at(stage) as page:
         await take(page)
-        stage.hub.team.apply(LinkHeard(stage.clock.now_s(), False))
+        silent_s = stage.clock.now_s()
+        monkeypatch.setattr(stage.hub.team, "link_down_s", lambda _now_s: silent_s)
         await page.get_by_text("A STOP PRESSED HERE MAY NOT ARRIVE").wait_for()
         assert "has not heard the mission" in await page.locator("#blind-why").inner_text()
         assert await card(page).locator("button.emergency").is_enabled(), "it may arrive all the same"
-        stage.hub.team.apply(LinkHeard(stage.clock.now_s(), True))
+        monkeypatch.undo()
         await page.wait_for_selector("body:not(.is-blind)")
 
 
@@ -115,6 +116,21 @@ async def test_a_page_that_slept_drives_nothing_when_it_wakes_and_offers_the_los
         await page.locator("#retake").click()
         await page.wait_for_selector("body[data-held=scout2]")
         assert await page.locator("#lost").is_hidden()
+
+
+async def test_a_page_that_comes_back_has_its_robot_again_at_once(stage: Stage) -> None:
+    """The server need not find out first that the connection before is dead."""
+    async with Cable(stage.port).plugged_in() as cable:
+        address = f"http://127.0.0.1:{cable.port}/#token={ANYBODY}"
+        async with page_at(stage, address=address) as page:
+            await take(page)
+            cable.is_cut = True
+            await page.get_by_text("THIS PAGE CANNOT STOP A ROBOT").wait_for()
+            assert len(stage.hub.guests) == 1
+            cable.is_cut = False
+            await page.locator("#retake").click()
+            await page.wait_for_selector("body[data-held=scout1]")
+            assert len(stage.hub.guests) == 1, "one page is one guest"
 
 
 async def test_a_robot_that_was_lost_can_be_left(stage: Stage) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from axe import serious_findings
 from web_browser import assert_no_sideways_scroll
-from web_page import ALL_SIZES, card, page_at, stop_button, take, wait_stopped
+from web_page import card, page_at, stop_button, take, wait_stopped
 from web_stage import LOW, Stage
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
@@ -86,8 +86,17 @@ async def test_the_look_is_the_systems_unless_this_browser_was_told_otherwise(st
         assert await ground(page) == light
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
-@pytest.mark.parametrize("size", ALL_SIZES)
+@pytest.mark.parametrize(
+    ("size", "theme"),
+    [
+        ("desktop", "light"),
+        ("phone", "dark"),
+        *(
+            pytest.param(size, theme, marks=pytest.mark.slow)
+            for size, theme in (("desktop", "dark"), ("tablet", "light"), ("tablet", "dark"), ("phone", "light"))
+        ),
+    ],
+)
 async def test_axe_finds_nothing_serious(stage: Stage, size: str, theme: str) -> None:
     async with page_at(stage, size, theme=theme) as page, stage.browser(LOW) as ben:
         found = {"watching": await serious_findings(page)}

@@ -43,6 +43,7 @@ export class Hand {
     this.own = null;
     this.driving.turn(false);
     document.body.dataset.held = "";
+    document.body.classList.remove("is-asking");
   }
 
   show(own, now_s) {

@@ -30,7 +30,7 @@ const driving = new Driving({
 });
 const hand = new Hand({ act, driving });
 const blindness = new Blindness({
-  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("videos"), find("hand")],
+  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("alarm-bar"), find("videos"), find("hand")],
   stops: () => document.querySelectorAll("button.emergency"),
 });
 new Keys({ isHeld: () => hand.held !== "", does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")) });
