@@ -23,7 +23,7 @@ from backbone.naming import Subsystem, component_of
 from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
 from backbone.spoken import value_text
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.console_events import (
     ActHeard,
@@ -555,12 +555,11 @@ class TeamModel:
         line = f"{fell.name} fell: {fell.how}; {again}{said}"
         self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
-    def _is_there(self, address: str) -> bool:
-        """Return whether this component is there; True as long as nothing was heard of who is."""
-        component = self._components.get(address)
-        if component is None:
-            return not self._components
-        return component.state not in LEAVING and address not in self._lost
+    def _is_there(self, author: Stopper) -> bool:
+        """Return whether who stopped a robot is there; True as long as nothing was heard of who is."""
+        at = {author.console, *(screen.address for screen in self.screens_of(author.by))} & self._components.keys()
+        there = [at for at in at if self._components[at].state not in LEAVING and at not in self._lost]
+        return bool(there) or not self._components
 
     # ------------------------------------------------------------------ what happened
     def _take_link(self, link: LinkHeard) -> None:

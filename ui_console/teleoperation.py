@@ -346,7 +346,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
             holds, by_script = self._holding if self.is_held else "", self._work is not None
             return await self._hand_over.answer(asked.body, holds, self._asked_s, by_script=by_script)
         if isinstance(asked.body, AskLift) and self._work is not None:
-            return Consent(False, self.user, "a script drives, and stopped it")
+            stopped_it = asked.body.console == self.address
+            return Consent(False, self.user, "a script drives, and stopped it", is_here=stopped_it)
         if not isinstance(asked.body, ArcNotice):
             return await super().answer(asked)
         if self._arc is None:
