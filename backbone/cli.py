@@ -399,7 +399,8 @@ def story(
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
-        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(told.events))
+        events = [*map(told.people.named_event, told.events)]
+        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(events))
         if not told.events:
             say(f"no component has an event about {name}")
         if told.missing:
