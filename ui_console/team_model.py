@@ -34,6 +34,7 @@ from ui_console.console_events import (
     LeasesHeard,
     LinkHeard,
     LoadHeard,
+    LogHeard,
     ParametersHeard,
     ProcessFallen,
     RadioCounted,
@@ -126,6 +127,9 @@ class TeamModel:
                 self._take_leases(leases, at_s)
             case StoryHeard(story=story):
                 self._take_story(story)
+            case LogHeard(events=events, consoles=consoles):
+                self.people.remember(consoles)
+                self._recall(events)
             case ActHeard(act=act, where=where):
                 self._log.append(act.event(where))
             case ComponentHeard(at_s=at_s, component=component):
@@ -577,6 +581,12 @@ class TeamModel:
         head, _, status = story.what.partition(": ")
         if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
             self._finished[story.subject] = (story.at_s, NodeState(status))
+
+    def _recall(self, events: Iterable[StoryEvent]) -> None:
+        """Put what happened before into the log; what was heard here too is in it once."""
+        told = {(event.at_s, event.where) for event in events}
+        own = [event for event in self._log if (event.at_s, event.where) not in told]
+        self._log = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=LOG_KEPT)
 
     def _take_stop(self, stop: StopState, at_s: float) -> None:
         former = self._stops.get(stop.rc)
