@@ -1,4 +1,9 @@
-"""Many faults, one after the other, in one mission: what it is like at the end, and what has grown."""
+"""Many faults, one after the other, in one mission: what it is like at the end, and what has grown.
+
+What a process uses is taken when each has been ended once and all have warmed up, and again at the end: a framegrabber
+fills its stores for three minutes, and a second life is not as the first: it is not forked from a fresh zygote, it
+watches what it found instead of what it started.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +11,30 @@ import contextlib
 import random
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import psutil
 from measuring import report
-from recovery_breaker import FAULTS, HARDWARE, STAYS_S, Breaker, breaking_calm, rounded
+from recovery_breaker import FAULTS, HARDWARE, ROWS, STAYS_S, Breaker, breaking_calm, rounded
 from recovery_mission import POLL_S, BenchMission, Look, NotSeen
-from recovery_verdict import Fault, Judgement, longest_gap_s
+from recovery_verdict import Expected, Fault, Judgement, longest_gap_s
 
 PAUSE_S = (5.0, 15.0)
 REMEMBERED_S = 60.0  # chosen: twice the longest pause of a process
 SETTLED_WITHIN_S = 60.0
 GROWTH = 0.1  # the most that a process may have grown
+WARM_UP_S = 180.0  # measured: after that a framegrabber's memory stays
+LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
 
 
 def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
     """Do random things to a mission for so long, and print what it is like afterwards."""
     rng = random.Random(seed)
     with breaking_calm() as (breaking, expected):
-        before = usage(breaking.mission, expected.before)
+        end_each_once(breaking, expected)
+        time.sleep(WARM_UP_S)
+        before = usage(breaking.mission, breaking.watch.looks[-1])
         ends_s = time.monotonic() + minutes * 60
         judgement = Judgement(expected, [])
         faults = []
@@ -52,6 +62,14 @@ def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
         report("recovery_soak", faults=len(faults), minutes=minutes, seed=seed, **end, **breaking.end())
 
 
+def end_each_once(breaking: Breaker, expected: Expected) -> None:
+    """Kill each process but the launcher, one after the other, and see it come back."""
+    for victim in ROWS:
+        if victim != "launcher":
+            found = breaking.see_through(expected, [breaking.fault(victim, "SIGKILL")])
+            report("recovery_soak", warms_up=victim, healthy_s=found["healthy_s"])
+
+
 def drawn(breaking: Breaker, rng: random.Random, victims: Sequence[str]) -> Fault | None:
     """Do any one thing to any one process; return it, or None where there was no such process."""
     victim = rng.choice(victims)
@@ -76,7 +94,8 @@ def wait(breaking: Breaker, judgement: Judgement, until_s: float) -> None:
         time.sleep(POLL_S)
         for fault in judgement.faults:
             breaking.attend(fault)
-        judgement.take(breaking.watch.looks, breaking.watch.pictures_s)
+        if judgement.faults:
+            judgement.take(breaking.watch.looks, breaking.watch.pictures_s)
 
 
 def settle(breaking: Breaker, judgement: Judgement) -> None:
@@ -96,11 +115,11 @@ def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
         if pid in seen:
             continue
         seen.add(pid)
-        with contextlib.suppress(psutil.Error):
+        with contextlib.suppress(psutil.Error, OSError):
             process = psutil.Process(pid)
             shared = "hardware" if name in HARDWARE else name
             found[shared] = {
-                "mb": round(process.memory_full_info().uss / 1e6, 1),
+                "mb": round(anonymous_kb(pid) / 1e3, 1),
                 "fds": process.num_fds(),
                 "threads": process.num_threads(),
                 "log_kb": round(logs.get(f"{shared}.log", 0) / 1e3, 1),
@@ -108,8 +127,21 @@ def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
     return found
 
 
+def anonymous_kb(pid: int) -> int:
+    """Return how much memory of its own a process has, also what it shares with the zygote it was forked from.
+
+    The death of a zygote makes what was shared a process's alone; by this measure nothing changes then.
+    """
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:"))
+
+
 def compared(name: str, before: dict[str, float], after: dict[str, float]) -> dict[str, Any]:
-    """Return what a process used before and after, and what of it has grown by more than ``GROWTH``."""
+    """Return what a process used before and after, and what of it has grown by more than ``GROWTH``.
+
+    A log grows with each fault that it tells of; it has grown when it is longer than logs may be.
+    """
     both = {kind: [before[kind], after.get(kind)] for kind in before}
-    grown = [kind for kind, (was, now) in both.items() if now is not None and now > (was or 0.0) * (1 + GROWTH)]
+    most = {kind: LOG_KB if kind == "log_kb" else was * (1 + GROWTH) for kind, was in before.items()}
+    grown = [kind for kind, (_, now) in both.items() if now is not None and now > most[kind]]
     return {"process": name, **both, "grown": grown}

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from ui_console.design.draft import Draft
     from ui_console.observer import Observer
     from ui_console.web.door import Pass
+    from ui_console.web.token_file import TokenFile
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
@@ -126,6 +127,7 @@ class _Site:
     key: str
     kind: str
     away_after_s: float
+    has_new_tokens: bool
 
     @property
     def encryption(self) -> SSLContext | None:
@@ -250,6 +252,10 @@ def serve(
         str, typer.Option(help="Serve the designer of this mission file instead; nothing needs to be up.")
     ] = "",
     kind: Annotated[str, typer.Option(help="Kind of ARC that operators claim.")] = KINDS["terminal"],
+    new_tokens: Annotated[
+        bool,
+        typer.Option("--new-tokens", help="Forget the tokens of the server before; its open pages do not come back."),
+    ] = False,
     away_after: Annotated[
         float,
         typer.Option(
@@ -275,7 +281,7 @@ def serve(
     if key and not certificate:
         say("--key belongs to a --certificate")
         raise typer.Exit(ExitCode.USAGE)
-    site = _Site(host, port, certificate, key, kind, away_after)
+    site = _Site(host, port, certificate, key, kind, away_after, new_tokens)
     if design:
         if mission is not None or connect is not None:
             say("--design serves a mission file; --mission and --connect are for missions that are up")
@@ -290,16 +296,8 @@ def design(
     new: Annotated[bool, typer.Option("--new", help="Begin from nothing, whatever the file holds.")] = False,
 ) -> None:
     """Build or change a mission file by keys, checked while you build it; nothing needs to be up."""
-    from backbone.mission.reader import MissionInvalid
-    from ui_console.design.draft import Draft
-
     _need_a_terminal("design", "an editor and scout-backbone check")
-    try:
-        draft = Draft.opened(file) if Path(file).exists() and not new else Draft.new(file)
-    except MissionInvalid as invalid:
-        say(str(invalid))
-        raise typer.Exit(ExitCode.MISSION_INVALID) from invalid
-    run(lambda: _design(draft))
+    run(lambda: _design(file, is_new=new or not Path(file).exists()))
 
 
 def main() -> None:
@@ -344,7 +342,7 @@ async def _drive_by_script(where: _Where, wished: dict[str, Any], user: str, giv
 async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -> int:
     from ui_console.gamepad import find_gamepad
     from ui_console.teleoperation import Teleoperation
-    from ui_console.terminal import app as screens
+    from ui_console.terminal import keys
     from ui_console.terminal.session import TerminalSession
 
     pad = find_gamepad() if looks.has_gamepad else None
@@ -354,7 +352,7 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
         launch.name,
         launch.mission,
         looks.user,
-        profile=screens.Profile(looks.profile),
+        profile=keys.Profile(looks.profile),
         is_bare=looks.is_bare,
         sees=sees,
         gamepad=pad,
@@ -362,11 +360,11 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
     bus = await _open_bus(launch, clock, secret)
     see = session.see if sees else None
     console = Teleoperation(launch, bus, clock, show=session.show, see=see, keeps_arc=True, user=looks.user)
-    _end_on_signals(console)
-    await session.run(console)
+    interrupted = _end_on_signals(console)
+    ended = await session.run(console)
     if console.refusal is not None and console.given_back is None:
         raise console.refusal
-    return ExitCode.DONE
+    return ExitCode.INTERRUPTED if interrupted() else ended
 
 
 async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
@@ -390,9 +388,9 @@ async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
 
     session = TerminalSession(launch.name, launch.mission, user, sees=False)
     console = Observer(launch, bus, clock, show=session.show, user=user)
-    _end_on_signals(console)
-    await session.run(console)
-    return ExitCode.DONE
+    interrupted = _end_on_signals(console)
+    ended = await session.run(console)
+    return ExitCode.INTERRUPTED if interrupted() else ended
 
 
 async def _look_once(where: _Where, user: str) -> int:
@@ -429,6 +427,7 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
 
     from ui_console.web.door import Doorkeeper
     from ui_console.web.hub import WebHub
+    from ui_console.web.token_file import kept_or_new
 
     try:
         from ui_console.web.reception import CannotListen
@@ -439,6 +438,9 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     encryption = site.encryption
     launch, clock, secret = await _launch(where, {})
     launch = msgspec.structs.replace(launch, name=f"web-{os.getpid()}")
+    tokens = _token_file(launch.mission, site) if where.connect is None else None
+    if tokens is not None and not site.has_new_tokens:
+        passes = kept_or_new(passes, tokens.read())
 
     async def join(one_more: Launch) -> Any:
         return await _open_bus(one_more, clock, secret)
@@ -447,18 +449,38 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     hub = WebHub(launch, bus, clock, join, kind=site.kind, away_after_s=site.away_after_s)
     interrupted = _end_on_signals(hub.observer)
 
+    def ready(port: int) -> None:
+        _keep(tokens, passes)
+        _tell_where(site, port, passes)
+
     try:
-        await WebServer(hub, Doorkeeper(passes)).run(
-            site.host, site.port, lambda port: _tell_where(site, port, passes), encryption
-        )
+        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, ready, encryption)
     except CannotListen:
         await bus.close()
         raise
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 
+def _token_file(mission: str, site: _Site) -> TokenFile | None:
+    """Return where the tokens are kept; None: nowhere, for no open page can come back to a port that nobody chose."""
+    from backbone import run_files
+    from ui_console.web.token_file import TokenFile
+
+    return TokenFile(run_files.run_directory(mission), site.port) if site.port else None
+
+
+def _keep(tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:
+    """Have the next server know the pages that are open; this one serves also if it cannot."""
+    from ui_console.web.token_file import TokensNotKept
+
+    try:
+        if tokens is not None:
+            tokens.keep(passes)
+    except TokensNotKept as refusal:
+        say(str(refusal))
+
+
 async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> int:
-    from backbone.bus.clock import MissionClock
     from backbone.mission.reader import MissionInvalid
     from ui_console.design.look_up import look_up
     from ui_console.web.design_room import DesignRoom
@@ -485,7 +507,7 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
 
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended, number)
-    room = DesignRoom(draft, kept, look_up, MissionClock.started_now())
+    room = DesignRoom(draft, kept, look_up)
     server = DesignServer(room, Doorkeeper(passes))
     await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end, encryption)
     return ExitCode.INTERRUPTED if signal.SIGINT in came else ExitCode.DONE
@@ -513,12 +535,32 @@ def _shown(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-async def _design(draft: Draft) -> int:
+async def _design(file: str, *, is_new: bool) -> int:
+    from backbone.mission.reader import MissionInvalid
+    from ui_console.design.draft import Draft
     from ui_console.design.look_up import look_up
     from ui_console.design.screen import DesignApp
 
-    await DesignApp(draft, look_up).run_async()
-    return ExitCode.DONE
+    try:
+        draft = Draft.new(file) if is_new else Draft.opened(file)
+    except MissionInvalid as invalid:
+        say(str(invalid))
+        return ExitCode.MISSION_INVALID
+    screen = DesignApp(draft, look_up)
+    await screen.run_async()
+    if screen.return_code:
+        _rescue(screen.draft)
+    return screen.return_code or ExitCode.DONE
+
+
+def _rescue(draft: Draft) -> None:
+    """Write what a designer that crashed had not saved beside the mission file."""
+    from ui_console.design.file import save
+
+    if draft.is_changed:
+        beside = Path(f"{draft.source}.rescued")
+        save(draft, beside, overwrite=True)
+        say(f"what was not saved is in {beside}")
 
 
 def _user() -> str:

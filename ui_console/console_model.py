@@ -60,6 +60,7 @@ STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
 UNRENEWED = ("lost", "lease")  # reasons of a loss that nobody decided
+SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 _TEAM_EVENTS = get_args(TeamEvent)
@@ -269,8 +270,7 @@ class ConsoleModel:
             stop = self.team.stop_of(self.robot)
             if stop is not None:
                 return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
-            left_s = self.held.until_s - now_s
-            slice_end = f", slice {left_s:.0f} s" if left_s > 0 else ""
+            slice_end = _slice_end(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
         if self.asked is None:
             there = "; ".join(self.other_screens())
@@ -378,6 +378,14 @@ def _video(robot: str, seen: deque[PictureSeen], now_s: float) -> VideoView:
     span_s = newest.at_s - seen[0].at_s
     rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
     return VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
+
+
+def _slice_end(until_s: float, now_s: float) -> str:
+    """Return what is left of a slice, for people; empty: it has no end, or ends now."""
+    left_s = until_s - now_s
+    if until_s < 0 or abs(left_s) < SLICE_TOLD_S:
+        return ""
+    return f", slice {left_s:.0f} s" if left_s > 0 else ", beyond its slice"
 
 
 def _question_line(sought: Sought) -> str:

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 
 from backbone.component.heartbeat import Vitals
 
-LOOK_EVERY_S = 0.25  # chosen: with beats as often, a silence is seen within 0.5 s of its beginning
-LOOK_MOST_S = 0.5  # chosen: twice the period: one look may be missed
-SHOWN_AFTER_S = 0.7  # chosen: a stopped process is shown within 1 s: 0.7 s and one look
+LOOK_EVERY_S = 0.2  # chosen: a little more often than a process beats
+LOOK_MOST_S = 0.4  # chosen: twice the period: one look may be missed
+SHOWN_AFTER_S = 0.55  # chosen: three looks; told 0.8 s after a process stopped, with the look that saw its last beat
 
 
 @dataclass

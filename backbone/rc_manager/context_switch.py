@@ -3,9 +3,9 @@
 Rules of this file:
 
 * All or nothing: if one step of a connection fails, all of it is undone before anybody is told.
-* An RC that does not confirm its disconnection is asked again and counts as held until it confirms or its lease is
-  over: a holder may be late, there are never two. After a death its successor confirms (decision 0006), and does so
-  before it is counted as up, so that the ARC's other RCs need not wait for it.
+* An RC that does not confirm its disconnection in time keeps nothing else waiting if nobody else holds it: it is left,
+  the caller puts it down, and it is not up again before it confirmed. One that others hold, too, is waited for until
+  its lease is over. A holder may be late, there are never two. After a death the successor confirms (decision 0006).
 * An ARC that does not answer delays nobody: its epoch ends with the disconnection of its RCs.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
@@ -15,6 +15,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -40,6 +42,7 @@ log = logging.getLogger(__name__)
 RC_REPLY_S = 0.5  # chosen: a hundred round trips; an RC that needs longer is not there
 ASK_AGAIN_S = 0.1  # chosen: a killed RC is back after two or three of these; a twentieth of a lease
 ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
+CONFIRM_S = 0.04  # chosen: ten round trips, within the tolerance of a trace; also for what is late already
 CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; one that hangs must not cost the next its turn
 
 Note = Callable[[str, str], Any]
@@ -54,13 +57,13 @@ class ContextSwitch:
         bus: Of the RC manager.
         clock: The mission's time.
         note: Keeps that something happened to a subject.
-        is_down: Says whether an RC is known to be down.
+        may_leave: Says whether an RC need not be waited for when an ARC loses it: it is down, or has no other holder.
     """
 
-    def __init__(self, bus: Bus, clock: Clock, note: Note, is_down: Callable[[str], bool]) -> None:
-        self._bus, self._clock, self._note, self._is_down = bus, clock, note, is_down
+    def __init__(self, bus: Bus, clock: Clock, note: Note, may_leave: Callable[[str, str], bool]) -> None:
+        self._bus, self._clock, self._note, self._may_leave = bus, clock, note, may_leave
         self._given_back: set[str] = set()
-        self._left: dict[str, dict[Hold, float]] = {}
+        self._left: defaultdict[str, dict[Hold, float]] = defaultdict(dict)
 
     def gives_back(self, arc: str) -> bool:
         """Say whether a connection of this ARC failed and is being undone: its leases must not be renewed."""
@@ -85,36 +88,50 @@ class ContextSwitch:
         try:
             async with asyncio.TaskGroup() as both:
                 both.create_task(self._close_gate(order.arc, close))
-                both.create_task(self._disconnect(_holds(order.arc, order.epochs), f"failed at {failed or order.arc}"))
+                both.create_task(self.disconnect(_holds(order.arc, order.epochs), f"failed at {failed or order.arc}"))
         finally:
             self._given_back.discard(order.arc)
         return failed or ""
 
-    async def revoke(self, order: RevokeArc) -> list[str]:
-        """Close the ARC's gate and disconnect its RCs; return when nothing that is up is held any more.
+    async def revoke(self, order: RevokeArc, within_s: float) -> list[str]:
+        """Close the ARC's gate and disconnect its RCs; return when nothing is held any more, but for what was left.
+
+        Args:
+            order: What the schedule manager decided.
+            within_s: Mission seconds after which RCs that nobody else holds are left.
 
         Returns:
-            RCs that never confirmed: they counted as held until their leases were over.
+            RCs that did not confirm: put them down, and ``clear`` them before they count as up.
         """
+        free_by_s = self._clock.now_s() + within_s
         close = CloseGate(order.why, order.by, order.deadline_s, order.expected_s)
         holds = _holds(order.arc, order.epochs)
         if order.deadline_s > 0:  # its decision process may stop cleanly while it still commands
             await self._close_gate(order.arc, close)
-            return await self._disconnect(holds, order.why)
+            return await self._disconnect(holds, order.why, free_by_s)
         async with asyncio.TaskGroup() as both:
             both.create_task(self._close_gate(order.arc, close))
-            disconnecting = both.create_task(self._disconnect(holds, order.why))
+            disconnecting = both.create_task(self._disconnect(holds, order.why, free_by_s))
         return disconnecting.result()
 
-    async def clear(self, rc: str, found: Sequence[Hold]) -> None:
-        """End what an RC that was down still holds: by its own word, and what was left to it while it was down."""
-        while holds := {*found, *(h for h, until_s in self._left.pop(rc, {}).items() if until_s > self._clock.now_s())}:
-            await self.disconnect([*holds], "held from before it was down")
+    async def clear(self, rc: str, found: Sequence[Hold]) -> bool:
+        """End what an RC that was down still holds: by its own word, and what was left while it was down.
+
+        Returns:
+            It confirmed that it holds nothing any more.
+        """
+        left = self._left[rc]
+        while holds := {*found, *(hold for hold, until_s in left.items() if until_s > self._clock.now_s())}:
+            if await self._disconnect([*holds], "held from before it was down", math.inf):
+                return False
             found = ()
+            for hold in holds:
+                left.pop(hold, None)
+        return True
 
     async def disconnect(self, holds: Sequence[Hold], reason: str) -> None:
         """Disconnect all at once; wait for each until it confirms or its lease is over."""
-        await self._disconnect(holds, reason, also_down=True)
+        await self._disconnect(holds, reason, math.inf)
 
     async def _connect_rcs(self, order: ConnectArc, uses: Mapping[str, RcUse]) -> str | None:
         """Connect all RCs at once; return the name of one that failed, or None."""
@@ -147,42 +164,45 @@ class ContextSwitch:
         return True
 
     async def _close_gate(self, arc: str, question: CloseGate) -> None:
-        within_s = CLOSE_S + question.deadline_s / self._clock.rate
+        within_s = question.deadline_s / self._clock.rate or CLOSE_S
         try:
             await self._bus.ask(_in_pool(arc), question, GateClosed, within_s=within_s)
         except (Refusal, LinkError) as error:
             self._note(arc, f"did not close its gate: {error}")
 
-    async def _disconnect(self, holds: Sequence[Hold], reason: str, *, also_down: bool = False) -> list[str]:
-        """Disconnect all at once; leave those that are down to ``clear`` unless told to wait for them, too.
+    async def _disconnect(self, holds: Sequence[Hold], reason: str, free_by_s: float) -> list[str]:
+        """Disconnect all at once; from ``free_by_s`` on leave those that may be left to ``clear``.
 
         Returns:
-            RCs that had not confirmed when their leases were over.
+            RCs that did not confirm: they were left, or their leases are over.
         """
         lease_until_s = self._clock.now_s() + LEASE_S * self._clock.rate
-        ended = await asyncio.gather(*(self._end(hold, reason, lease_until_s, also_down) for hold in holds))
-        return [rc for (rc, _, _), has_ended in zip(holds, ended, strict=True) if not has_ended]
+        confirmed = await asyncio.gather(*(self._end(hold, reason, lease_until_s, free_by_s) for hold in holds))
+        return [rc for (rc, _, _), has_confirmed in zip(holds, confirmed, strict=True) if not has_confirmed]
 
-    async def _end(self, hold: Hold, reason: str, lease_until_s: float, also_down: bool) -> bool:
-        """Return whether the RC confirmed, or is down and was left."""
+    async def _end(self, hold: Hold, reason: str, lease_until_s: float, free_by_s: float) -> bool:
+        """Return whether the RC confirmed that it is disconnected."""
         rc, arc, epoch = hold
         complain = self._note
-        while (left_s := (lease_until_s - self._clock.now_s()) / self._clock.rate) > 0:
+        while (left_s := self._real_s(lease_until_s)) > 0:
+            within_s = min(RC_REPLY_S, left_s, max(CONFIRM_S, self._real_s(free_by_s)))
             try:
-                within_s = min(RC_REPLY_S, left_s)
                 await self._bus.ask(_in_pool(rc), Disconnect(arc, epoch, reason), Disconnected, within_s=within_s)
                 return True
             except (Refusal, LinkError) as error:
                 complain(rc, f"did not confirm its disconnection from {arc}: {error}")
                 complain = _keep_quiet
-                if isinstance(error, Refusal):  # its hardware does not obey, and comes to rest by itself if at all
-                    await self._clock.sleep_until_s(lease_until_s)
-                    return False
-            if self._is_down(rc) and not also_down:
-                self._left.setdefault(rc, {})[hold] = lease_until_s
-                return True
-            await self._clock.sleep_s(min(ASK_AGAIN_S, left_s) * self._clock.rate)
+                does_not_obey = isinstance(error, Refusal)  # its hardware comes to rest by itself if at all
+            if free_by_s < math.inf and self._may_leave(rc, arc) and self._real_s(free_by_s) < ASK_AGAIN_S:
+                self._left[rc][hold] = lease_until_s
+                return False
+            pause_s = left_s if does_not_obey else min(ASK_AGAIN_S, left_s)
+            await self._clock.sleep_s(pause_s * self._clock.rate)
         return False
+
+    def _real_s(self, until_s: float) -> float:
+        """Return for how long it is until then by people's clocks."""
+        return (until_s - self._clock.now_s()) / self._clock.rate
 
 
 def _keep_quiet(_subject: str, _what: str) -> None:

@@ -148,7 +148,7 @@ class RcManager(Component[RcManagerParameters]):
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
-        self._context_switch = ContextSwitch(bus, clock, self.story.note, lambda rc: rc not in self._running_rcs)
+        self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._roll_call = RollCall(bus, clock)
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
@@ -337,11 +337,21 @@ class RcManager(Component[RcManagerParameters]):
             self._meet_in_a_while(failed)
 
     async def _revoke(self, order: RevokeArc) -> None:
-        for rc in await self._context_switch.revoke(order):
+        release_s = max(self._resources[rc].disconnect_s for rc in order.epochs)
+        for rc in await self._context_switch.revoke(order, self.parameters.grace_s + release_s):
+            self._does_not_answer(rc)
+        self.happened(Freed(order.arc))
+
+    def _may_leave(self, rc: str, arc: str) -> bool:
+        """Say whether nobody but this ARC would lose anything if the RC were down."""
+        return rc not in self._running_rcs or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
+
+    def _does_not_answer(self, rc: str) -> None:
+        """Count the RC as down from now on, until it answers and is cleared."""
+        if rc in self._running_rcs:
             self._running_rcs.discard(rc)
             self.happened(RcWentDown(rc))
-            self._meet_in_a_while(rc)
-        self.happened(Freed(order.arc))
+            self.start_task(self._meet_again(rc), f"meet {rc}")
 
     def _measure_switch(self, order: ConnectArc) -> None:
         """Keep the time since these RCs were revoked from another ARC, settling not counted."""
@@ -387,8 +397,9 @@ class RcManager(Component[RcManagerParameters]):
         state = await self._ask_rc(rc)
         if state is None:
             return False
-        if rc not in self._running_rcs:
-            await self._context_switch.clear(rc, [(rc, holder.arc, holder.epoch) for holder in state.holders])
+        holds = [(rc, holder.arc, holder.epoch) for holder in state.holders]
+        if rc not in self._running_rcs and not await self._context_switch.clear(rc, holds):
+            return False
         if rc not in self._running_rcs:
             if self._faults.pop(rc, ""):
                 self.story.note(rc, "makes sense again")
@@ -504,7 +515,8 @@ class RcManager(Component[RcManagerParameters]):
             self._failing_rcs.discard(rc)
 
     async def _meet_again(self, rc: str) -> None:
-        await self._meet_rc(rc)
+        if not await self._meet_rc(rc):
+            self._meet_in_a_while(rc)
 
     def _heard_rc(self, envelope: Envelope[Any]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""

@@ -6,7 +6,7 @@ The laws, by name:
 * epochs-grow: every hold of an RC has a larger epoch than all before it, over all restarts.
 * fenced: once a robot was commanded under an epoch, no packet of an older one goes on the air to it; and none
   but the safe packet once it was given to the next; and none outside of its ARC's hold of the radio.
-* freed: an ARC of which the RC manager says that its RCs are free has no RC any more.
+* freed: an ARC of which the RC manager says that its RCs are free has none any more of those that are up.
 * safe: who commanded a robot through a radio leaves it safe: the safe packet is the last it hears from it.
 * whole-set: a gate opens only over RCs that were all connected to its ARC under just these epochs.
 * true: what an owner believes agrees with its ARC's gate, and the gate with the RCs, but for known delays.
@@ -26,7 +26,7 @@ of the mission.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field
 
 from backbone.rc_manager.messages import LEASE_S
@@ -142,6 +142,8 @@ class _Judge:
         self._gates: dict[str, dict[str, int]] = {}
         self._beliefs: dict[str, _Belief] = {owner.name: _Belief() for owner in shape.owners}
         self._doubts: dict[tuple[str, ...], float] = {}
+        self._free: set[str] = set()
+        self._down: set[str] = set()
         self._calm_s: float | None = None
         self._wanting: dict[str, float] = {}
         self._granted: dict[str, float] = {}
@@ -160,7 +162,12 @@ class _Judge:
             case "packet":
                 yield from self._packet(h)
             case "free":
-                self._must_be_free(h, h.values["arc"])
+                self._free.add(h.values["arc"])
+                self._must_be_free(h, self._holds.keys() - self._down)
+            case "connect":
+                self._free.discard(h.values["arc"])
+            case "rc_state":
+                self._rc_state(h, h.values["id"], h.values["state"])
             case "open":
                 yield from self._open(h)
             case "shut":
@@ -203,10 +210,17 @@ class _Judge:
         self._connected.add((h.who, arc, epoch))
         self._sent.setdefault(h.who, {})[arc] = _Sent(epoch)
 
-    def _must_be_free(self, h: Happening, arc: str) -> None:
-        for rc, holders in self._holds.items():
-            if arc in holders:
-                self._doubts[FREED, arc, rc, str(holders[arc])] = h.at_s
+    def _must_be_free(self, h: Happening, rcs: Set[str]) -> None:
+        """From now on no ARC that is called free has one of these RCs."""
+        held = ((rc, arc, epoch) for rc in sorted(rcs) for arc, epoch in self._holds[rc].items())
+        self._doubts |= {(FREED, arc, rc, str(epoch)): h.at_s for rc, arc, epoch in held if arc in self._free}
+
+    def _rc_state(self, h: Happening, rc: str, state: str) -> None:
+        if state == "down":
+            self._down.add(rc)
+        else:
+            self._down.discard(rc)
+            self._must_be_free(h, {rc})
 
     def _let_go(self, h: Happening, arc: str, epoch: int) -> Iterator[Broken]:
         if (h.who, arc, epoch) in self._to_keep and h.at_s < self._keep_until_s:
@@ -292,7 +306,8 @@ class _Judge:
         doubts |= {
             doubt
             for doubt in self._doubts
-            if doubt[0] == FREED and self._holds[doubt[2]].get(doubt[1]) == int(doubt[3])
+            if doubt[0] == FREED and doubt[2] not in self._down
+            if self._holds[doubt[2]].get(doubt[1]) == int(doubt[3])
         }
         self._doubts = {doubt: self._doubts.get(doubt, now_s) for doubt in sorted(doubts)}
 

@@ -47,9 +47,11 @@ class Terminal:
         )
         return done.stdout
 
-    def open(self, *command: str) -> None:
-        words = " ".join([str(BIN / command[0]), *command[1:]])
-        self.tmux("new-session", "-d", "-x", str(COLUMNS), "-y", str(LINES), f"{words}; echo ENDED WITH $?; cat")
+    def open(self, *command: str, size: tuple[int, int] = (COLUMNS, LINES), variables: str = "") -> None:
+        """Run a command in a new terminal, which says afterwards how it ended and whether it echoes what is typed."""
+        words = " ".join(["env", variables, str(BIN / command[0]), *command[1:]])
+        after = "echo ENDED WITH $?; stty -a | grep -ow -- '-\\?echo'; cat"
+        self.tmux("new-session", "-d", "-x", str(size[0]), "-y", str(size[1]), f"{words}; {after}")
 
     def press(self, *keys: str) -> None:
         self.tmux("send-keys", *keys)
@@ -88,6 +90,17 @@ def holder(mission: RunningMission, robot: str) -> str:
     return found["holders"][0]["arc"] if found["holders"] else ""
 
 
+def lift(screen: Terminal, robot: str) -> None:
+    """Lift a stop as a person does: look again if it has just been set anew."""
+    deadline = time.monotonic() + SHOWN_WITHIN_S
+    while re.search(rf"{robot} +STOPPED", screen.screen()):
+        assert time.monotonic() < deadline, screen.screen()
+        screen.press("c")
+        screen.shows(rf"lift the stop of {robot}\?")
+        screen.press("l")
+        time.sleep(0.7)  # what came of it is on the screen by then
+
+
 def test_from_attach_to_release_key_by_key(mission: RunningMission, tmp_path: Path) -> None:
     with terminal(mission, tmp_path) as screen:
         screen.open("scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name)
@@ -102,7 +115,9 @@ def test_from_attach_to_release_key_by_key(mission: RunningMission, tmp_path: Pa
         screen.shows(r"commands to scout3")
         screen.press("x")
         screen.shows(r"scout3 is STOPPED by anna")
-        screen.press("c")
+        screen.press("x", "x")
+        screen.shows(r"STOPPED by anna")
+        lift(screen, "scout3")
         screen.shows(r"you hold scout3")
         screen.press("2")
         screen.shows(r"you hold scout2")
@@ -130,13 +145,9 @@ def test_a_monitor_holds_nothing_asks_for_nothing_and_can_still_stop_all_robots(
         screen.press("X")
         screen.shows(r"STOPPED by ben")
         screen.press("BTab", "BTab", "BTab")
-        for _robot in range(3):
-            screen.press("c")
+        for robot in ("scout1", "scout2", "scout3"):
+            lift(screen, robot)
             screen.press("]")
-            time.sleep(0.5)
-        deadline = time.monotonic() + SHOWN_WITHIN_S
-        while "STOPPED" in screen.screen() and time.monotonic() < deadline:
-            time.sleep(0.2)
         assert "STOPPED" not in screen.screen()
         screen.press("q")
         screen.shows(r"ENDED WITH 0")
@@ -160,3 +171,103 @@ def test_a_script_is_told_once_all_that_screens_show(mission: RunningMission) ->
     assert [node["name"] for node in view["tree"]] == ["surveillance", "watch-scout1", "watch-scout2"]
     assert [row["rc"] for row in view["timeline"]["rows"]]
     assert not view["own"]["is_asked"]
+
+
+# ---------------------------------------------------------------------- whatever the terminal
+TERMINALS = ["TERM=xterm-256color", "TERM=vt100", "TERM=dumb", "NO_COLOR=1", "TEXTUAL_THEME=textual-light"]
+KEYS_OF_A_CONSOLE = [*"wasdjtrpmMgnkKyiev", "Up", "Space", "Tab", "BTab", "+", "-", "?", "[", "]", "x", "X", "c", "l"]
+KEYS_OF_THE_DESIGNER = [*"aenxudctw+-<>JK?", "Tab", "BTab", "Up", "Down", "Space", "Delete"]
+
+
+def press_all_twice(screen: Terminal, keys: list[str]) -> None:
+    """Press each key twice at once, then close what it opened."""
+    for key in keys:
+        screen.press(key, key)
+        screen.press("Enter", "Enter")
+        screen.press("Escape")
+        time.sleep(0.15)  # a terminal tells escape from the begin of another key by a pause
+        screen.press("Escape")
+        time.sleep(0.15)
+        assert "ENDED WITH" not in screen.screen(), f"{key} twice ended it\n{screen.screen()}"
+
+
+def ended_well(screen: Terminal, code: int) -> None:
+    """Check that the program ended with this code, without a traceback, and gave the terminal back as it was."""
+    shown = screen.shows(rf"ENDED WITH {code}\n-?echo")
+    assert re.search(r"^echo$", shown, re.MULTILINE), shown
+    assert "Traceback" not in shown
+    assert screen.tmux("display-message", "-p", "#{alternate_on}").strip() == "0"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (200, 60)], ids=str)
+@pytest.mark.parametrize("variables", TERMINALS)
+def test_no_key_pressed_twice_ends_a_console_in_any_terminal(
+    mission: RunningMission, tmp_path: Path, variables: str, size: tuple[int, int]
+) -> None:
+    with terminal(mission, tmp_path) as screen:
+        command = ["scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name]
+        screen.open(*command, size=size, variables=variables)
+        screen.shows(r"you hold scout3")
+        press_all_twice(screen, KEYS_OF_A_CONSOLE)
+        screen.press("q")
+        ended_well(screen, 0)
+
+
+@pytest.mark.parametrize("variables", TERMINALS)
+def test_a_console_is_drawn_in_any_terminal_and_ctrl_c_ends_it(
+    mission: RunningMission, tmp_path: Path, variables: str
+) -> None:
+    with terminal(mission, tmp_path) as screen:
+        command = ["scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name]
+        screen.open(*command, size=(80, 24), variables=variables)
+        screen.shows(r"you hold scout3")
+        screen.press("p")
+        screen.shows(r"which robot\?")
+        screen.press("Enter", "Enter")
+        screen.shows(r"you hold scout1")
+        screen.press("C-c")
+        ended_well(screen, 130)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variables", TERMINALS)
+def test_no_key_pressed_twice_ends_the_designer_in_any_terminal(
+    mission: RunningMission, tmp_path: Path, variables: str
+) -> None:
+    with terminal(mission, tmp_path) as screen:
+        screen.open("scout-console", "design", str(tmp_path / "guard.xml"), size=(80, 24), variables=variables)
+        screen.shows(r"guard.xml")
+        press_all_twice(screen, KEYS_OF_THE_DESIGNER)
+        screen.press("q", "y")
+        ended_well(screen, 0)
+
+
+CRASHING = """
+import sys
+from ui_console.terminal.app import ConsoleApp
+from ui_console import cli
+
+def crash(self):
+    raise ZeroDivisionError("this console is broken on purpose")
+
+ConsoleApp.action_jump = crash
+sys.argv = sys.argv[1:]
+cli.main()
+"""
+
+
+def test_a_console_that_crashes_gives_its_robot_back_and_the_terminal_and_says_so_by_its_exit_code(
+    mission: RunningMission, tmp_path: Path
+) -> None:
+    program = tmp_path / "crashing.py"
+    program.write_text(CRASHING)
+    with terminal(mission, tmp_path) as screen:
+        words = ["scout-console", "attach", "scout3", "--user", "anna", "--mission", mission.name]
+        screen.open("python", str(program), *words)
+        screen.shows(r"you hold scout3")
+        screen.press("j")
+        shown = screen.shows(r"ENDED WITH 1\n-?echo")
+        assert not holder(mission, "scout3").startswith("console-")
+        assert "broken on purpose" in shown
+        assert re.search(r"^echo$", shown, re.MULTILINE), shown

@@ -1,7 +1,4 @@
-"""``scout-console serve`` beside a running mission: driven by a program, and by a real browser at three sizes.
-
-Screenshots for the documents are kept where ``SCOUT_PICTURES`` says.
-"""
+"""``scout-console serve`` beside a running mission: driven by a program, and by a real browser at three sizes."""
 
 from __future__ import annotations
 
@@ -11,16 +8,16 @@ import json
 import math
 import os
 import re
-import shutil
 import subprocess
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import pytest
+import web_browser
 from running_mission import BIN, MISSION_XML, RunningMission, mission_up
+from web_browser import Cable, Finger, assert_no_sideways_scroll
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
@@ -37,7 +34,6 @@ WORLD = "resource_pool/world"
 SECOND_WATCHER = re.search(
     r'<behavior type="watch_for_motion" name="watch-scout2".*?</behavior>', MISSION_XML.read_text(), re.DOTALL
 )
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
 
 
 @dataclass
@@ -213,94 +209,20 @@ async def holds(bus: Bus, behavior: str) -> bool:
 
 
 # ---------------------------------------------------------------------- a real browser
-class Cable:
-    """A connection to the server that can be pulled out: afterwards nothing passes, and nobody is told."""
-
-    def __init__(self, to_port: int) -> None:
-        self._to_port, self.is_cut, self.port = to_port, False, 0
-        self._tasks: set[asyncio.Task[None]] = set()
-
-    @asynccontextmanager
-    async def plugged_in(self) -> AsyncIterator[Cable]:
-        server = await asyncio.start_server(self._meet, "127.0.0.1", 0)
-        self.port = server.sockets[0].getsockname()[1]
-        try:
-            yield self
-        finally:
-            server.close()
-            for task in list(self._tasks):
-                task.cancel()
-            await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
-        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self._to_port)
-        try:
-            await asyncio.gather(self._carry(reader, far_writer), self._carry(far_reader, writer))
-        finally:
-            writer.close()
-            far_writer.close()
-
-    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with contextlib.suppress(ConnectionError):
-            while data := await reader.read(65536):
-                if not self.is_cut:
-                    writer.write(data)
-                    await writer.drain()
-            if not self.is_cut:
-                writer.close()
-
-
-SIZES = {"desktop": (1280, 860), "tablet": (820, 1180), "phone": (390, 844)}
-
-
 @asynccontextmanager
 async def page_at(size: str, port: int, token: str, script: str = "") -> AsyncIterator[Any]:
-    """Open the page in a browser of this size; anything the page complains about fails the test.
-
-    Args:
-        size: Of ``SIZES``.
-        port: Where the page is.
-        token: What opens it.
-        script: Run before the page's own.
-    """
-    async_api = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
-    if not CHROMIUM:
-        pytest.skip("no Chromium on this machine: apt-get install chromium")
-    width, height = SIZES[size]
-    async with async_api.async_playwright() as playwright:
-        browser = await playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--force-color-profile=srgb"]
-        )
-        try:
-            context = await browser.new_context(
-                viewport={"width": width, "height": height}, has_touch=size != "desktop", is_mobile=size == "phone"
-            )
-            page = await context.new_page()
-            await page.add_init_script(script)
-            page.set_default_timeout(1000 * WITHIN_S)
-            complaints: list[str] = []
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-            await page.goto(f"http://127.0.0.1:{port}/#token={token}&user={size}")
-            await page.wait_for_selector(".robot[data-robot=scout1]")
-            yield page
-            assert [one for one in complaints if "WebSocket" not in one] == []
-        finally:
-            await browser.close()
+    """Open the page in a browser of this size, with a script that is run before its own."""
+    address = f"http://127.0.0.1:{port}/#token={token}"
+    async with web_browser.page_at(size, address, shows=".robot[data-robot=scout1]", script=script) as page:
+        yield page
 
 
 async def keep_picture(page: Any, name: str) -> None:
-    folder = os.environ.get("SCOUT_PICTURES")
-    if folder:
-        seen = page.locator("#alarm-bar button")
-        while await seen.is_visible():
-            await seen.click()
-            await page.wait_for_timeout(300)
-        await page.screenshot(path=Path(folder) / f"web-{name}.jpg", type="jpeg", quality=60)
+    seen = page.locator("#alarm-bar").get_by_role("button", name="Seen")
+    while os.environ.get("SCOUT_PICTURES") and await seen.is_visible():
+        await seen.click()
+        await page.wait_for_timeout(300)
+    await web_browser.keep_picture(page, f"web-{name}")
 
 
 async def shown(page: Any) -> str:
@@ -312,35 +234,6 @@ async def shown(page: Any) -> str:
 async def take(page: Any) -> None:
     await page.locator(".robot[data-robot=scout1]").get_by_role("button", name="Take over").click()
     await page.wait_for_selector("body[data-held=scout1]")
-
-
-async def assert_no_sideways_scroll(page: Any) -> None:
-    overhang_px = await page.locator("html").evaluate("page => page.scrollWidth - page.clientWidth")
-    assert overhang_px <= 0
-
-
-class Finger:
-    """A finger on the drive pad."""
-
-    def __init__(self, page: Any) -> None:
-        self._page = page
-
-    async def push_right(self) -> None:
-        """Put it down in the middle and move it to the right."""
-        self._touches = await self._page.context.new_cdp_session(self._page)
-        await self._page.locator("#pad").scroll_into_view_if_needed()
-        box = await self._page.locator("#pad").bounding_box()
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        await self._send("touchStart", [{"x": x, "y": y}])
-        await self._send("touchMove", [{"x": x + 0.45 * box["width"], "y": y}])
-        await self._page.wait_for_selector("#pad.is-held")
-
-    async def lift(self) -> None:
-        """Take it away."""
-        await self._send("touchEnd", [])
-
-    async def _send(self, kind: str, points: list[dict[str, float]]) -> None:
-        await self._touches.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
 
 async def test_at_a_desk_a_person_watches_drives_by_keys_and_releases(served: Served) -> None:
@@ -377,6 +270,7 @@ async def test_on_a_tablet_a_finger_on_the_pad_drives_and_a_lifted_one_stops(ser
         before = await pose(bus)
         finger = Finger(page)
         await finger.push_right()
+        await page.wait_for_selector("#pad.is-held")
 
         async def moved() -> bool:
             return differs(before, await pose(bus))
@@ -403,6 +297,7 @@ async def test_on_a_phone_that_loses_its_network_the_wheels_stop_and_the_behavio
         await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stale)")
         finger = Finger(page)
         await finger.push_right()
+        await page.wait_for_selector("#pad.is-held")
 
         async def moved() -> bool:
             return differs(before, await pose(bus))
@@ -469,15 +364,20 @@ async def test_an_emergency_stop_holds_against_the_hands_until_it_is_lifted(serv
     async with served.mission.bus() as bus, page_at("desktop", served.port, served.token) as page:
         card = page.locator(".robot[data-robot=scout1]")
         await take(page)
-        await card.get_by_role("button", name="Stop").click()
+        for _ in range(3):
+            await card.get_by_role("button", name="Stop").click()
         await page.wait_for_selector(".robot[data-robot=scout1].is-stopped")
         before = await pose(bus)
         await page.keyboard.down("d")
         await asyncio.sleep(1.0)
         assert not differs(before, await pose(bus))
-        await page.keyboard.up("d")
-        await card.get_by_role("button", name="Let it move").click()
+        await card.locator(".lift").hover()
+        await page.mouse.down()
         await page.wait_for_selector(".robot[data-robot=scout1]:not(.is-stopped)")
+        await page.mouse.up()
+        await asyncio.sleep(1.0)
+        assert not differs(before, await pose(bus)), "the key that is still down was pressed before"
+        await page.keyboard.up("d")
         await page.keyboard.down("d")
 
         async def moved() -> bool:

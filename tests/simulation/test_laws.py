@@ -105,6 +105,17 @@ def test_an_arc_that_is_called_free_and_goes_on_holding_breaks_freed() -> None:
     assert judged(held(1, "scout1", "a-drive", 1), free, let_go(2.1, "scout1", "a-drive", 1), later) is None
 
 
+def test_an_rc_that_is_up_again_and_still_held_by_an_arc_that_is_called_free_breaks_freed() -> None:
+    free: Told = (2, "rc_manager", "free", {"arc": "a-drive"})
+    down: Told = (1.9, "rc_manager", "rc_state", {"id": "scout1", "state": "down"})
+    up: Told = (5, "rc_manager", "rc_state", {"id": "scout1", "state": "up"})
+    later: Told = (6, "mission", "calm", {})
+    begun = (held(1, "scout1", "a-drive", 1), down, free)
+    assert judged(*begun, later) is None
+    assert broken_law(*begun, up, later) == "freed"
+    assert judged(*begun, let_go(4.9, "scout1", "a-drive", 1), up, later) is None
+
+
 def test_a_gate_that_opens_over_what_was_never_connected_breaks_whole_set() -> None:
     opened: Told = (2, "a-drive", "open", {"epochs": {"scout1": 1, "radio1": 1}})
     assert broken_law(held(1, "scout1", "a-drive", 1), opened) == "whole-set"

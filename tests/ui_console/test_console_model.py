@@ -413,3 +413,12 @@ def test_every_event_has_a_word(event: ConsoleEvent) -> None:
 def test_a_schedule_in_json_names_its_fields() -> None:
     line = json.loads(event_json(ScheduleHeard(8.0, SCHEDULE)))
     assert line["schedule"]["rcs"][1]["holders"][0]["arc"] == "watch1-capture"
+
+
+def test_a_slice_that_ends_now_has_no_number_and_one_kept_longer_says_so() -> None:
+    """Schedules that nobody waits in let a console keep its robot beyond its slice."""
+    shown = held_model()
+    assert shown.status_line(GRANT.until_s - 3.0).endswith("slice 3 s")
+    assert "slice" not in shown.status_line(GRANT.until_s - 0.4)
+    assert "slice" not in shown.status_line(GRANT.until_s + 0.4)
+    assert shown.status_line(GRANT.until_s + 7.0).endswith(", beyond its slice")

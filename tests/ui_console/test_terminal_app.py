@@ -6,13 +6,14 @@ import re
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from console_scenes import ASK, GRANT, SCHEDULE, STOP, TEAM_EVENTS, held_model, model
-from numpy.typing import NDArray
 from screen_text import same_as_before, screen_text
 from textual.events import AppBlur, AppFocus
 from textual.widgets import Input
+from written_session import WrittenSession, settle
 
 from ui_console.consent import Consent, Settled, Sought
 from ui_console.console_events import (
@@ -27,102 +28,13 @@ from ui_console.console_events import (
     ScheduleHeard,
     StopHeard,
 )
-from ui_console.console_model import ConsoleModel
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
-from ui_console.terminal.app import (
-    DRIVE_KEYS,
-    DRIVES,
-    PENDANT_DOES,
-    SPEED_MOST_RAD_S,
-    ConsoleApp,
-    PanelName,
-    Profile,
-    read_value,
-)
+from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
+from ui_console.terminal.keys import DRIVES, Profile
+from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import DrivePad, Panel, Video
 
 SIZE = (120, 36)
-
-
-class WrittenSession:
-    """Writes down what keys want."""
-
-    def __init__(self, *events: ConsoleEvent, shown: ConsoleModel | None = None) -> None:
-        self.model = shown or model(*events)
-        self.wanted: list[Any] = []
-        self.touched = 0
-        self.shown: NDArray[np.uint8] | None = None
-        self.is_sure = True
-
-    def picture(self) -> NDArray[np.uint8] | None:
-        return self.shown
-
-    def now_s(self) -> float:
-        return 12.0
-
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
-        self.wanted.append(drive if lasts_s is None else (drive, lasts_s))
-
-    def stop(self) -> None:
-        self.wanted.append("stop")
-
-    def jump(self) -> None:
-        self.wanted.append("jump")
-
-    def take(self) -> None:
-        self.wanted.append("take")
-
-    def release(self) -> None:
-        self.wanted.append("release")
-
-    def ask_consent(self, why: str = "") -> None:
-        self.wanted.append(("may I", why))
-
-    def decide(self, is_given: bool) -> None:
-        self.wanted.append(("decide", is_given))
-
-    async def switch(self, robot: str) -> None:
-        self.wanted.append(("switch", robot))
-
-    def touch(self) -> None:
-        self.touched += 1
-
-    def leave(self) -> None:
-        self.wanted.append("leave")
-
-    def acknowledge(self, key: str) -> None:
-        self.wanted.append(("acknowledge", key))
-        self.model.acknowledge(key)
-
-    async def stop_robot(self, robot: str) -> bool:
-        self.wanted.append(("stop robot", robot))
-        return self.is_sure
-
-    async def stop_all(self) -> list[str]:
-        self.wanted.append("stop all")
-        return [] if self.is_sure else ["scout2"]
-
-    def require_let_go(self) -> None:
-        self.wanted.append("let go")
-
-    def dismiss_lost(self) -> None:
-        self.wanted.append("dismiss lost")
-
-    async def lift_stop(self, robot: str, number: int) -> bool:
-        self.wanted.append(("lift", robot, number))
-        return True
-
-    async def why(self, name: str) -> list[str]:
-        self.wanted.append(("why", name))
-        return [f"{name}: waiting", "  watch1 has its minimum run time"]
-
-    async def ask_parameters(self, name: str) -> bool:
-        self.wanted.append(("ask", name))
-        return True
-
-    async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
-        self.wanted.append(("set", name, parameter, value))
-        return self.is_sure
 
 
 FORWARD, BACKWARD = Drive(4.0, 4.0), Drive(-4.0, -4.0)
@@ -146,6 +58,8 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("n", [("decide", False)]),
     ("x", ["stop", ("stop robot", "scout1")]),
     ("X", ["stop", "stop all"]),
+    ("alt+x", ["stop", ("stop robot", "scout1")]),
+    ("alt+shift+x", ["stop", "stop all"]),
     ("c", []),
     ("1", [("switch", "scout1")]),
     ("2", [("switch", "scout2")]),
@@ -156,21 +70,6 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("K", [("acknowledge", "")]),
     ("enter", []),
 ]
-
-
-async def settle(pilot: Any) -> None:
-    """Return when what keys began is done and drawn."""
-    await pilot.app.workers.wait_for_complete()
-    await pilot.pause()
-    await pilot.pause()
-
-
-async def test_a_lift_names_the_stop_that_is_on_the_screen() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), StopHeard(11.0, STOP))
-    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
-        await pilot.press("c")
-        await settle(pilot)
-        assert session.wanted == [("lift", "scout1", STOP.number)]
 
 
 async def test_every_key_does_what_it_says() -> None:
@@ -197,6 +96,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
         "shift+tab",
         "q",
         "ctrl+c",
+        "ctrl+q",
         "v",
         "question_mark",
         "f1",
@@ -204,7 +104,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
     }
     elsewhere |= {"left_square_bracket", "pageup", "right_square_bracket", "pagedown", "4", "5", "6", "7", "8", "9"}
     known = set(ConsoleApp(WrittenSession())._bindings.key_to_bindings)  # noqa: SLF001  what the footer is made of
-    assert known - {"ctrl+q"} == {key for key, _wanted in KEYS} | elsewhere
+    assert known == {key for key, _wanted in KEYS} | elsewhere
 
 
 def test_the_reference_names_every_key_and_who_has_it() -> None:
@@ -218,7 +118,7 @@ def test_the_reference_names_every_key_and_who_has_it() -> None:
         screen = ConsoleApp(WrittenSession(), profile=profile)
         bindings = screen._bindings.key_to_bindings  # noqa: SLF001  what the footer is made of
         can = {key for key, found in bindings.items() if screen.check_action(found[0].action.partition("(")[0], ())}
-        assert {key for key, who in listed.items() if name in who} == can - {"ctrl+q"}
+        assert {key for key, who in listed.items() if name in who} == can
 
 
 async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds() -> None:
@@ -231,13 +131,14 @@ async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds()
         assert screen.speed_rad_s == SPEED_MOST_RAD_S
 
 
-@pytest.mark.parametrize("key", ["q", "ctrl+c"])
-async def test_q_and_ctrl_c_quit(key: str) -> None:
+@pytest.mark.parametrize(("key", "code"), [("q", 0), ("ctrl+q", 0), ("ctrl+c", 130)])
+async def test_q_and_ctrl_c_quit_and_say_how_it_ended(key: str, code: int) -> None:
     screen = ConsoleApp(WrittenSession())
     async with screen.run_test() as pilot:
         await pilot.press(key)
         await pilot.pause()
         assert not screen.is_running
+    assert screen.return_code == code
 
 
 async def test_leaving_the_window_stops_the_wheels_and_coming_back_is_noticed() -> None:
@@ -283,14 +184,6 @@ async def test_a_stop_nobody_confirmed_is_said_aloud(key: str, said: str) -> Non
         await settle(pilot)
         await pilot.pause()
         assert said in screen_text(pilot.app)
-
-
-async def test_all_robots_can_be_stopped_with_a_dialog_in_front() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
-    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
-        await pilot.press("p", "X")
-        await settle(pilot)
-    assert "stop all" in session.wanted
 
 
 # ---------------------------------------------------------------------- robots, tables, dialogs
@@ -368,7 +261,7 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
     screen = ConsoleApp(session)
     async with screen.run_test(size=(160, 36)) as pilot:
         await settle(pilot)
-        assert "ben asks for scout1: my robot is stuck [g: let go, n: keep; 6 s]" in screen_text(screen)
+        assert "ben asks for scout1: my robot is stuck [g: yes, n: no; 6 s]" in screen_text(screen)
         await pilot.press("g")
         assert session.wanted[-1] == ("decide", True)
         shown.apply(ConsentSettled(12.0, Settled(sought, Consent(True, "anna", ""))))
@@ -377,13 +270,16 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
         assert "ben asks" not in screen_text(screen)
 
 
-async def test_a_pendants_holder_lets_go_with_the_key_that_releases() -> None:
+async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
     shown = held_model()
     shown.apply(ConsentSought(11.0, Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0)))
-    screen = ConsoleApp(WrittenSession(shown=shown), profile=Profile.PENDANT)
-    async with screen.run_test(size=(160, 20)) as pilot:
+    session = WrittenSession(shown=shown)
+    screen = ConsoleApp(session, profile=Profile.PENDANT)
+    async with screen.run_test(size=(50, 20)) as pilot:
         await settle(pilot)
-        assert "ben asks for scout1: stuck [enter: let go; 6 s]" in screen_text(screen)
+        assert "ben asks for scout1: stuck [g: yes, n: no; 6 s]" in " ".join(screen_text(screen).split())
+        await pilot.press("n")
+    assert session.wanted == [("decide", False)]
 
 
 async def test_who_asks_may_say_why_and_sees_what_came_of_it() -> None:
@@ -478,14 +374,17 @@ async def test_a_monitor_has_no_keys_that_drive() -> None:
     assert {"drive", "jump", "take", "release"} <= DRIVES
 
 
-async def test_a_pendant_drives_with_six_keys_and_knows_no_other() -> None:
+async def test_a_pendant_drives_with_six_keys_and_stops_with_two_more() -> None:
     session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
     async with ConsoleApp(session, profile=Profile.PENDANT).run_test(size=(50, 20)) as pilot:
         await pilot.press("up", "down", "left", "right", "space", "enter")
-        await pilot.press("j", "t", "r", "y", "x", "1", "p", "v", "k")
+        await pilot.press("j", "t", "r", "y", "1", "p", "v", "k")
         await settle(pilot)
-    assert session.wanted == [FORWARD, BACKWARD, LEFT, RIGHT, "stop", "take"]
-    assert len(DRIVE_KEYS) + len(PENDANT_DOES - {"drive", "quit"}) == 6
+        assert session.wanted == [FORWARD, BACKWARD, LEFT, RIGHT, "stop", "take"]
+        session.wanted.clear()
+        await pilot.press("x", "X")
+        await settle(pilot)
+    assert session.wanted == ["stop", ("stop robot", "scout1"), "stop", "stop all"]
 
 
 async def test_the_pendants_key_gives_back_what_is_wanted_or_held() -> None:
@@ -578,6 +477,8 @@ async def test_every_table_looks_as_it_did() -> None:
     ("name", "profile", "size", "keys"),
     [
         ("attach-narrow", Profile.TERMINAL, (60, 40), []),
+        ("attach-80x24", Profile.TERMINAL, (80, 24), []),
+        ("dialog-lift", Profile.TERMINAL, (80, 24), ["c"]),
         ("attach-video-only", Profile.TERMINAL, (80, 24), ["v"]),
         ("pendant", Profile.PENDANT, (50, 20), []),
         ("monitor", Profile.MONITOR, SIZE, []),
@@ -591,6 +492,8 @@ async def test_every_screen_looks_as_it_did(
     name: str, profile: Profile, size: tuple[int, int], keys: list[str]
 ) -> None:
     session = WrittenSession(shown=held_model())
+    if name == "dialog-lift":
+        session.model.apply(StopHeard(11.0, msgspec.structs.replace(STOP, by="ben")))
     session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
     screen = ConsoleApp(session, profile=profile)
     async with screen.run_test(size=size) as pilot:

@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rich.terminal_theme import DIMMED_MONOKAI
+from textual.color import Color
+from textual.filter import ANSIToTruecolor
 
 from ui_console.terminal.pixels import (
     CHUNK_BYTES,
+    IMAGE,
     MOST_ROWS,
     PLACEHOLDER,
     ROW_MARKS,
@@ -54,6 +58,13 @@ def test_rows_of_placeholders_are_as_wide_as_asked_for_and_say_which_row_they_ar
     assert all(unicodedata.combining(mark) == 230 for mark in ROW_MARKS)
 
 
+def test_the_color_that_names_the_picture_stays_as_it_is_on_the_way_to_the_terminal() -> None:
+    on_its_way = ANSIToTruecolor(DIMMED_MONOKAI).apply([row_of_cells(0, 3)], Color(0, 0, 0))
+    color = on_its_way[0].style.color if on_its_way[0].style is not None else None
+    assert color is not None
+    assert color.triplet == (0, 0, IMAGE)
+
+
 @pytest.mark.parametrize(
     ("environment", "can"),
     [
@@ -61,6 +72,7 @@ def test_rows_of_placeholders_are_as_wide_as_asked_for_and_say_which_row_they_ar
         ({"TERM": "xterm-256color", "KITTY_WINDOW_ID": "1"}, True),
         ({"TERM": "xterm-256color", "TERM_PROGRAM": "ghostty"}, True),
         ({"TERM": "xterm-kitty", "TMUX": "default,1,0"}, False),
+        ({"TERM": "xterm-kitty", "NO_COLOR": "1"}, False),
         ({"TERM": "xterm-256color"}, False),
         ({}, False),
     ],

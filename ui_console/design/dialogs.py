@@ -1,41 +1,31 @@
-"""What covers the designer's screen for a moment: pick one, answer one question, read something."""
+"""What covers the designer's screen for a moment: pick one, answer one question."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, TypeVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical, VerticalScroll
-from textual.screen import ModalScreen
+from textual.containers import Vertical
 from textual.suggester import SuggestFromList
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
 from ui_console.design.offers import Asked
+from ui_console.terminal.dialogs import CSS as DIALOG_CSS
+from ui_console.terminal.dialogs import Dialog
 
-T = TypeVar("T")
 CHOICES_TOLD = 12  # chosen: fits two lines
-CSS = """
-Dialog { align: center middle; background: $background; }
-Dialog > Vertical { width: 80%; max-width: 100; height: auto; max-height: 90%; padding: 0 1; }
-Dialog > Vertical { border: thick $primary; background: $surface; }
+CSS = (
+    DIALOG_CSS
+    + """
+Dialog { background: $background; }
 Dialog OptionList { height: 12; }
 Dialog #doc { margin-top: 1; height: 12; }
-Dialog VerticalScroll { height: auto; max-height: 100%; }
 """
-
-
-class Dialog(ModalScreen[T]):
-    """Base of all; escape closes it, changes nothing and answers None."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "close", "close")]
-
-    def action_close(self) -> None:
-        """Close it."""
-        self.dismiss(None)
+)
 
 
 class Picker(Dialog[int | None]):
@@ -74,7 +64,7 @@ class Picker(Dialog[int | None]):
         """Answer."""
         number = self._number()
         if number is not None:
-            self.dismiss(number)
+            self.answer(number)
 
     def on_option_list_option_highlighted(self, _event: OptionList.OptionHighlighted) -> None:
         """Explain it."""
@@ -84,7 +74,7 @@ class Picker(Dialog[int | None]):
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Answer a mouse."""
-        self.dismiss(int(event.option.id or 0))
+        self.answer(int(event.option.id or 0))
 
     def action_move(self, steps: int) -> None:
         """Move in the list."""
@@ -130,7 +120,7 @@ class Ask(Dialog[str | None]):
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Answer."""
-        self.dismiss(event.value)
+        self.answer(event.value)
 
 
 class Sure(Dialog[bool | None]):
@@ -150,21 +140,4 @@ class Sure(Dialog[bool | None]):
 
     def action_yes(self) -> None:
         """Answer."""
-        self.dismiss(True)
-
-
-class Reading(Dialog[None]):
-    """Something to read, with the cursor keys if it is long."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("enter,space,q", "close", "close")]
-
-    def __init__(self, title: str, lines: Sequence[str]) -> None:
-        super().__init__()
-        self._title, self._lines = title, lines
-
-    def compose(self) -> ComposeResult:
-        """Lay out the text."""
-        with Vertical() as box:
-            box.border_title = self._title
-            with VerticalScroll():
-                yield Static(Text("\n".join(self._lines)))
+        self.answer(True)

@@ -39,12 +39,14 @@ class Asked:
         doc: What it means.
         proposed: What is proposed.
         choices: What makes sense, if it can be listed.
+        is_required: False: no answer is an answer.
     """
 
     name: str
     doc: str
     proposed: str = ""
     choices: tuple[str, ...] = ()
+    is_required: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +237,10 @@ def _types(mission: Node) -> list[Offer]:
 
 def _parameter(node: Node) -> Offer:
     rules = vocabulary()["parameter"].attributes
-    asks = (Asked("name", rules["name"].documentation), Asked("value", rules["value"].documentation))
+    asks = (
+        Asked("name", rules["name"].documentation),
+        Asked("value", rules["value"].documentation, is_required=False),
+    )
     return Offer(
         "parameter",
         vocabulary()["parameter"].documentation,

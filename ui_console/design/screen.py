@@ -23,14 +23,15 @@ from backbone.mission.edit import Node, Path
 from ui_console.design.catalogue import ClassFacts, TypeEntry, description, entries, stock_classes
 from ui_console.design.commands import Command, Move, Remove, SetValue
 from ui_console.design.dialogs import CSS as DIALOG_CSS
-from ui_console.design.dialogs import Ask, Picker, Reading, Sure
+from ui_console.design.dialogs import Ask, Picker, Sure
 from ui_console.design.draft import Draft
 from ui_console.design.file import FileChanged, save
 from ui_console.design.following import follower
 from ui_console.design.lines import key_of, path_of, problem_rows, property_rows, rehearsal_rows, tree_rows
 from ui_console.design.offers import Asked, Offer, offers
 from ui_console.design.properties import Property, properties
-from ui_console.terminal.lines import Row
+from ui_console.terminal.dialogs import Reading
+from ui_console.terminal.lines import Row, plural
 from ui_console.terminal.widgets import Panel
 
 LookUp = Callable[[Sequence[str]], Awaitable[dict[str, ClassFacts]]]
@@ -105,7 +106,8 @@ class DesignApp(App[None]):
         Binding("s,ctrl+s", "save", "save"),
         Binding("w", "save_as", "save as", show=False),
         Binding("question_mark,f1", "keys", "keys"),
-        Binding("q,ctrl+c", "leave", "quit"),
+        Binding("q", "leave", "quit"),
+        Binding("ctrl+c,ctrl+q", "leave", "quit", show=False, priority=True),
     ]
 
     def __init__(self, draft: Draft, look_up: LookUp) -> None:
@@ -128,7 +130,7 @@ class DesignApp(App[None]):
             with Vertical(id="right"):
                 yield DesignPanel(PanelName.PROPERTIES)
                 yield Static(id="meaning")
-        yield DesignPanel(PanelName.PROBLEMS, wraps=True)
+        yield DesignPanel(PanelName.PROBLEMS)
         yield Footer(compact=True)
 
     def on_mount(self) -> None:
@@ -181,7 +183,7 @@ class DesignApp(App[None]):
         count = len(draft.problems)
         state = Text(f" {draft.source}", style="bold")
         state.append("  changed" if draft.is_changed else "  saved", "yellow" if draft.is_changed else "green")
-        state.append(f"  {count} problem{'s' * (count != 1)}" if count else "  fine", "bold red" if count else "green")
+        state.append(f"  {plural(count, 'problem')}" if count else "  fine", "bold red" if count else "green")
         return state.append(f"  line {self.node.line}", "dim")
 
     # ------------------------------------------------------------------ moving about
@@ -416,13 +418,15 @@ class DesignApp(App[None]):
             self.notify(str(refusal), title="not saved", severity="error", markup=False)
             return
         count = len(self.draft.problems)
-        told = f"saved, with {count} problem{'s' * (count != 1)}" if count else "saved; check says that it is fine"
+        told = f"saved, with {plural(count, 'problem')}" if count else "saved; check says that it is fine"
         self.notify(told, severity="warning" if count else "information", markup=False)
         self.redraw()
 
     @work
     async def action_leave(self) -> None:
         """End; ask first if something is not saved."""
+        if isinstance(self.screen, Sure):
+            return
         if self.draft.is_changed:
             is_sure = await self.push_screen_wait(Sure("What you changed is not saved. Leave?"))
             if not is_sure:

@@ -90,6 +90,7 @@ class AskedView(msgspec.Struct, frozen=True):
     doc: str
     proposed: str
     choices: tuple[str, ...]
+    is_required: bool
 
 
 class OfferView(msgspec.Struct, frozen=True):
@@ -259,7 +260,7 @@ def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
         offer: The offer.
         class_doc: What the class of its type says of itself, of which the first line is told; empty: not known.
     """
-    asks = tuple(AskedView(one.name, one.doc, one.proposed, one.choices) for one in offer.asks)
+    asks = tuple(AskedView(one.name, one.doc, one.proposed, one.choices, one.is_required) for one in offer.asks)
     return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, asks)
 
 

@@ -1,188 +1,42 @@
 """The console in a terminal: live picture, who holds what and why, keys to drive.
 
-Widgets are thin: what they show is in ``ConsoleModel``, what keys do is in the session.
+Widgets are thin: what they show is in ``ConsoleModel``, what keys do is in the session, which keys there are in
+``keys``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import StrEnum
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, TypeVar
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
+from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
-from textual.events import AppBlur, AppFocus, Key, MouseDown
+from textual.events import AppBlur, AppFocus, Key, MouseDown, Resize, Unmount
 from textual.screen import Screen
-from textual.widgets import Footer, Static
+from textual.widgets import Input, Static
 
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import Direction, Drive, drive_towards
+from backbone.cli import ExitCode
+from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
-from ui_console.terminal.dialogs import Question, Reading, RobotPicker
-from ui_console.terminal.lines import (
-    Row,
-    alarm_rows,
-    component_rows,
-    link_rows,
-    log_rows,
-    parameter_rows,
-    request_rows,
-    robot_rows,
-    status_text,
-    timeline_rows,
-    tree_rows,
-)
-from ui_console.terminal.widgets import DrivePad, Panel, Video
+from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
+from ui_console.terminal.head import head
+from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
+from ui_console.terminal.lines import Row, robot_rows
+from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
+from ui_console.terminal.verbs import Session
+from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
 from ui_console.views import AlarmView, ConsoleView
 
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
 SPEED_RAD_S, SPEED_STEP_RAD_S, SPEED_MOST_RAD_S = 4.0, 1.0, 15.0  # chosen: a walk, fine steps, a Scout's most
-MOST_PICKED_BY_KEY = 9
-
-
-class Profile(StrEnum):
-    """How a console looks."""
-
-    TERMINAL = "terminal"  # picture, tables, keys
-    PENDANT = "pendant"  # six keys and the state of one robot; the picture is on a video monitor
-    MONITOR = "monitor"  # tables only; drives nothing
-
-
-class PanelName(StrEnum):
-    """The tables, in the order in which tab goes through them."""
-
-    ROBOTS = "robots"
-    TREE = "tree"
-    SCHEDULE = "schedule"
-    TIMELINE = "timeline"
-    ALARMS = "alarms"
-    LINKS = "links"
-    PARAMETERS = "parameters"
-    COMPONENTS = "components"
-    LOG = "log"
-
-
-NOTHING = {
-    PanelName.ROBOTS: "no robot is known yet",
-    PanelName.TREE: "no behavior is known yet",
-    PanelName.SCHEDULE: "nobody asks",
-    PanelName.TIMELINE: "nothing was held yet",
-    PanelName.ALARMS: "none",
-    PanelName.LINKS: "nothing is known yet",
-    PanelName.PARAMETERS: "i on a row elsewhere asks for its parameters, e here changes one",
-    PanelName.COMPONENTS: "nobody is known yet",
-    PanelName.LOG: "nothing yet",
-}
-FIXED = (PanelName.ROBOTS, PanelName.ALARMS)
-"""Tables that are always to be seen; the others take turns between them."""
-
-DRIVE_KEYS: list[BindingType] = [
-    Binding("up,w", "drive('forward')", "forward"),
-    Binding("down,s", "drive('backward')", "backward", show=False),
-    Binding("left,a", "drive('left')", "left", show=False),
-    Binding("right,d", "drive('right')", "right", show=False),
-]
-DRIVES = frozenset(
-    {
-        "drive",
-        "stop",
-        "jump",
-        "faster",
-        "release",
-        "take",
-        "take_or_release",
-        "pick",
-        "choose_robot",
-        "bare",
-        "ask_consent",
-        "ask_consent_because",
-        "decide",
-    }
-)
-"""Actions of those who may drive."""
-PENDANT_DOES = frozenset({"drive", "stop", "take_or_release", "quit"})
-"""Four keys to drive, one to stop, one to take and release; closing it is no key one drives by."""
-
-
-class Session(Protocol):
-    """What the keys of a console do."""
-
-    model: ConsoleModel
-
-    def picture(self) -> NDArray[np.uint8] | None:
-        """Return the newest picture, grey levels, shape (height, width), or None."""
-
-    def now_s(self) -> float:
-        """Return the mission time."""
-
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
-        """A drive key is down, or for so long what says so again."""
-
-    def stop(self) -> None:
-        """Stop the wheels now."""
-
-    def jump(self) -> None:
-        """Jump once."""
-
-    def take(self) -> None:
-        """Ask for the robot."""
-
-    def release(self) -> None:
-        """Give the robot back."""
-
-    def ask_consent(self, why: str = "") -> None:
-        """Ask the operator who holds the robot for it."""
-
-    def decide(self, is_given: bool) -> None:
-        """Answer the operator who asks for the robot, or to lift a stop."""
-
-    def require_let_go(self) -> None:
-        """What is held moves nothing until it was let go and pressed anew."""
-
-    def dismiss_lost(self) -> None:
-        """The operator knows that a robot was lost."""
-
-    async def switch(self, robot: str) -> None:
-        """Give the robot back and ask for this one."""
-
-    def touch(self) -> None:
-        """A key was pressed."""
-
-    def leave(self) -> None:
-        """The window is no longer in front."""
-
-    def acknowledge(self, key: str) -> None:
-        """One alarm was seen; all, with an empty key."""
-
-    async def stop_robot(self, robot: str) -> bool:
-        """Emergency stop; return whether it is certain."""
-
-    async def stop_all(self) -> list[str]:
-        """Emergency stop of all; return the robots of which it is not certain."""
-
-    async def lift_stop(self, robot: str, number: int) -> bool:
-        """Let the robot move again, if those who stopped it let it; return whether it may.
-
-        Args:
-            robot: Which.
-            number: Of the stop that was seen on the screen.
-        """
-
-    async def why(self, name: str) -> list[str]:
-        """Return why it is as it is."""
-
-    async def ask_parameters(self, name: str) -> bool:
-        """Have its parameters told; return whether they were."""
-
-    async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
-        """Change one; return whether it was."""
+NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
+A = TypeVar("A")
 
 
 class ConsoleApp(App[None]):
@@ -198,64 +52,44 @@ class ConsoleApp(App[None]):
 
     TITLE = "scout-console"
     ENABLE_COMMAND_PALETTE = False
-    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (90, "-wide")]  # chosen: two tables beside each other need 45 each
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (NARROW_COLUMNS, "-small"), (100, "-wide")]  # chosen: see the CSS
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (30, "-high")]  # chosen: a pad of more lines would take the picture's
     CSS = (
         DIALOG_CSS
         + """
     #status { height: 1; background: $panel; color: $text; }
+    #say { height: auto; max-height: 4; background: $panel; color: $text; padding: 0 1; }
+    #keys { height: auto; background: $panel; color: $text; }
     #body { height: 1fr; }
-    #video { width: 2fr; height: 1fr; }
+    #left { width: 2fr; }
+    #video { width: 1fr; height: 1fr; }
+    #pad { border: round $primary; height: 9; width: 1fr; }
     #side { width: 1fr; min-width: 46; }
-    .panel { border: round $primary; height: auto; padding: 0 1; }
-    #robots { max-height: 12; text-wrap: nowrap; text-overflow: ellipsis; }
-    #turn { text-wrap: nowrap; text-overflow: ellipsis; }
+    .panel { border: round $primary; height: auto; padding: 0 1; text-wrap: nowrap; text-overflow: ellipsis; }
+    #robots { max-height: 12; }
     #alarms { max-height: 9; }
     #turn { height: 1fr; }
     .-chosen { border: round $success; }
-    #pad { border: round $primary; height: 9; width: 1fr; }
+    /* 80 x 24: a picture of 46 x 17 cells, and 32 columns of text beside it */
+    Screen.-small #left { width: 46; }
+    Screen.-small #side { min-width: 0; }
+    Screen.-small .panel { padding: 0; }
+    Screen.-low #pad { height: 5; }
+    Screen.-low #robots { max-height: 8; }
+    Screen.-low #alarms { max-height: 7; }
     Screen.-narrow #body { layout: vertical; }
-    Screen.-narrow #side { width: 1fr; min-width: 0; height: 2fr; }
-    Screen.-narrow #video { width: 1fr; }
-    Screen.-narrow #pad { height: 7; }
-    Screen.-bare #side { display: none; }
-    Screen.-bare Footer { display: none; }
-    Screen.-tables #video { display: none; }
-    Screen.-tables #pad { display: none; }
-    Screen.-tables #side { width: 1fr; }
+    Screen.-narrow #left { width: 1fr; height: 1fr; }
+    Screen.-narrow #side { width: 1fr; min-width: 0; height: 1fr; }
+    Screen.-narrow #pad { height: 5; }
+    Screen.-bare #side, Screen.-bare #pad, Screen.-bare #keys { display: none; }
+    Screen.-bare #left { width: 1fr; }
+    Screen.-tables #left { display: none; }
+    Screen.-tables #side { width: 1fr; height: 1fr; }
     Screen.-pendant #turn { display: none; }
+    Screen.-unlinked #body, Screen.-unlinked #keys { opacity: 45%; }
     """
     )
-    BINDINGS: ClassVar[list[BindingType]] = [
-        *DRIVE_KEYS,
-        Binding("space,escape", "stop", "stop"),
-        Binding("enter", "take_or_release", "take or release"),
-        Binding("t", "take", "take"),
-        Binding("r", "release", "release"),
-        Binding("x", "stop_robot", "STOP ROBOT"),
-        Binding("X", "stop_all", "STOP ALL"),
-        Binding("c", "lift", "lift stop", show=False),
-        Binding("m", "ask_consent", "may I?", show=False),
-        Binding("M", "ask_consent_because", "may I, because", show=False),
-        Binding("g", "decide(True)", "let them have it", show=False),
-        Binding("n", "decide(False)", "keep it", show=False),
-        Binding("j", "jump", "jump", show=False),
-        Binding("plus,equals_sign", "faster(1)", "faster", show=False),
-        Binding("minus", "faster(-1)", "slower", show=False),
-        Binding("p", "pick", "pick robot"),
-        *(Binding(str(n), f"choose_robot({n})", f"robot {n}", show=False) for n in range(1, MOST_PICKED_BY_KEY + 1)),
-        Binding("tab", "panel(1)", "table", priority=True),
-        Binding("shift+tab", "panel(-1)", "table before", show=False, priority=True),
-        Binding("left_square_bracket,pageup", "row(-1)", "row up", show=False),
-        Binding("right_square_bracket,pagedown", "row(1)", "row down", show=False),
-        Binding("y", "why", "why"),
-        Binding("k", "acknowledge", "seen"),
-        Binding("K", "acknowledge_all", "all seen", show=False),
-        Binding("i", "ask_parameters", "parameters", show=False),
-        Binding("e", "edit", "edit", show=False),
-        Binding("v", "bare", "video only", show=False),
-        Binding("question_mark,f1", "keys", "keys"),
-        Binding("q,ctrl+c", "quit", "quit"),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = [*KEYS]
 
     def __init__(
         self,
@@ -281,16 +115,18 @@ class ConsoleApp(App[None]):
 
     # ------------------------------------------------------------------ what is shown
     def compose(self) -> ComposeResult:
-        """Lay out: status above, picture left, tables right, keys below."""
+        """Lay out: first lines, picture and drag pad left, tables right, keys below."""
         yield Static(id="status")
+        yield Static(id="say")
         with Horizontal(id="body"):
-            yield Video(self._session.picture, has_pixels=self._has_pixels)
-            with Vertical(id="side"):
-                yield Panel(PanelName.ROBOTS, most_lines=10)
-                yield Panel("turn")
-                yield Panel(PanelName.ALARMS, most_lines=7, wraps=True)
+            with Vertical(id="left"):
+                yield Video(self._session.picture, has_pixels=self._has_pixels)
                 yield DrivePad(lambda: self.speed_rad_s)
-        yield Footer(compact=True)
+            with Vertical(id="side"):
+                yield Panel(PanelName.ROBOTS)
+                yield Panel("turn")
+                yield Panel(PanelName.ALARMS)
+        yield KeyLine(id="keys")
 
     def on_mount(self) -> None:
         """Begin to redraw."""
@@ -304,22 +140,46 @@ class ConsoleApp(App[None]):
         self.set_interval(every_s, self.redraw)
         if self.profile is Profile.TERMINAL:
             self.set_interval(REDRAW_EVERY_S, self.redraw_video)
+        if self.profile is Profile.MONITOR:
+            self.set_interval(TABLES_EVERY_S, self.redraw_if_cut)
+
+    def on_resize(self, _event: Resize) -> None:
+        """Show as much as fits now."""
+        self.call_after_refresh(self.redraw)
+
+    def on_unmount(self, _event: Unmount) -> None:
+        """Let the session know before anything else is done about what ended the screen."""
+        self._session.closed()
+
+    def exit(self, result: None = None, return_code: int = 0, message: Any = None) -> None:
+        """End; what ended by a crash stays a crash."""
+        super().exit(result, return_code or self.return_code or 0, message)
 
     def redraw(self) -> None:
         """Show what the model says now."""
         main = self._main()
         if main is None:
             return
-        now_s = self._session.now_s()
-        view = self._view = self._session.model.view(now_s)
-        speed_rad_s = self.speed_rad_s if self.drives else None
-        main.query_one("#status", Static).update(status_text(view, speed_rad_s, self._hint(view)), layout=False)
+        view = self._view = self._session.model.view(self._session.now_s())
+        main.set_class(view.own.link_down_s >= 0, "-unlinked")
+        self._show_head(main, view)
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)
         turn.border_title = self._turn
         self._show(self._turn, turn, view)
+        keys = hints(view, self.profile, self._robot_meant())
+        main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
+        if isinstance(self.screen, LiftQuestion):
+            subject = self.screen.subject
+            self.screen.look(next((robot.stop for robot in view.robots if robot.robot == subject), None))
         self.redraw_video()
+
+    def redraw_if_cut(self) -> None:
+        """Show at once that the link is down, or up again: nothing looks fresh that is not."""
+        shown = self._view is not None and self._view.own.link_down_s >= 0
+        if (self._session.model.team.link_down_s(self._session.now_s()) >= 0) is not shown:
+            self.redraw()
 
     def redraw_video(self) -> None:
         """Show the newest picture, or why there is none to drive by."""
@@ -339,58 +199,55 @@ class ConsoleApp(App[None]):
         return screens[0] if screens and screens[0].query("#status") else None
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:  # noqa: ARG002
-        """Hide the keys that drive from those who only watch, and all but six from a pendant."""
-        if self.profile is Profile.PENDANT:
-            return action in PENDANT_DOES
-        return action != "take_or_release" and (self.drives or action not in DRIVES)
+        """Hide the keys that this profile does not have."""
+        return has(self.profile, action)
 
-    def _hint(self, view: ConsoleView) -> str:
-        if view.own.away_since_s >= 0:
-            return "you are away: press any key"
-        consent = view.own.consent
-        if consent is not None:
-            keys = "enter: let go" if self.profile is Profile.PENDANT else "g: let go, n: keep"
-            others = f", {consent.others} more" if consent.others else ""
-            return f"{consent.line} [{keys}; {consent.left_s:.0f} s{others}]"
-        if view.own.asked:
-            return view.own.asked
-        unsure = [robot.robot for robot in view.robots if robot.stop is not None and not robot.stop.is_confirmed]
-        return f"NOT SURE that {', '.join(unsure)} stopped" if unsure else ""
+    def _show_head(self, main: Screen[Any], view: ConsoleView) -> None:
+        first = head(view, self.size.width, self.profile, self.speed_rad_s)
+        main.query_one("#status", Static).update(first.status, layout=False)
+        say = main.query_one("#say", Static)
+        say.display = bool(first.says)
+        say.update(Text("\n").join(first.says))
 
     def _show(self, name: PanelName, panel: Panel, view: ConsoleView) -> None:
         is_chosen = name is self.chosen
         panel.set_class(is_chosen, "-chosen")
-        panel.show_rows(self._rows(name, panel, view), is_chosen=is_chosen, nothing=NOTHING[name])
+        rows = table_rows(name, view, panel.content_size.width)
+        panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
-    def _rows(self, name: PanelName, panel: Panel, view: ConsoleView) -> list[Row]:
-        rows: dict[PanelName, Callable[[], list[Row]]] = {
-            PanelName.ROBOTS: lambda: robot_rows(view.robots, view.now_s),
-            PanelName.TREE: lambda: tree_rows(view.tree, view.now_s),
-            PanelName.SCHEDULE: lambda: request_rows(view.requests, view.now_s),
-            PanelName.TIMELINE: lambda: timeline_rows(view.timeline, panel.content_size.width),
-            PanelName.ALARMS: lambda: alarm_rows(view.alarms, view.now_s),
-            PanelName.LINKS: lambda: link_rows(view.links, view.hosts),
-            PanelName.PARAMETERS: lambda: parameter_rows(view.parameters),
-            PanelName.COMPONENTS: lambda: component_rows(view.components),
-            PanelName.LOG: lambda: log_rows(view.log),
-        }
-        return rows[name]()
-
+    # ------------------------------------------------------------------ what is meant
     def _panel(self) -> Panel:
         return self.screen_stack[0].query_one(f"#{self.chosen}" if self.chosen in FIXED else "#turn", Panel)
 
     def _subject(self) -> str:
-        row = self._panel().row
-        return row.subject if row is not None else ""
+        return _subject_of(self._panel().row)
+
+    def _robots_at_hand(self) -> dict[str, str]:
+        """Return the robots that a key may mean, see ``robot_meant``."""
+        names = [robot.robot for robot in self._view.robots] if self._view is not None else []
+        model, panel = self._session.model, self._panel()
+        dialog = self.screen.subject if isinstance(self.screen, Dialog) else ""
+        placed, shown = dialog or _subject_of(panel.placed), _subject_of(panel.row)
+        return {
+            "held": model.robot if model.held is not None else "",
+            "placed": placed if placed in names else "",
+            "wanted": model.robot,
+            "shown": shown if shown in names else names[0] if len(names) == 1 else "",
+        }
 
     def _robot_meant(self) -> str:
-        """Return the robot a stop is for: the one the cursor is on, else the one that is held or wanted."""
-        names = [robot.robot for robot in self._view.robots] if self._view is not None else []
-        subject = self._subject()
-        model = self._session.model
-        if model.held is not None and model.robot:
-            return model.robot
-        return subject if subject in names else model.robot
+        return robot_meant(**self._robots_at_hand())
+
+    def _open(self, dialog: Dialog[A], answered: Callable[[A], object] | None = None) -> None:
+        """Open a dialog; what is held down then, or when it closes, drives no more until it was let go."""
+
+        def closed(answer: A | None) -> None:
+            self._session.require_let_go()
+            if answered is not None and answer is not None:
+                answered(answer)
+
+        self._session.require_let_go()
+        self.push_screen(dialog, closed)
 
     # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
@@ -399,6 +256,10 @@ class ConsoleApp(App[None]):
 
     def on_mouse_down(self, _event: MouseDown) -> None:
         """Take note that somebody is there."""
+        self._session.touch()
+
+    def on_input_changed(self, _event: Input.Changed) -> None:
+        """Take note that somebody is there: a field keeps the keys to itself."""
         self._session.touch()
 
     def action_drive(self, direction: Direction) -> None:
@@ -448,12 +309,7 @@ class ConsoleApp(App[None]):
 
     def action_ask_consent_because(self) -> None:
         """The same, with a sentence that says why."""
-
-        def typed(why: str | None) -> None:
-            if why is not None:
-                self._session.ask_consent(why)
-
-        self.push_screen(Question("may I have it, because", ""), typed)
+        self._open(Question("may I have it, because"), self._session.ask_consent)
 
     def action_decide(self, is_given: bool) -> None:
         """Let the operator who asks have the robot, or keep it."""
@@ -462,6 +318,7 @@ class ConsoleApp(App[None]):
     def on_app_blur(self, _event: AppBlur) -> None:
         """Stop the wheels when the window is left: no key release would be heard there."""
         if self.drives:
+            self.screen_stack[0].query_one(DrivePad).let_go()
             self._session.leave()
 
     def on_app_focus(self, _event: AppFocus) -> None:
@@ -476,21 +333,34 @@ class ConsoleApp(App[None]):
         if not robot:
             self.notify("which robot? move to its row first, or stop all with X", severity="warning")
             return
+        self._session.touch()
         self._session.stop()
         self.run_worker(self._stop_robot(robot), exclusive=False)
 
     def action_stop_all(self) -> None:
         """Stop all robots, whoever holds them."""
+        self._session.touch()
         self._session.stop()
         self.run_worker(self._stop_all(), exclusive=False)
 
     def action_lift(self) -> None:
-        """Let the robot move again."""
-        robot = self._robot_meant()
-        rows = self._view.robots if self._view is not None else []
-        for row in rows:
-            if row.robot == robot and row.stop is not None:
-                self.run_worker(self._session.lift_stop(robot, row.stop.number), exclusive=False)
+        """Show whose stop is meant and why it was set, and lift it if another key says so."""
+        robots = {robot.robot: robot for robot in self._view.robots} if self._view is not None else {}
+        stopped = [name for name, robot in robots.items() if robot.stop is not None]
+        meant = stop_meant(stopped, **self._robots_at_hand())
+        stop = robots[meant].stop if meant else None
+        if stop is None:
+            told = "which one? move to the row of a stopped robot first" if stopped else "no robot is stopped"
+            self.notify(told, severity="warning")
+            return
+        self._open(
+            LiftQuestion(meant, stop), lambda number: self.run_worker(self._lift(meant, number), exclusive=False)
+        )
+
+    async def _lift(self, robot: str, number: int) -> None:
+        if not await self._session.lift_stop(robot, number):
+            self.notify(f"{robot} stays stopped: see the alarms", severity="warning")
+        self.redraw()
 
     async def _stop_robot(self, robot: str) -> None:
         if not await self._session.stop_robot(robot):
@@ -514,12 +384,10 @@ class ConsoleApp(App[None]):
         """Pick a robot from the list."""
         if self._view is None:
             return
-
-        def picked(robot: str | None) -> None:
-            if robot:
-                self.run_worker(self._session.switch(robot), group="switch", exclusive=False)
-
-        self.push_screen(RobotPicker(robot_rows(self._view.robots, self._view.now_s)), picked)
+        self._open(
+            RobotPicker(robot_rows(self._view.robots, self._view.now_s)),
+            lambda robot: self.run_worker(self._session.switch(robot), group="switch", exclusive=False),
+        )
 
     # ------------------------------------------------------------------ tables
     def action_panel(self, steps: int) -> None:
@@ -541,10 +409,12 @@ class ConsoleApp(App[None]):
             self.run_worker(self._why(subject), group="why", exclusive=True)
 
     async def _why(self, subject: str) -> None:
-        self.push_screen(Reading(f"why {subject}?", await self._session.why(subject)))
+        self._open(Reading(f"why {subject}?", await self._session.why(subject)))
 
     def action_acknowledge(self) -> None:
-        """The alarm the cursor is on was seen; without one, the first of the list."""
+        """A robot that was lost is known to be; else the alarm the cursor is on was seen, or the first of the list."""
+        if self._knew_of_lost():
+            return
         shown = self._alarms()
         row = self.screen_stack[0].query_one(f"#{PanelName.ALARMS}", Panel).row
         if shown and row is not None:
@@ -552,9 +422,18 @@ class ConsoleApp(App[None]):
             self.redraw()
 
     def action_acknowledge_all(self) -> None:
-        """All alarms were seen."""
+        """All alarms were seen, and that a robot was lost."""
+        self._knew_of_lost()
         self._session.acknowledge("")
         self.redraw()
+
+    def _knew_of_lost(self) -> bool:
+        """Note that the operator knows of a robot that was lost; return whether one was."""
+        is_lost = self._view is not None and self._view.own.lost is not None
+        if is_lost:
+            self._session.dismiss_lost()
+            self.redraw()
+        return is_lost
 
     def _alarms(self) -> list[AlarmView]:
         return self._view.alarms if self._view is not None else []
@@ -580,11 +459,10 @@ class ConsoleApp(App[None]):
             return
         parameter = found[0]
 
-        def typed(text: str | None) -> None:
-            if text is not None:
-                self.run_worker(self._set(parameter.component, parameter.name, text), group="parameters")
-
-        self.push_screen(Question(f"{parameter.component}.{parameter.name} =", parameter.value), typed)
+        self._open(
+            Question(f"{parameter.component}.{parameter.name} =", parameter.value),
+            lambda text: self.run_worker(self._set(parameter.component, parameter.name, text), group="parameters"),
+        )
 
     async def _set(self, component: str, parameter: str, text: str) -> None:
         if not await self._session.set_parameter(component, parameter, read_value(text)):
@@ -597,21 +475,18 @@ class ConsoleApp(App[None]):
 
     def action_keys(self) -> None:
         """Say what the keys do."""
-        shown = [
-            f"{', '.join(self.get_key_display(one) for one in bindings)}: {description}"
-            for description, bindings in self._keys().items()
-        ]
+        shown = keys_help(self.profile, self.get_key_display)
         if self._has_gamepad:
             shown += ["", "gamepad", *buttons_help()]
-        self.push_screen(Reading("keys", shown))
+        self._open(Reading("keys", shown))
 
-    def _keys(self) -> dict[str, list[Binding]]:
-        found: dict[str, list[Binding]] = {}
-        for binding in self._bindings.key_to_bindings.values():
-            for one in binding:
-                if self.check_action(one.action.partition("(")[0], ()) and not one.action.startswith("choose_robot"):
-                    found.setdefault(one.description, []).append(one)
-        return found
+    def action_interrupt(self) -> None:
+        """Leave as Ctrl-C leaves any program."""
+        self.exit(return_code=ExitCode.INTERRUPTED)
+
+
+def _subject_of(row: Row | None) -> str:
+    return row.subject if row is not None else ""
 
 
 def read_value(text: str) -> object:

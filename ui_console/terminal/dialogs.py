@@ -1,43 +1,72 @@
-"""What covers the screen for a moment: pick a robot, read a reason, change a parameter.
+"""What covers the screen for a moment: pick a robot, read a reason, change a parameter, lift a stop.
 
-Drive keys do nothing meanwhile, so the wheels stop by themselves; the emergency stop of all robots works here too.
+Drive keys do nothing meanwhile, so the wheels stop by themselves. The keys of the emergency stop work here too, also
+while a line is typed.
 """
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Sequence
 from typing import ClassVar, TypeVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.containers import Vertical
+from textual.containers import Vertical, VerticalScroll
 from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ui_console.terminal.lines import Row
+from ui_console.terminal.keys import STOP_KEYS
+from ui_console.terminal.lines import Row, lift_lines
+from ui_console.views import StopView
 
 T = TypeVar("T")
-STOP_ALL = "X"
 CSS = """
 Dialog { align: center middle; }
-Dialog > Vertical { width: 80%; max-width: 100; height: auto; max-height: 80%; padding: 0 1; }
+Dialog > Vertical { width: 90%; max-width: 100; height: auto; max-height: 90%; padding: 0 1; }
 Dialog > Vertical { border: thick $primary; background: $surface; }
 Dialog OptionList { height: auto; max-height: 20; }
+Dialog VerticalScroll { height: auto; max-height: 100%; }
+Dialog .remark { color: $text-muted; }
 """
+READ_S = 0.5  # chosen: nobody reads a line faster
+FIELD_REMARK = "x and X stop robots here too; ctrl+x types an x"
 
 
 class Dialog(ModalScreen[T]):
     """Base of all; escape closes it and changes nothing."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "close", "close"),
-        Binding(STOP_ALL, "app.stop_all", "STOP ALL"),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "close", "close")]
+
+    @property
+    def subject(self) -> str:
+        """The name the dialog's cursor is on; empty: it has no cursor."""
+        return ""
+
+    def answer(self, result: T | None) -> None:
+        """Close with this answer; of several that keys pressed in a burst give, the first counts."""
+        if self.is_active:
+            self.dismiss(result)
 
     def action_close(self) -> None:
         """Close it."""
-        self.dismiss(None)
+        self.answer(None)
+
+
+class Field(Input):
+    """One line to type in; the keys of the emergency stop are never typed."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("ctrl+x", "type_x", "type an x", show=False)]
+
+    def check_consume_key(self, key: str, character: str | None) -> bool:
+        """Say whether the key is text; the keys of the emergency stop never are."""
+        return key not in STOP_KEYS and super().check_consume_key(key, character)
+
+    def action_type_x(self) -> None:
+        """Type an x."""
+        self.replace("x", *self.selection)
 
 
 class RobotPicker(Dialog[str]):
@@ -47,6 +76,12 @@ class RobotPicker(Dialog[str]):
         super().__init__()
         self._robots = robots
 
+    @property
+    def subject(self) -> str:
+        """The robot the cursor is on."""
+        chosen = self.query_one(OptionList).highlighted
+        return self._robots[chosen].subject if chosen is not None else ""
+
     def compose(self) -> ComposeResult:
         """Lay out the list."""
         with Vertical() as box:
@@ -55,15 +90,15 @@ class RobotPicker(Dialog[str]):
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Answer."""
-        self.dismiss(event.option.id)
+        self.answer(event.option.id)
 
 
 class Reading(Dialog[None]):
-    """Something to read."""
+    """Something to read, with the cursor keys if it is long."""
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter,space,q", "close", "close")]
 
-    def __init__(self, title: str, lines: list[str]) -> None:
+    def __init__(self, title: str, lines: Sequence[str]) -> None:
         super().__init__()
         self._title, self._lines = title, lines
 
@@ -71,7 +106,8 @@ class Reading(Dialog[None]):
         """Lay out the text."""
         with Vertical() as box:
             box.border_title = self._title
-            yield Static(Text("\n".join(self._lines)), id="reading")
+            with VerticalScroll():
+                yield Static(Text("\n".join(self._lines)), id="reading")
 
 
 class Question(Dialog[str]):
@@ -85,10 +121,55 @@ class Question(Dialog[str]):
         """Lay out the field."""
         with Vertical() as box:
             box.border_title = self._title
-            field = Input(self._value, select_on_focus=True)
+            field = Field(self._value, select_on_focus=True)
             field.cursor_blink = False
             yield field
+            yield Static(FIELD_REMARK, classes="remark")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Answer."""
-        self.dismiss(event.value)
+        self.answer(event.value)
+
+
+class LiftQuestion(Dialog[int]):
+    """Ask whether a stop is to be lifted, by another key than the one that asked; answers the number of that stop.
+
+    Args:
+        robot: Which robot.
+        stop: The stop to lift, as it is now.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("l", "lift", "lift it")]
+
+    def __init__(self, robot: str, stop: StopView) -> None:
+        super().__init__()
+        self._robot, self._stop, self._changed_s = robot, stop, -READ_S
+
+    @property
+    def subject(self) -> str:
+        """The robot that is stopped."""
+        return self._robot
+
+    def compose(self) -> ComposeResult:
+        """Lay out the question."""
+        with Vertical() as box:
+            box.border_title = f"lift the stop of {self._robot}?"
+            yield Static(self._text(), id="stop")
+
+    def look(self, stop: StopView | None) -> None:
+        """Show the stop as it is now; close if there is none any more."""
+        if stop is None:
+            self.answer(None)
+            return
+        if stop.number != self._stop.number:
+            self._changed_s = asyncio.get_running_loop().time()
+        self._stop = stop
+        self.query_one("#stop", Static).update(self._text())
+
+    def action_lift(self) -> None:
+        """Answer, unless the stop has just become another one, which nobody can have read yet."""
+        if asyncio.get_running_loop().time() - self._changed_s >= READ_S:
+            self.answer(self._stop.number)
+
+    def _text(self) -> Text:
+        return Text("\n".join([*lift_lines(self._stop), "", "l: lift it   escape: leave it stopped"]))

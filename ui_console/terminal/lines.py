@@ -5,17 +5,18 @@ Pure: a view and a width in, rich texts out. A row that can be asked ``why`` nam
 
 from __future__ import annotations
 
+import io
 import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+from rich.console import Console
 from rich.text import Text
 
 from ui_console.views import (
     AlarmView,
     Certainty,
     ComponentRow,
-    ConsoleView,
-    HealthView,
     HostView,
     LinkView,
     LogRow,
@@ -26,6 +27,7 @@ from ui_console.views import (
     RobotView,
     Severity,
     SliceView,
+    StopView,
     TimelineView,
 )
 
@@ -39,10 +41,14 @@ NODE_MARKS = {
     NodeState.LOST: ("!", "bold red"),
 }
 ALARM_STYLES = {Severity.ALARM: "bold red", Severity.WARNING: "yellow", Severity.NOTICE: "cyan"}
-_HEALTH_STYLES = {"ok": "green", "degraded": "bold yellow", "failed": "bold red"}
-HEALTH_COLUMNS = 60  # chosen: half a wide terminal; the alarms show the rest
 BUSY_CPU = 0.8  # chosen: from here on a host's load is shown in yellow
 NAME_COLUMNS = 10
+BEYOND_S = 1.0  # chosen: a slice that ends now is not beyond it yet
+HANG = 2  # chosen: a line that goes on is set off from the next row
+LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
+HELD_ELSEWHERE = "hold to lift"  # what a page needs; a terminal has a second key for it
+LONG_NUMBER = 8  # chosen: digits that people read at a glance
+_PAPER = Console(file=io.StringIO())  # Rich wants one to fold text, and asks it nothing
 SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
 SLICE_COLORS = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green", "bright_magenta")
 
@@ -62,9 +68,65 @@ class Row:
     text: Text = field(compare=False)
 
 
+def plural(count: int, word: str) -> str:
+    """Return how many of them there are.
+
+    Example:
+        >>> plural(1, "alarm"), plural(2, "alarm")
+        ('1 alarm', '2 alarms')
+    """
+    return f"{count} {word}{'' if count == 1 else 's'}"
+
+
+# ---------------------------------------------------------------------- rows on lines
+def laid_out(rows: Sequence[Row], here: str | None, columns: int, room: int) -> list[list[Text]]:
+    """Return the lines of each row: long ones go on below if there is room for all, else only the cursor's row does.
+
+    Args:
+        rows: From top to bottom.
+        here: Key of the row the cursor is on; None: it is elsewhere.
+        columns: How wide a line may be.
+        room: How many lines there are.
+    """
+    folded = [_folded(row.text, columns) for row in rows]
+    if sum(map(len, folded)) <= room:
+        return folded
+    return [lines if row.key == here else _cut(row.text, columns) for row, lines in zip(rows, folded, strict=True)]
+
+
+def _folded(text: Text, columns: int) -> list[Text]:
+    lines: list[Text] = []
+    for line in text.split("\n", allow_blank=True):
+        indent = len(line.plain) - len(line.plain.lstrip()) + HANG
+        if line.cell_len <= columns or columns < indent + LEAST_COLUMNS:
+            lines.append(line)
+            continue
+        first, *others = line.wrap(_PAPER, columns - indent)
+        lines += [first, *(Text(" " * indent).append_text(other) for other in others)]
+    return lines
+
+
+def _cut(text: Text, columns: int) -> list[Text]:
+    lines = list(text.split("\n", allow_blank=True))
+    if columns >= LEAST_COLUMNS:  # before the screen is laid out there are none
+        for line in lines:
+            line.truncate(columns, overflow="ellipsis")
+    return lines
+
+
+# ---------------------------------------------------------------------- views as rows
 def robot_rows(robots: list[RobotView], now_s: float) -> list[Row]:
     """Return two lines for each robot: who has it, and for how long, who comes next."""
-    return [Row(f"robot:{robot.robot}", robot.robot, _robot(robot, now_s)) for robot in robots]
+    wide = max((len(robot.robot) for robot in robots), default=0)
+    return [Row(f"robot:{robot.robot}", robot.robot, _robot(robot, now_s, wide)) for robot in robots]
+
+
+def lift_lines(stop: StopView) -> list[str]:
+    """Return whose stop is about to be lifted, since when, why it was set, and what lifting it takes."""
+    also = f"; since then also by {', '.join(stop.also)}" if stop.also else ""
+    reason = [f"because: {stop.reason}"] if stop.reason else []
+    takes = [] if stop.lift_line == HELD_ELSEWHERE else [stop.lift_line]
+    return [f"set by {'you' if stop.is_mine else stop.by_user}, {stop.age_s:.0f} s ago{also}", *reason, *takes]
 
 
 def tree_rows(nodes: list[NodeView], now_s: float) -> list[Row]:
@@ -135,63 +197,41 @@ def timeline_rows(timeline: TimelineView, columns: int) -> list[Row]:
     return [*rows, Row("timeline:legend", "", Text("\n").join([legend, scale]))]
 
 
-def status_text(view: ConsoleView, speed_rad_s: float | None, hint: str) -> Text:
-    """Return the line at the top: whether the robot is held, what its picture is worth, what keys will do."""
-    own = view.own
-    style = "bold white on red" if own.stop else "bold black on green" if own.is_held else "bold"
-    parts = [Text(f" {own.status} ", style=style)]
-    if view.health is not None:
-        parts.append(_health(view.health))
-    if hint:
-        parts.append(Text(hint, style="bold yellow"))
-    unseen = [alarm for alarm in view.alarms if not alarm.acknowledged_by]
-    if unseen:
-        worst = ALARM_STYLES[unseen[0].severity]
-        away = sum(alarm.while_away for alarm in unseen)
-        parts.append(Text(f"{len(unseen)} alarms{f', {away} while you were away' if away else ''}", style=worst))
-    if own.taken_because and not own.is_held:
-        parts.append(Text(f"taken: {own.taken_because}", style="yellow"))
-    if speed_rad_s is not None:
-        parts.append(Text(f"speed {speed_rad_s:g} rad/s"))
-        parts += [
-            _video(video.age_s, video.rate_hz, video.is_stale) for video in view.videos if video.robot == own.robot
-        ]
-    return Text(" · ").join(parts)
-
-
-def _health(health: HealthView) -> Text:
-    first = f": {health.lines[0]}" if health.lines else ""
-    cut = f"{first[: HEALTH_COLUMNS - 1]}…" if len(first) > HEALTH_COLUMNS else first
-    return Text(f"mission {health.word}{cut}", style=_HEALTH_STYLES[health.word])
-
-
-def _video(age_s: float, rate_hz: float, is_stale: bool) -> Text:
-    style = "bold red" if is_stale else "yellow" if age_s > 0.25 else ""
-    return Text(f"picture {age_s:.1f} s old, {rate_hz:.0f}/s", style=style)
-
-
-def _robot(robot: RobotView, now_s: float) -> Text:
-    lines = Text.assemble((f"{robot.number} ", "dim"), (f"{robot.robot:{NAME_COLUMNS}s} ", "bold"))
+def _robot(robot: RobotView, now_s: float, wide: int) -> Text:
+    lines = Text.assemble((f"{robot.number} ", "dim"), (f"{robot.robot:{wide}s}  ", "bold"))
     if not robot.is_up:
         lines.append("down ", style="bold red")
     if robot.stop is not None:
-        lines.append(f"STOPPED by {robot.stop.by} ", style="bold white on red")
+        lines.append(f"STOPPED by {robot.stop.by_user}", style="bold white on red")
+        lines.append(" ")
     if robot.is_mine:
-        lines.append(f"YOU ({robot.holder})", style="bold green")
+        lines.append("YOU", style="bold green")
     else:
         lines.append(robot.holder or "free", style="green" if robot.holder else "dim")
-    facts = []
-    if robot.holder:
-        facts.append(f"for {max(0.0, now_s - robot.since_s):.0f} s")
-        if robot.until_s > now_s:
-            facts.append(f"{robot.until_s - now_s:.1f} s left")
-        facts.append(f"{robot.priority.rpartition('/')[2]}")
-        facts.append(f"lease {robot.lease_age_s:.1f} s")
-    if robot.waiting:
-        facts.append("then " + ", ".join(waiting.who for waiting in robot.waiting))
+    facts = list(_robot_facts(robot, now_s))
     if facts:
         lines.append(f"\n  {', '.join(facts)}", style="dim")
     return lines
+
+
+def _robot_facts(robot: RobotView, now_s: float) -> Iterator[str]:
+    """Yield what else is known of a robot, what matters most first: where room is short, the end is cut."""
+    if robot.stop is not None:
+        yield robot.stop.reason or f"since {robot.stop.age_s:.0f} s"
+    if robot.holder and robot.until_s >= 0:
+        yield from _slice_end(robot.until_s, now_s)
+    if robot.waiting:
+        yield "then " + ", ".join(waiting.who for waiting in robot.waiting)
+    if robot.holder:
+        yield f"for {max(0.0, now_s - robot.since_s):.0f} s"
+        yield robot.priority.rpartition("/")[2]
+
+
+def _slice_end(until_s: float, now_s: float) -> Iterator[str]:
+    if until_s > now_s:
+        yield f"{until_s - now_s:.1f} s left"
+    elif now_s - until_s >= BEYOND_S:
+        yield "beyond its slice"
 
 
 def _node(node: NodeView, now_s: float) -> Text:
@@ -208,9 +248,9 @@ def _node(node: NodeView, now_s: float) -> Text:
 
 def _request(request: RequestRow, now_s: float) -> Text:
     if request.state == "running":
-        when = f"{max(0.0, request.until_s - now_s):4.1f} s left" if request.until_s >= 0 else "running"
-    elif request.expected_start_s >= 0:
-        when = f"in {max(0.0, request.expected_start_s - now_s):4.1f} s"
+        when = next(_slice_end(request.until_s, now_s), "running") if request.until_s >= 0 else "running"
+    elif request.expected_start_s > now_s:
+        when = f"in {request.expected_start_s - now_s:.1f} s"
     else:
         when = request.state
     style = "green" if request.state == "running" else "yellow" if request.state == "waiting" else "dim"
@@ -240,17 +280,28 @@ def _host(host: HostView) -> Text:
     return Text.assemble(
         "host ",
         (host.host, "bold"),
-        (f" {host.cpu:4.0%} of {host.cores} cores", style),
-        f", memory {host.memory:.0%}, {host.components} components",
+        (f" {host.cpu:.0%} of {plural(host.cores, 'core')}", style),
+        f", memory {host.memory:.0%}, {plural(host.components, 'component')}",
         (f"  {host.age_s:.0f} s ago", "dim"),
     )
 
 
 def _parameter(parameter: ParameterView) -> Text:
-    line = Text.assemble((f"{parameter.component}.{parameter.name}", "bold"), f" = {parameter.value}")
+    line = Text.assemble((f"{parameter.component}.{parameter.name}", "bold"), f" = {_said(parameter.value)}")
     if parameter.changed_by:
-        line.append(f"  was {parameter.before}, set by {parameter.changed_by} at {parameter.changed_s:.0f} s", "dim")
+        before = _said(parameter.before)
+        line.append(f"  was {before}, set by {parameter.changed_by} at {parameter.changed_s:.0f} s", "dim")
     return line
+
+
+def _said(value: str) -> str:
+    """Return a value of JSON, a number with more digits than people read as a shorter one."""
+    if len(value) <= LONG_NUMBER or "." not in value:
+        return value
+    try:
+        return f"{float(value):.6g}"
+    except ValueError:  # a text, or a list
+        return value
 
 
 def _component(component: ComponentRow) -> Text:

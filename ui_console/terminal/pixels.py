@@ -21,7 +21,7 @@ from rich.color import Color
 from rich.segment import ControlType, Segment
 from rich.style import Style
 
-IMAGE = 42  # chosen: any number below 256 can be named by a color of the palette
+IMAGE = 42  # chosen: any number of 24 bits can be named by a color
 PLACEHOLDER = "\U0010eeee"
 CHUNK_BYTES = 4096  # the protocol's most
 PNG_LEVEL = 1  # chosen: analog noise does not compress anyway
@@ -42,7 +42,7 @@ def can_show_pixels(environment: Mapping[str, str]) -> bool:
         >>> can_show_pixels({"TERM": "xterm-kitty"}), can_show_pixels({"TERM": "xterm-256color"})
         (True, False)
     """
-    if environment.get("TMUX") or environment.get("STY"):
+    if environment.get("TMUX") or environment.get("STY") or "NO_COLOR" in environment:  # a color names the picture
         return False
     return (
         environment.get("TERM") in ("xterm-kitty", "xterm-ghostty")
@@ -92,4 +92,4 @@ def _chunk(kind: bytes, body: bytes) -> bytes:
     return struct.pack("!I", len(body)) + kind + body + struct.pack("!I", zlib.crc32(kind + body))
 
 
-_STYLE = Style(color=Color.from_ansi(IMAGE))
+_STYLE = Style(color=Color.from_rgb(0, 0, IMAGE))  # Textual draws colors of the palette as others, which name no image

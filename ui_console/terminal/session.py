@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from textual import pilot as textual_pilot
 
+from backbone.cli import ExitCode
 from backbone.component.messages import LifeState
 from resource_pool.arc_client import Frame
 from ui_console.console_events import ConsoleEvent
@@ -21,8 +22,9 @@ from ui_console.gamepad import Gamepad, PadWish, Stick, play_gamepad
 from ui_console.observer import Observer
 from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
-from ui_console.terminal.app import ConsoleApp, Profile
+from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
+from ui_console.terminal.keys import Profile
 from ui_console.terminal.pixels import can_show_pixels
 
 Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
@@ -68,13 +70,16 @@ class TerminalSession:
 
     async def run(
         self, console: Observer[Any], *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
-    ) -> None:
-        """Show the screen until a key or the component ends it; both have ended afterwards.
+    ) -> ExitCode:
+        """Show the screen until a key or the component ends it; both have ended afterwards, the component first.
 
         Args:
             console: The component.
             pilot: Presses the keys, on a screen nobody sees, in place of a person at a terminal.
             size: Columns and lines of the pilot's screen.
+
+        Returns:
+            How the screen ended; a screen that crashed has said why by now.
 
         Raises:
             BaseException: What ended the component, if that was a bug or a refusal.
@@ -102,6 +107,7 @@ class TerminalSession:
             await asyncio.wait({playing})
             if not playing.cancelled():
                 playing.result()
+        return ExitCode(screen.return_code or ExitCode.DONE)
 
     async def _play_gamepad(self, screen: ConsoleApp) -> None:
         if self._gamepad is None:
@@ -192,7 +198,7 @@ class TerminalSession:
             self._console.decide(is_given)
 
     def require_let_go(self) -> None:
-        """What is held moves nothing until it was let go and pressed anew; when a dialog opens or closes."""
+        """What is held moves nothing until it was let go and pressed anew."""
         self._with_robot(Teleoperation.require_let_go)
 
     def dismiss_lost(self) -> None:
@@ -211,6 +217,11 @@ class TerminalSession:
     def leave(self) -> None:
         """Nobody is."""
         self._with_robot(Teleoperation.leave)
+
+    def closed(self) -> None:
+        """The screen has gone; the component gives the robot back, and ends."""
+        if self._console is not None:
+            self._console.end("the screen was closed")
 
     def acknowledge(self, key: str) -> None:
         """One alarm was seen, or all."""

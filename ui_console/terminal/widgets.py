@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 from textual import events
@@ -16,7 +17,8 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
-from ui_console.terminal.lines import Row
+from ui_console.terminal.keys import Hint, key_lines
+from ui_console.terminal.lines import Row, laid_out, plural
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
 from ui_console.terminal.video import fit, row_segments, shrink
 
@@ -65,16 +67,15 @@ class Video(Widget):
 
     def render_line(self, y: int) -> Strip:
         """Return one row of cells."""
+        width, blank = self.size.width, self.rich_style  # Textual's filter for NO_COLOR wants a style everywhere
         if self._remark and y == self.size.height // 2:
-            return Strip([*Text(self._remark.center(self.size.width), OLD).render(self.app.console, end="")]).crop(
-                0, self.size.width
-            )
+            return Strip([Segment(self._remark.center(width), blank + OLD)]).crop(0, width)
         if self._steps is None or self._shown is None or 2 * y >= len(self._steps):
-            return Strip.blank(self.size.width)
+            return Strip.blank(width, blank)
         if not self._has_pixels or self._remark:
-            return Strip(row_segments(self._steps, y)).adjust_cell_length(self.size.width)
+            return Strip(row_segments(self._steps, y)).adjust_cell_length(width, blank)
         rows, columns = len(self._steps) // 2, self._steps.shape[1]
-        cells = Strip([row_of_cells(y, columns)], columns).adjust_cell_length(self.size.width)
+        cells = Strip([row_of_cells(y, columns)], columns).adjust_cell_length(width, blank)
         return Strip([send(self._shown, columns, rows), *cells], self.size.width) if y == 0 else cells
 
     def _cells(self, picture: NDArray[np.uint8]) -> tuple[int, int]:
@@ -87,24 +88,26 @@ class Panel(Static):
 
     Args:
         name: What is above it, and its id.
-        most_lines: As high as it grows; 0: as high as there is room.
-        wraps: True if long lines go on in the next one, so that its height is not known from their number.
     """
 
-    def __init__(self, name: str, *, most_lines: int = 0, wraps: bool = False) -> None:
+    def __init__(self, name: str) -> None:
         super().__init__(id=name, classes="panel")
         self.border_title = name
-        self._most_lines = most_lines
-        self._keeps_height = not wraps
         self._rows: Sequence[Row] = ()
         self._key = ""
         self._is_chosen = False
+        self._nothing = ""
         self._drawn: Text | None = None
 
     @property
     def row(self) -> Row | None:
-        """The row the cursor is on."""
-        return next((row for row in self._rows if row.key == self._key), self._rows[0] if self._rows else None)
+        """The row the cursor is on: the first until it was moved, and when its row has gone."""
+        return self.placed or (self._rows[0] if self._rows else None)
+
+    @property
+    def placed(self) -> Row | None:
+        """The row the cursor was moved to; None: it was not, or that row has gone."""
+        return next((row for row in self._rows if row.key == self._key), None)
 
     def show_rows(self, rows: Sequence[Row], *, is_chosen: bool, nothing: str) -> None:
         """Show these rows; the cursor stays where it was, if that is still there.
@@ -114,8 +117,8 @@ class Panel(Static):
             is_chosen: True: the keys for rows mean this panel.
             nothing: What to say if there are none.
         """
-        self._rows, self._is_chosen = rows, is_chosen
-        self._draw(nothing)
+        self._rows, self._is_chosen, self._nothing = rows, is_chosen, nothing
+        self._draw()
 
     def move(self, steps: int) -> None:
         """Move the cursor down, or up for negative steps, within the rows."""
@@ -124,26 +127,42 @@ class Panel(Static):
         keys = [row.key for row in self._rows]
         at = keys.index(self._key) if self._key in keys else 0
         self._key = keys[min(max(0, at + steps), len(keys) - 1)]
-        self._draw("")
+        self._draw()
 
-    def _draw(self, nothing: str) -> None:
-        here = self.row
-        shown: list[Text] = []
+    def _draw(self) -> None:
+        here, room = self.row, self._room()
+        key = here.key if self._is_chosen and here is not None else None
+        rows = laid_out(self._rows, key, self.content_size.width, room)
+        lines: list[Text] = []
         offset = 0
-        room = self._most_lines or max(1, self.content_size.height)
-        for row in self._rows:
-            text = row.text.copy()
-            if self._is_chosen and here is not None and row.key == here.key:
-                text.stylize(CURSOR, 0, len(text.plain.partition("\n")[0]))
-                above = sum(one.plain.count("\n") + 1 for one in shown)
-                offset = max(0, above + text.plain.count("\n") + 1 - room)
-            shown.append(text)
-        lines = Text("\n").join(shown).split("\n", allow_blank=True)[offset:] if shown else []
-        drawn = Text("\n").join(lines) if shown else Text(nothing, style="dim")
+        for row, its_lines in zip(self._rows, rows, strict=True):
+            if row.key == key:
+                its_lines[0].stylize(CURSOR)
+                offset = min(len(lines), max(0, len(lines) + len(its_lines) - room))
+            lines += its_lines
+        is_cut = len(lines) > room
+        self.border_subtitle = f"{plural(len(rows), 'row')}: pgup, pgdn" if is_cut else ""
+        self._put(Text("\n").join(lines[offset:]) if rows else Text(self._nothing, style="dim"))
+
+    def _put(self, drawn: Text) -> None:
         before, self._drawn = self._drawn, drawn
         if before is None or drawn != before or drawn.spans != before.spans:
-            grew = before is None or drawn.plain.count("\n") != before.plain.count("\n") or not self._keeps_height
+            grew = before is None or drawn.plain.count("\n") != before.plain.count("\n")
             self.update(drawn, layout=grew)
+
+    def _room(self) -> int:
+        """Return for how many lines there is room: as high as it may grow, or as it is."""
+        most = self.styles.max_height
+        lines = int(most.value) - self.gutter.height if most is not None else self.content_size.height
+        return max(1, lines)
+
+
+class KeyLine(Static):
+    """The keys that matter now, as many as fit; a click on one is as good as the key."""
+
+    def show(self, found: Sequence[Hint], *, rows: int) -> None:
+        """Name these keys in so many lines."""
+        self.update(key_lines(found, self.size.width, rows))
 
 
 class DrivePad(Widget):
@@ -193,6 +212,11 @@ class DrivePad(Widget):
         """Stop: the mouse went to somebody else."""
         self._let_go()
 
+    def let_go(self) -> None:
+        """Stop: the window was left, and who lets the mouse go there tells nobody."""
+        self.release_mouse()
+        self._let_go()
+
     def render_line(self, y: int) -> Strip:
         """Return one row: a cross, and where it is held."""
         width, height = self.size.width, self.size.height
@@ -203,7 +227,7 @@ class DrivePad(Widget):
             column = round((1 + right) / 2 * (width - 1))
             if y == row:
                 cells[column] = "●"
-        return Strip([*Text("".join(cells)).render(self.app.console, end="")], width)
+        return Strip([Segment("".join(cells), self.rich_style)], width)
 
     def _drag(self, event: events.MouseEvent) -> None:
         half_width, half_height = max(1, self.size.width - 1) / 2, max(1, self.size.height - 1) / 2

@@ -6,14 +6,12 @@ What a change does is decided in ``designing``; here it is done in turn, told to
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, assert_never
 
 import msgspec
 
-from backbone.bus.interface import Clock
 from backbone.errors import Refusal
 from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
@@ -45,8 +43,6 @@ from ui_console.web.door import Offence, Welcome
 from ui_console.web.outbox import Outbox
 
 log = logging.getLogger(__name__)
-
-BEAT_EVERY_S = 1.0  # chosen: a page says that the server is silent after five of them
 
 LookUpClasses = Callable[[Sequence[str]], Awaitable[dict[str, ClassFacts]]]
 
@@ -88,14 +84,13 @@ class DesignRoom:
         draft: What is designed.
         kept: Where it is kept until it is saved.
         look_up: Asks classes for their documentation and parameters, see ``look_up.look_up``.
-        clock: Of this machine.
     """
 
-    def __init__(self, draft: Draft, kept: DraftFile, look_up: LookUpClasses, clock: Clock) -> None:
+    def __init__(self, draft: Draft, kept: DraftFile, look_up: LookUpClasses) -> None:
         self.draft = draft
         self.revision = 1
         self.guests: dict[Designer, None] = {}
-        self._kept, self._look_up, self._clock = kept, look_up, clock
+        self._kept, self._look_up = kept, look_up
         self._facts: dict[str, ClassFacts] = {}
         self._trusted = _classes_of(draft.saved)
         self._turn = asyncio.Lock()
@@ -134,6 +129,7 @@ class DesignRoom:
     # ------------------------------------------------------------------ what pages ask for
     async def obey(self, guest: Designer, intent: DesignIntent) -> None:
         """Do what a designer asks, one after the other; what is refused is told to that one."""
+        is_change = isinstance(intent, Change | SaveFile | TakeFile)
         try:
             async with self._turn:
                 await self._do(guest, intent)
@@ -143,10 +139,10 @@ class DesignRoom:
         except FileChanged as refusal:
             guest.answer(file_changed=refusal.detail, name=intent.name if isinstance(intent, SaveFile) else "")
         except MissionInvalid as invalid:
-            guest.answer(refused=str(invalid.faults[0]), remedy="Mend the file, or save over it.")
+            guest.answer(refused=str(invalid.faults[0]), remedy="Mend the file, or save over it.", is_change=is_change)
         except Refusal as refusal:
-            guest.answer(refused=refusal.detail, remedy=refusal.remedy)
-        if isinstance(intent, Change | SaveFile | TakeFile):
+            guest.answer(refused=refusal.detail, remedy=refusal.remedy, is_change=is_change)
+        if is_change:
             guest.handled += 1
             guest.tell("handled", guest.handled)
 
@@ -224,13 +220,6 @@ class DesignRoom:
         facts = await self._look_up(stock_classes())
         async with self._turn:
             await self._known(facts)
-
-    async def beat(self) -> None:
-        """Have every page know that the server is there; until cancelled."""
-        for number in itertools.count():
-            for guest in self.guests:
-                guest.tell("beat", number)
-            await self._clock.sleep_s(BEAT_EVERY_S)
 
     async def keep_on(self) -> None:
         """Keep the draft beside the file whenever it has changed; until cancelled."""

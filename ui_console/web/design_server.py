@@ -74,8 +74,10 @@ class DesignServer:
         await room.prepare()
         try:
             async with self._reception.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
-                tasks = [beside.create_task(one(), name=f"design: {one.__name__}") for one in (room.beat, room.keep_on)]
-                tasks.append(beside.create_task(room.learn_stock(), name="design: learn_stock"))
+                tasks = [
+                    beside.create_task(room.keep_on(), name="design: keep_on"),
+                    beside.create_task(room.learn_stock(), name="design: learn_stock"),
+                ]
                 ready(port_of(server))
                 await end.wait()
                 for task in tasks:

@@ -45,6 +45,12 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     priority: int | None = None
 
 
+class Beat(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="beat"):
+    """Say this number back: the page learns how old what it shows can be, and that it is heard."""
+
+    number: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+
+
 class Fault(StrEnum):
     """What a visitor did wrong."""
 
@@ -157,7 +163,7 @@ class Visitor(Generic[IntentT]):
     """
 
     def __init__(
-        self, doorkeeper: Doorkeeper, understand: Callable[[bytes | str], Hello | IntentT], now_s: float
+        self, doorkeeper: Doorkeeper, understand: Callable[[bytes | str], Hello | Beat | IntentT], now_s: float
     ) -> None:
         self._understand = understand
         self._doorkeeper, self._came_s = doorkeeper, now_s
@@ -173,7 +179,7 @@ class Visitor(Generic[IntentT]):
         """When the token must have come; None: it has."""
         return None if self.welcome is not None else self._came_s + LOGIN_WITHIN_S
 
-    def heard(self, data: str | bytes, now_s: float) -> Welcome | IntentT | Offence | None:
+    def heard(self, data: str | bytes, now_s: float) -> Welcome | Beat | IntentT | Offence | None:
         """Return what a message means; None: nothing any more.
 
         Args:

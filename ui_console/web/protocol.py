@@ -11,7 +11,7 @@ import msgspec
 
 from backbone.ranges import EXACT
 from ui_console.consent import MAX_WHY
-from ui_console.web.door import Hello, ShortText
+from ui_console.web.door import Beat, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
@@ -143,10 +143,10 @@ Intent = (
     | SetParameter
     | Here
 )
-_intents: msgspec.json.Decoder[Hello | Intent] = msgspec.json.Decoder(Hello | Intent)
+_intents: msgspec.json.Decoder[Hello | Beat | Intent] = msgspec.json.Decoder(Hello | Beat | Intent)
 
 
-def understand(data: bytes | str) -> Hello | Intent:
+def understand(data: bytes | str) -> Hello | Beat | Intent:
     """Return what a message means.
 
     Raises:

@@ -16,7 +16,17 @@ from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 from backbone.errors import Refusal
-from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Fault, Hello, IntentT, Offence, Visitor, Welcome
+from ui_console.web.door import (
+    MAX_MESSAGE_BYTES,
+    Beat,
+    Doorkeeper,
+    Fault,
+    Hello,
+    IntentT,
+    Offence,
+    Visitor,
+    Welcome,
+)
 from ui_console.web.outbox import Outbox
 from ui_console.web.porch import CLOSE_WITHIN_S, OPEN_WITHIN_S, Porch
 from ui_console.web.site import SOCKET_PATH, Answer, Site, is_own_page
@@ -32,6 +42,7 @@ FATAL_CODES = {
     Fault.SLOW: CloseCode.TRY_AGAIN_LATER,
     Fault.CROWD: CloseCode.TRY_AGAIN_LATER,
 }
+MOST_REASON = 120  # of the 123 bytes that a close frame has for it
 KEEPALIVE_REASON = "keepalive ping timeout"
 
 
@@ -93,7 +104,7 @@ class Reception(Generic[GuestT, IntentT]):
         house: House[GuestT, IntentT],
         doorkeeper: Doorkeeper,
         site: Site,
-        understand: Callable[[bytes | str], Hello | IntentT],
+        understand: Callable[[bytes | str], Hello | Beat | IntentT],
     ) -> None:
         self._house, self._doorkeeper, self._site, self._understand = house, doorkeeper, site, understand
 
@@ -207,6 +218,9 @@ class Reception(Generic[GuestT, IntentT]):
                     await self._refuse(connection, who, said)
                     if said.is_fatal:
                         return said.line
+                case Beat(number):
+                    guest.outbox.put_section("beat", str(number).encode())
+                    guest.news.set()
                 case Welcome() | None:
                     continue
                 case _:
@@ -244,7 +258,7 @@ class Reception(Generic[GuestT, IntentT]):
         self._house.offended(who, offence)
         if offence.is_fatal:
             code = FATAL_CODES.get(offence.fault, CloseCode.POLICY_VIOLATION)
-            await connection.close(code, f"You {offence.line}. {offence.remedy}"[:120])
+            await connection.close(code, f"This page {offence.line}. {offence.remedy}"[:MOST_REASON])
 
 
 def port_of(server: Server) -> int:

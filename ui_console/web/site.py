@@ -12,30 +12,59 @@ from dataclasses import dataclass
 from importlib import resources
 from urllib.parse import urlsplit
 
-FILES = {
-    "/": ("index.html", "text/html; charset=utf-8"),
-    "/console.css": ("console.css", "text/css; charset=utf-8"),
-    "/main.js": ("main.js", "text/javascript; charset=utf-8"),
-    "/link.js": ("link.js", "text/javascript; charset=utf-8"),
-    "/login.js": ("login.js", "text/javascript; charset=utf-8"),
-    "/driving.js": ("driving.js", "text/javascript; charset=utf-8"),
-    "/pictures.js": ("pictures.js", "text/javascript; charset=utf-8"),
-    "/tables.js": ("tables.js", "text/javascript; charset=utf-8"),
-    "/icon.svg": ("icon.svg", "image/svg+xml"),
+KINDS = {
+    "html": "text/html; charset=utf-8",
+    "css": "text/css; charset=utf-8",
+    "js": "text/javascript; charset=utf-8",
+    "svg": "image/svg+xml",
 }
-DESIGN_FILES = {
-    "/": ("design.html", "text/html; charset=utf-8"),
-    "/console.css": ("console.css", "text/css; charset=utf-8"),
-    "/design.css": ("design.css", "text/css; charset=utf-8"),
-    "/link.js": ("link.js", "text/javascript; charset=utf-8"),
-    "/login.js": ("login.js", "text/javascript; charset=utf-8"),
-    "/design.js": ("design.js", "text/javascript; charset=utf-8"),
-    "/design_tree.js": ("design_tree.js", "text/javascript; charset=utf-8"),
-    "/design_drag.js": ("design_drag.js", "text/javascript; charset=utf-8"),
-    "/design_panels.js": ("design_panels.js", "text/javascript; charset=utf-8"),
-    "/design_dialogs.js": ("design_dialogs.js", "text/javascript; charset=utf-8"),
-    "/icon.svg": ("icon.svg", "image/svg+xml"),
-}
+
+
+def _page(html: str, *names: str) -> dict[str, tuple[str, str]]:
+    """Return the files of a page by their paths, each with its type; the page itself is at the root."""
+    paths = {"/": html, **{f"/{name}": name for name in names}}
+    return {path: (name, KINDS[name.rpartition(".")[2]]) for path, name in paths.items()}
+
+
+FILES = _page(
+    "index.html",
+    "theme.css",
+    "console.css",
+    "main.js",
+    "blind.js",
+    "cards.js",
+    "driving.js",
+    "freshness.js",
+    "hand.js",
+    "holding.js",
+    "keys.js",
+    "link.js",
+    "login.js",
+    "notices.js",
+    "pictures.js",
+    "stopping.js",
+    "tables.js",
+    "text.js",
+    "theme.js",
+    "timeline.js",
+    "icon.svg",
+)
+DESIGN_FILES = _page(
+    "design.html",
+    "theme.css",
+    "console.css",
+    "design.css",
+    "design.js",
+    "design_dialogs.js",
+    "design_drag.js",
+    "design_panels.js",
+    "design_tree.js",
+    "freshness.js",
+    "link.js",
+    "login.js",
+    "theme.js",
+    "icon.svg",
+)
 SOCKET_PATH = "/socket"
 
 SAFETY = {

@@ -152,7 +152,7 @@ def test_a_start_that_is_not_ready_in_time_fails_and_leaves_nothing(on_bench: Ca
 def test_a_slow_start_that_shows_signs_of_life_is_waited_for(on_bench: Callable) -> None:
     async def body(bench: Bench) -> None:
         assert await bench.start("Late", "slow", within_s=5.0) == FIRST_PID
-        assert now_s() >= 10.0
+        assert now_s() >= 10.0 - 1e-9  # sums of looks
 
     on_bench(body)
 

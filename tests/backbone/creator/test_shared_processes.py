@@ -259,6 +259,15 @@ def test_a_process_that_never_serves_is_killed_and_nobody_is_started() -> None:
     assert shared.exited(7, -9) == [MemberNotStarted("scout1", "its process pool: did not serve within 10 s")]
 
 
+def test_a_signal_that_ends_a_process_before_it_admits_is_told_as_such() -> None:
+    """So that its members' start is begun again, as that of a process of their own."""
+    shared = SharedProcesses()
+    shared.wanted("scout1", "pool", 0.0)
+    shared.forked("pool", 7, 0.0)
+    how = "its process pool: killed by SIGTERM"
+    assert shared.exited(7, -15) == [MemberNotStarted("scout1", how, -15)]
+
+
 def test_a_process_that_does_not_admit_is_killed_and_who_lived_there_is_gone() -> None:
     shared = living("scout1")
     shared.wanted("radio", "pool", 1.0)

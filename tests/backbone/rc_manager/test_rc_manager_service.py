@@ -399,7 +399,7 @@ def test_the_other_rcs_of_an_arc_do_not_wait_for_one_that_died(pool: Any) -> Non
     run_virtual(main())
 
 
-def test_an_rc_that_never_confirmed_is_down_until_it_answers(pool: Any) -> None:
+def test_an_rc_that_does_not_confirm_in_time_and_has_no_other_holder_is_down_until_it_does(pool: Any) -> None:
     async def main() -> Path:
         async with pool() as here, here.beside(here.manager()):
             one = await here.arc("one")
@@ -416,6 +416,7 @@ def test_an_rc_that_never_confirmed_is_down_until_it_answers(pool: Any) -> None:
     ended = next(number for number, line in enumerate(lines) if line["ev"] == "revoke")
     told = [line for line in lines[ended:] if line.get("id") == "left" or line.get("arc") == "one"]
     assert [line.get("state", line["ev"]) for line in told] == ["revoke", "down", "free", "up"]
+    assert told[2]["t"] - told[0]["t"] <= 0.2 + 0.05  # grace and tolerance
     assert check(lines) == []
 
 

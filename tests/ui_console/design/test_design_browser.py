@@ -1,14 +1,11 @@
 """The designer in a real browser: the tutorial's mission from nothing, by mouse at a desk and by fingers on a phone.
 
-Both must save what the terminal's designer saves (see ``test_design_tutorial``), byte for byte. Screenshots for the
-documents are kept where ``SCOUT_PICTURES`` says.
+Both must save what the terminal's designer saves (see ``test_design_tutorial``), byte for byte.
 """
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import AsyncIterator, Iterator
@@ -17,7 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import web_browser
 from design_keys import tutorial_draft
+from web_browser import assert_no_sideways_scroll
 
 from ui_console.design.keeping import path_of_draft
 
@@ -25,9 +24,6 @@ pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
 ROOT = Path(__file__).parents[3]
 BIN = Path(sys.executable).parent
-WITHIN_S = 20.0
-SIZES = {"desktop": (1280, 860), "tablet": (820, 1180), "phone": (390, 844)}
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
 
 
 @contextmanager
@@ -56,37 +52,14 @@ def served(file: Path) -> Iterator[str]:
 
 @asynccontextmanager
 async def page_at(size: str, address: str) -> AsyncIterator[Any]:
-    """Open the page in a browser of this size; anything the page complains about fails the test."""
-    async_api = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
-    if not CHROMIUM:
-        pytest.skip("no Chromium on this machine: apt-get install chromium")
-    width, height = SIZES[size]
-    async with async_api.async_playwright() as playwright:
-        browser = await playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--force-color-profile=srgb"]
-        )
-        try:
-            context = await browser.new_context(
-                viewport={"width": width, "height": height}, has_touch=size != "desktop", is_mobile=size == "phone"
-            )
-            page = await context.new_page()
-            page.set_default_timeout(1000 * WITHIN_S)
-            complaints: list[str] = []
-            page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
-            await page.goto(f"{address}&user={size}")
-            await page.wait_for_selector(".element")
-            yield page
-            assert complaints == []
-            assert await page.locator("html").evaluate("page => page.scrollWidth - page.clientWidth") <= 0
-        finally:
-            await browser.close()
+    """Open the page in a browser of this size; it never scrolls sideways."""
+    async with web_browser.page_at(size, address, shows=".element", expects=()) as page:
+        yield page
+        await assert_no_sideways_scroll(page)
 
 
 async def keep_picture(page: Any, name: str) -> None:
-    folder = os.environ.get("SCOUT_PICTURES")
-    if folder:
-        await page.screenshot(path=Path(folder) / f"design-{name}.jpg", type="jpeg", quality=60)
+    await web_browser.keep_picture(page, f"design-{name}")
 
 
 class Hands:

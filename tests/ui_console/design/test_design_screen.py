@@ -251,12 +251,12 @@ async def test_it_is_saved_and_somebody_elses_work_not_overwritten_unasked(tmp_p
 async def test_what_is_not_saved_is_not_left_unasked() -> None:
     app = app_of(shipped())
     async with app.run_test(size=SIZE, notifications=True) as pilot:
-        for key in ("q", "ctrl+c"):
+        for key in ("q", "ctrl+c", "ctrl+q"):
             await press(pilot, f"plus {key}")
             assert "not saved. Leave?" in screen_text(app)
             await press(pilot, "n")
             assert app.is_running
-        await press(pilot, "u u q")
+        await press(pilot, "u u u q")
         assert not app.is_running
 
 

@@ -17,7 +17,6 @@ from msgspec import DecodeError
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from backbone.bus.clock import MissionClock
 from ui_console.design.catalogue import ClassFacts
 from ui_console.design.draft import Draft
 from ui_console.design.keeping import path_of_draft
@@ -122,7 +121,7 @@ async def serving(file: Path) -> AsyncIterator[Serving]:
         asked.extend(class_paths)
         return {path: ClassFacts(f"About {path}.") for path in class_paths}
 
-    made = Serving(DesignRoom(draft, kept, look_up, MissionClock.started_now()))
+    made = Serving(DesignRoom(draft, kept, look_up))
     made.asked = asked
     ready = asyncio.Event()
 

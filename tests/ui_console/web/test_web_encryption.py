@@ -22,7 +22,6 @@ from typer.testing import CliRunner
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidMessage
 
-from backbone.bus.clock import MissionClock
 from ui_console.cli import app
 from ui_console.design.catalogue import ClassFacts
 from ui_console.web.design_room import DesignRoom
@@ -67,9 +66,7 @@ async def port(papers: Papers, tmp_path: Path) -> AsyncIterator[int]:
         return {path: ClassFacts("") for path in class_paths}
 
     draft, kept = begin(str(tmp_path / "guard.xml"))
-    server = DesignServer(
-        DesignRoom(draft, kept, look_up, MissionClock.started_now()), Doorkeeper({ANYBODY: Pass("", 1)})
-    )
+    server = DesignServer(DesignRoom(draft, kept, look_up), Doorkeeper({ANYBODY: Pass("", 1)}))
     listening: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     end = asyncio.Event()
     encryption = encryption_with(str(papers.certificate), str(papers.key))

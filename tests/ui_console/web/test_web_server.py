@@ -6,189 +6,26 @@ import asyncio
 import contextlib
 import json
 import socket
-import struct
 import urllib.error
 import urllib.request
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from contextlib import asynccontextmanager
-from typing import Any
+from collections.abc import Awaitable, Iterator
 
 import pytest
-from fake_resource_pool import FakeArc, FakePlacer
-from websockets.asyncio.client import ClientConnection, connect
+from fake_resource_pool import FakeArc
+from web_stage import ANYBODY, HEIGHT_PX, HIGH, LOW, PASSES, WIDTH_PX, WITHIN_S, Stage
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import CloseCode
 
-from backbone.bus.clock import MissionClock
-from backbone.bus.interface import Bus
-from backbone.component.launch import Launch
-from backbone.keys import Conversation
-from backbone.naming import Subsystem
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Holder, RcView, RequestState, RequestView, Schedule
-from backbone.wire import Envelope, Message
 from resource_pool.messages import Drive, Halt
 from ui_console.web import door, reception
-from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Pass
-from ui_console.web.hub import WebHub
+from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper
 from ui_console.web.reception import CannotListen
 from ui_console.web.server import WebServer
-
-MISSION = "web-test"
-HIGH, LOW, ANYBODY = "high-token", "low-token", "anybody"
-PASSES = {HIGH: Pass("anna", 100), LOW: Pass("ben", 50), ANYBODY: Pass("", 10)}
-WITHIN_S = 15.0
-WIDTH_PX, HEIGHT_PX = 32, 24
-
-
-class Browser:
-    """What a page does, without a page: keeps the newest of each section, and says that pictures are drawn."""
-
-    def __init__(self, socket_: ClientConnection) -> None:
-        self.socket = socket_
-        self.view: dict[str, Any] = {}
-        self.answers: list[dict[str, Any]] = []
-        self.pictures: dict[str, list[int]] = {}
-        self.news = asyncio.Event()
-
-    async def listen(self) -> None:
-        try:
-            async for message in self.socket:
-                if isinstance(message, bytes):
-                    robot = message[1 : 1 + message[0]].decode()
-                    (number,) = struct.unpack_from(">I", message, 1 + message[0])
-                    assert message[13 + message[0] :].startswith(b"\xff\xd8"), "a JPEG"
-                    self.pictures.setdefault(robot, []).append(number)
-                    await self.say(do="drawn", robot=robot, number=number)
-                else:
-                    said = json.loads(message)
-                    self.view.update(said.get("view", {}))
-                    self.answers += [said["answer"]] if "answer" in said else []
-                self.news.set()
-        except ConnectionClosed:
-            self.news.set()
-
-    async def say(self, **message: Any) -> None:
-        await self.socket.send(json.dumps(message))
-
-    async def wait(self, holds: Callable[[], Any], what: str) -> None:
-        """Return when this holds of what was heard so far."""
-        try:
-            async with asyncio.timeout(WITHIN_S):
-                while not holds():
-                    self.news.clear()
-                    await self.news.wait()
-        except TimeoutError:
-            pytest.fail(f"never: {what}; own: {self.view.get('own')}; alarms: {self.view.get('alarms')}")
-
-    def has_alarm(self, words: str) -> bool:
-        return any(words in alarm["line"] for alarm in self.view.get("alarms", []))
-
-    @property
-    def is_held(self) -> bool:
-        return bool(self.view.get("own", {}).get("is_held"))
 
 
 async def all_in_turn(sends: Iterator[Awaitable[None]]) -> None:
     for send in sends:
         await send
-
-
-class Stage:
-    """A mission with a web console and nobody before it yet."""
-
-    def __init__(self, network: Any, clock: MissionClock, placer: FakePlacer, rc_manager: Bus) -> None:
-        self.placer, self.clock, self.rc_manager = placer, clock, rc_manager
-        launch = Launch(MISSION, Subsystem.UI_CONSOLE, "web-1", "console", "in this process", "local", "", 0.0, 1.0)
-
-        async def join(one_more: Launch) -> Bus:
-            return network.join(one_more.address, clock)
-
-        self.hub = WebHub(launch, network.join(launch.address, clock), clock, join)
-        self.port = 0
-
-    @asynccontextmanager
-    async def browser(self, token: str = HIGH, **hello: Any) -> AsyncIterator[Browser]:
-        async with self.connection() as connection:
-            browser = Browser(connection)
-            await browser.say(do="hello", token=token, **hello)
-            listening = asyncio.create_task(browser.listen(), name="browser")
-            try:
-                await browser.wait(lambda: "own" in browser.view, "welcome")
-                yield browser
-            finally:
-                listening.cancel()
-                await asyncio.wait({listening})
-
-    def connection(self, **options: Any) -> connect:
-        return connect(f"ws://127.0.0.1:{self.port}/socket", compression=None, proxy=None, **options)
-
-    def grant_all(self) -> None:
-        """Let every ARC have its robot at once, as if nobody else were there."""
-
-        def grant(arc: FakeArc) -> None:
-            arc.bus.start(arc.grant())  # type: ignore[attr-defined]
-
-        self.placer.on_arc = grant
-
-    def publish_schedule(self, **arcs: str) -> None:
-        """Say which ARC holds which robot; an empty name: none."""
-        now_s = self.clock.now_s()
-        rcs = [
-            RcView(robot, "scout", "up", False, 1.0, [Holder(arc, 1, now_s, 0.0)] if arc else [], 1, [], [now_s + 5.0])
-            for robot, arc in arcs.items()
-        ]
-        schedule = Schedule(now_s, rcs, [], [])
-        self.rc_manager.publish(RC_MANAGER, Conversation.SCHEDULE, schedule)
-
-    def answer_who_holds(self) -> None:
-        """Have the RC manager know of every ARC; those that are granted hold their robot."""
-
-        async def answer(_asked: Envelope[Any]) -> Message:
-            now_s = self.clock.now_s()
-            held = [Holder(arc.name, arc.epoch, now_s, 0.0) for arc in self.placer.arcs.values() if arc.granted]
-            requests = [
-                RequestView(name, arc.parameters["owner"], RequestState.WAITING, [], 0.0, 0.0, 0.0, "", [], 5.0, "", 0)
-                for name, arc in self.placer.arcs.items()
-            ]
-            return Schedule(now_s, [RcView("scout1", "scout", "up", False, 1.0, held, 1, [], [])], requests, [])
-
-        self.rc_manager.serve(RC_MANAGER, AskSchedule, answer)
-
-    def drives(self, robot: str = "scout1") -> list[tuple[float, Any]]:
-        return [
-            (at_s, command)
-            for arc in self.placer.arcs.values()
-            if arc.rcs["scout"] == robot
-            for at_s, _epoch, command in arc.commands
-        ]
-
-
-@pytest.fixture
-async def stage(local_mission: Any) -> AsyncIterator[Stage]:
-    clock = MissionClock.started_now()
-    async with local_mission(MISSION, clock) as network:
-        placer = FakePlacer(network, clock, {})
-        rc_manager = network.join(RC_MANAGER, clock)
-        made = Stage(network, clock, placer, rc_manager)
-        is_ready = asyncio.Event()
-
-        def ready(port: int) -> None:
-            made.port = port
-            is_ready.set()
-
-        serving = asyncio.create_task(WebServer(made.hub, Doorkeeper(PASSES)).run("127.0.0.1", 0, ready), name="server")
-        try:
-            async with asyncio.timeout(WITHIN_S):
-                await is_ready.wait()
-            await placer.wait(lambda: made.hub.observer.state == "ready")
-            yield made
-        finally:
-            made.hub.observer.end("the test is over")
-            await asyncio.wait({serving})
-            await placer.close()
-            await rc_manager.close()
-        serving.result()
 
 
 async def test_who_takes_a_robot_drives_it_and_who_lets_go_stops_it(stage: Stage) -> None:

@@ -6,14 +6,15 @@ import { Details, Palette, showMinute, showProblems } from "./design_panels.js";
 import { Tree, isWithin, keyOf, pathOf } from "./design_tree.js";
 import { Link } from "./link.js";
 import { Login } from "./login.js";
+import { followTheme } from "./theme.js";
 
-const SILENT_MS = 5000; // chosen: the server says something every second
+const OLD_MS = 2000, SILENT_MS = 5000; // chosen: nothing moves here; a check of a large mission takes a moment
 const NOTICES = 3;
 const AT_THE_MISSION = ["behavior", "resource", "world", "type"]; // what the server puts in the right section by itself
 const find = (id) => document.getElementById(id);
 const view = {};
 
-const link = new Link({ heard, saw: () => {}, changed, silentMs: SILENT_MS });
+const link = new Link({ heard, saw: () => {}, changed, silentMs: SILENT_MS, oldMs: OLD_MS });
 const login = new Login({ form: find("login"), enter: (hello) => link.open(hello) });
 const tree = new Tree({ root: find("tree"), choose: (path, isTouched) => { if (!isTouched || !put(path)) link.say({ do: "select", path, number: ++selects }); }, key: treeKey });
 const palette = new Palette({
@@ -26,11 +27,13 @@ const details = new Details({
   set: (path, one, value) => change(() => ({ do: "set", path, name: one.name, value, is_parameter: one.is_parameter })),
 });
 new Drag({ tree: tree.root, what, place, drop: (place) => place.do() });
-let carried = null, learning = "", afterShown = null, selects = 0;
+let carried = null, learning = "", afterShown = null, selects = 0, wasDown = true;
+followTheme(find("theme"));
 
 // ---------------------------------------------------------------- one change after the other
 const waiting = [];
-let isUnderway = false;
+let underway = null; // what was said and is neither done nor refused yet
+let asked = null; // the questions of the dialog whose answers were said last
 
 /** Say a change as soon as the one before it was done; what it is about is looked at only then, or refused as too old. */
 function change(make) {
@@ -39,12 +42,36 @@ function change(make) {
 }
 
 function pump() {
-  while (!isUnderway && waiting.length && view.status) {
+  while (underway === null && waiting.length && view.status) {
     const message = waiting.shift()();
     if (message === null) continue;
-    isUnderway = link.say({ revision: view.status.revision, ...message });
-    if (!isUnderway) { waiting.length = 0; notice("NOT CONNECTED: this was not done", ""); }
+    underway = { revision: view.status.revision, ...message };
+    if (link.say(underway)) return;
+    refused("NOT CONNECTED: this was not done", "");
+    underway = null;
+    waiting.length = 0;
   }
+}
+
+/** What was said last is not done: say so where it was meant. */
+function refused(text, remedy) {
+  const why = remedy ? `${text} (${remedy})` : text;
+  if (underway?.do === "set") details.refused(underway.path, underway, underway.value, why);
+  if (underway?.do === "take" && underway.answers?.length && asked?.label === underway.label) askAgain(underway, why);
+  else notice(text, remedy);
+}
+
+async function askAgain({ path, label, answers }, why) {
+  const asks = asked.asks.map((one, number) => ({ ...one, proposed: answers[number] }));
+  const revision = view.status.revision;
+  const again = await ask(label, asked.doc, asks, why);
+  if (again) take(path, label, again, revision);
+}
+
+/** Ask what an offer needs to know; resolves to the answers, or null. */
+function askFor(offer) {
+  asked = offer;
+  return offer.asks.length ? ask(offer.label, offer.doc, offer.asks) : Promise.resolve([]);
 }
 
 const take = (path, label, answers = [], revision = null) =>
@@ -52,20 +79,23 @@ const take = (path, label, answers = [], revision = null) =>
 const atChosen = (make) => change(() => (tree.row(tree.at) ? make(tree.at, tree.row(tree.at)) : null));
 
 // ---------------------------------------------------------------- what is heard
-function changed(isUp, why, isRefused = false) {
+function changed({ is, why }) {
   const shown = find("link");
-  shown.classList.toggle("is-down", !isUp);
-  shown.textContent = isUp ? "connected" : `NOT CONNECTED: ${why}`;
-  document.body.classList.toggle("is-down", !isUp);
-  isUnderway = false;
-  if (isUp) {
+  shown.classList.toggle("is-down", is !== "fresh");
+  shown.textContent = is === "fresh" ? "connected" : is === "old" ? `NOT HEARD: ${why}` : `NOT CONNECTED: ${why}`;
+  if (is === "old") return;
+  if (is === "fresh") {
+    if (!wasDown) return; // it was only not heard for a moment
+    wasDown = false;
     selects = 0;
     find("designer").hidden = false;
     if (!find("minute").hidden) link.say({ do: "rehearse", is_shown: true });
     return;
   }
+  wasDown = true;
+  underway = null;
   waiting.length = 0;
-  if (isRefused) { find("designer").hidden = true; login.ask(why); }
+  if (is === "refused") { find("designer").hidden = true; login.ask(why); }
 }
 
 function heard(message) {
@@ -87,7 +117,7 @@ function heard(message) {
   if ("rehearsal" in changes) showMinute(find("minute"), view.rehearsal);
   if (changes.people) find("people").textContent = view.people.length > 1 ? `with ${view.people.filter((one, at) => at !== view.people.indexOf(view.welcome?.user)).join(", ")}` : "";
   if (changes.status) showStatus(view.status);
-  if (changes.handled !== undefined) { isUnderway = false; pump(); }
+  if (changes.handled !== undefined) { underway = null; pump(); }
 }
 
 function showChosen() {
@@ -115,9 +145,10 @@ function showStatus(status) {
 async function answered(answer) {
   if (answer.ask) {
     const revision = view.status.revision;
-    const answers = await ask(answer.ask.label, answer.ask.doc, answer.ask.asks);
+    const answers = await askFor(answer.ask);
     if (answers) take(answer.path, answer.ask.label, answers, revision);
-  } else if (answer.refused) notice(answer.refused, answer.remedy);
+  } else if (answer.refused && answer.is_change) refused(answer.refused, answer.remedy);
+  else if (answer.refused) notice(answer.refused, answer.remedy);
   else if (answer.notice) notice(answer.notice, answer.remedy);
   else if (answer.text !== undefined) read(answer.source, answer.text, answer.line);
   else if (answer.saved) notice(answer.problems ? `Saved as ${answer.saved}, with problems: ${answer.problems}` : `Saved as ${answer.saved}; check says that it is fine.`, "", "good");
@@ -190,7 +221,7 @@ const acts = {
     const { path, offers } = view.element, revision = view.status.revision;
     const option = await choose(`Add to ${view.element.tag} ${view.element.told}`, offers);
     if (!option) return;
-    const answers = option.asks.length ? await ask(option.label, option.doc, option.asks) : [];
+    const answers = await askFor(option);
     if (answers) take(path, option.label, answers, revision);
   }),
   up: () => atChosen((path) => { const at = siblings(path).findIndex((one) => keyOf(one.path) === keyOf(path)); return at > 0 ? placed(path, path.slice(0, -1), siblings(path)[at - 1].path.at(-1)) : null; }),
@@ -287,7 +318,7 @@ find("text").addEventListener("click", () => link.say({ do: "text" }));
 
 async function saveAs() {
   const proposed = view.status.source.split("/").at(-1);
-  const answers = await ask("Save as", "Another file of the same folder, which is designed from then on.", [{ name: "file", doc: "Ends in .xml.", proposed, choices: [] }]);
+  const answers = await ask("Save as", "Another file of the same folder, which is designed from then on.", [{ name: "file", doc: "Ends in .xml.", proposed, choices: [], is_required: true }]);
   if (answers && answers[0] === proposed) acts.save();
   else if (answers) change(() => ({ do: "save", name: answers[0] }));
 }

@@ -2,11 +2,15 @@
 
 const find = (id) => document.getElementById(id);
 
-/** Ask for each of `asks` ({name, doc, proposed, choices}); resolves to the answers in their order, or null. */
-export function ask(title, doc, asks) {
+/**
+ * Ask for each of `asks` ({name, doc, proposed, choices, is_required}); resolves to the answers in their order, or null.
+ * `refused` says why earlier answers were not taken.
+ */
+export function ask(title, doc, asks, refused = "") {
   const dialog = find("ask"), form = dialog.querySelector("form");
   find("ask-title").textContent = title;
   find("ask-doc").textContent = doc;
+  find("ask-refused").textContent = refused;
   const fields = asks.map((asked, number) => field(asked, `answer-${number}`));
   find("ask-fields").replaceChildren(...fields.map((one) => one.label));
   const cancel = form.querySelector("button[value=cancel]");
@@ -72,7 +76,7 @@ export function read(title, text, line = 1) {
   shown.scrollTop = (shown.scrollHeight * (line - 1)) / Math.max(1, text.split("\n").length);
 }
 
-/** A labelled input, or a select where the answers can be listed. */
+/** A labelled input, or a select where the answers can be listed; Enter in either is the form's. */
 function field(asked, id) {
   const label = document.createElement("label"), name = document.createElement("span"), doc = document.createElement("span");
   const input = asked.choices.length ? document.createElement("select") : document.createElement("input");
@@ -80,7 +84,13 @@ function field(asked, id) {
   input.id = id;
   input.name = asked.name;
   input.value = asked.proposed;
+  input.required = asked.is_required;
   input.autocomplete = "off";
+  if (asked.choices.length) {
+    input.addEventListener("keydown", (event) => {
+      if (event.key === "Enter") { event.preventDefault(); input.form.requestSubmit(); }
+    });
+  }
   name.textContent = asked.name;
   doc.className = "quiet";
   doc.textContent = asked.doc;

@@ -63,12 +63,18 @@ export class Palette {
 }
 
 // ---------------------------------------------------------------- details
-/** What can be set of the chosen element; `set(path, property, value)` is called when a field was changed. */
+/**
+ * What can be set of the chosen element; `set(path, property, value)` is called when a field was changed. A value that was
+ * refused stays in its field, marked, until it is changed; Escape brings back what is set.
+ */
 export class Details {
   constructor({ form, set }) {
     Object.assign(this, { form, set });
-    this.shape = "";
-    form.addEventListener("submit", (event) => { event.preventDefault(); document.activeElement?.blur(); });
+    this.shape = this.path = "";
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      for (const input of form.querySelectorAll("input, select")) this.commit(input);
+    });
   }
 
   show(element, problems) {
@@ -77,36 +83,76 @@ export class Details {
     find("details-problems").replaceChildren(...problems.map((one) => listed(one)));
     find("type-doc").hidden = element.type_doc.length === 0;
     find("type-doc").querySelector("pre").textContent = element.type_doc.join("\n");
-    const shape = JSON.stringify([element.path, element.properties.map((one) => [one.name, one.is_parameter, one.choices, one.doc])]);
-    if (shape !== this.shape) {
-      const focus = this.form.contains(document.activeElement) ? document.activeElement.dataset.key : "";
-      this.form.replaceChildren(...element.properties.map((one) => this.field(element.path, one)));
-      this.shape = shape;
-      if (focus) this.form.querySelector(`[data-key="${CSS.escape(focus)}"]`)?.focus();
-    }
+    this.path = element.path.join("/");
+    const kinds = element.properties.map((one) => [one.name, one.is_parameter, one.choices, one.doc]);
+    const shape = JSON.stringify([element.path, kinds]);
+    if (shape !== this.shape) this.rebuild(element);
+    this.shape = shape;
     for (const one of element.properties) this.fill(one);
   }
 
-  field(path, one) {
-    const label = document.createElement("label"), name = document.createElement("span"), doc = document.createElement("span");
+  rebuild(element) {
+    const focus = this.form.contains(document.activeElement) ? document.activeElement.dataset.key : "";
+    const set = document.createElement("button");
+    set.textContent = "Set"; // what Enter presses
+    this.properties = new Map(element.properties.map((one) => [keyOf(one), one]));
+    this.form.replaceChildren(...element.properties.map((one) => this.field(one)), set);
+    set.hidden = element.properties.length === 0;
+    if (focus) this.input(focus)?.focus();
+  }
+
+  field(one) {
+    const label = document.createElement("label");
     const input = one.choices.length ? document.createElement("select") : document.createElement("input");
     if (one.choices.length) input.append(new Option("", ""), ...one.choices.map((each) => new Option(each, each)));
     input.dataset.key = keyOf(one);
+    input.dataset.path = this.path;
     input.autocomplete = "off";
     input.spellcheck = false;
-    input.addEventListener("change", () => { if (input.value !== input.dataset.is) this.set(path, one, input.value); });
-    name.className = "name";
-    name.textContent = one.is_parameter ? `${one.name} (parameter)` : one.name;
-    doc.className = "quiet";
-    doc.textContent = one.doc;
-    label.append(name, input, doc);
+    input.addEventListener("change", () => this.commit(input));
+    input.addEventListener("input", () => this.mark(input, ""));
+    input.addEventListener("keydown", (event) => { if (event.key === "Escape") this.takeBack(input); });
+    const refused = line("refused", "");
+    refused.setAttribute("role", "alert");
+    label.append(line("name", one.is_parameter ? `${one.name} (parameter)` : one.name), input, refused, line("quiet", one.doc));
     return label;
   }
 
-  /** Show the value, unless somebody is just writing another one. */
+  input(key) { return this.form.querySelector(`[data-key="${CSS.escape(key)}"]`); }
+
+  /** Have the value set that is written in a field, once. */
+  commit(input) {
+    const { key, path, said, is } = input.dataset;
+    if (input.value === (said ?? is ?? "")) return;
+    input.dataset.said = input.value;
+    this.set(path === "" ? [] : path.split("/").map(Number), this.properties.get(key), input.value);
+  }
+
+  /** A value was not taken: say so where it stands. */
+  refused(path, one, value, why) {
+    const input = path.join("/") === this.path ? this.input(keyOf(one)) : null;
+    if (input === null || (input.value !== value && input === document.activeElement)) return;
+    delete input.dataset.said;
+    input.value = value;
+    this.mark(input, why);
+  }
+
+  mark(input, why) {
+    if (why) input.setAttribute("aria-invalid", "true"); else input.removeAttribute("aria-invalid");
+    input.parentElement.querySelector(".refused").textContent = why;
+  }
+
+  takeBack(input) {
+    delete input.dataset.said;
+    input.value = input.dataset.is ?? "";
+    this.mark(input, "");
+  }
+
+  /** Show the value, unless another one is just being written, or was refused and nothing has changed since. */
   fill(one) {
-    const input = this.form.querySelector(`[data-key="${CSS.escape(keyOf(one))}"]`);
-    const value = one.value ?? "", isWriting = input === document.activeElement && input.value !== (input.dataset.is ?? "");
+    const input = this.input(keyOf(one)), value = one.value ?? "", was = input.dataset.is ?? "";
+    const isWriting = input === document.activeElement && input.value !== was;
+    const isRefused = input.getAttribute("aria-invalid") === "true" && value === was;
     const nothing = one.is_missing ? "missing" : one.default === null ? "" : `${one.default} (default)`;
     if (input.tagName === "SELECT") {
       if (value && ![...input.options].some((each) => each.value === value)) input.append(new Option(value, value));
@@ -114,8 +160,15 @@ export class Details {
     } else input.placeholder = nothing;
     input.classList.toggle("is-missing", one.is_missing);
     input.dataset.is = value;
-    if (!isWriting) input.value = value;
+    if (input.value === value || !(isWriting || isRefused)) this.takeBack(input);
   }
+}
+
+function line(className, text) {
+  const made = document.createElement("span");
+  made.className = className;
+  made.textContent = text;
+  return made;
 }
 
 const keyOf = (one) => `${one.is_parameter ? "parameter " : ""}${one.name}`;

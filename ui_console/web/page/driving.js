@@ -1,47 +1,67 @@
 // Hands: pad, keys and gamepad become one stick, which is told again and again while it is held, and never otherwise.
 
+import { DRIVES } from "./keys.js";
+
 const SAY_EVERY_MS = 50; // chosen: six times within the 300 ms after which the server stops the wheels
-const KEYS = {
-  ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0],
-  ArrowLeft: [0, -1], KeyA: [0, -1], ArrowRight: [0, 1], KeyD: [0, 1],
-};
 const SHOULDERS = [4, 5]; // Gamepad API, standard mapping
-const FACE_STOP = 1;
+const BUTTONS = { 0: "jump", 1: "stop_mine", 3: "stop_all", 8: "release", 9: "take" }; // as the terminal has them
 const DEAD_ZONE = 0.12; // chosen: worn sticks rest within it
 
-/** Says where the stick is while something holds it, and one stop when nothing does any more. */
+/**
+ * Says where the stick is while something holds it, and one stop when nothing does any more.
+ *
+ * `does` is called with what a gamepad's button asks for; `hint` is shown while something is held that counts no more.
+ * What is held when `letGo` is called counts no more, until it was let go and is held anew: a key pressed, a finger put
+ * down, the gamepad's shoulder button pressed again.
+ */
 export class Driving {
-  constructor({ pad, knob, say, isClogged, speed }) {
-    Object.assign(this, { pad, knob, say, isClogged, speed });
+  constructor({ pad, knob, hint, say, isClogged, speed, does }) {
+    Object.assign(this, { pad, knob, hint, say, isClogged, speed });
+    this.isOn = false;
     this.keys = new Set();
     this.pointer = null;
     this.stick = [0, 0];
-    this.gamepad = null;
-    this.hadGamepadHold = false;
+    this.gamepad = new Gamepad(does);
     this.timer = 0;
     pad.addEventListener("pointerdown", (event) => this.grab(event));
     pad.addEventListener("pointermove", (event) => this.drag(event));
-    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(end, (event) => this.drop(event));
-    addEventListener("keydown", (event) => this.keyDown(event));
-    addEventListener("keyup", (event) => { this.keys.delete(event.code); this.update(); });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+      pad.addEventListener(end, (event) => this.drop(event));
+    }
+    addEventListener("keyup", (event) => { this.hint.hidden = true; if (this.keys.delete(event.code)) this.update(); });
+    addEventListener("pointerup", () => { this.hint.hidden = true; });
     addEventListener("blur", () => this.letGo());
     addEventListener("pagehide", () => this.letGo());
     document.addEventListener("visibilitychange", () => { if (document.hidden) this.letGo(); });
-    addEventListener("gamepadconnected", () => this.lookAtGamepads());
+    addEventListener("gamepadconnected", () => this.followGamepad());
+  }
+
+  /** Whether there is a robot to drive; hands count only from then on. */
+  turn(isOn) {
+    if (isOn === this.isOn) return;
+    this.letGo();
+    this.isOn = isOn;
+    this.pad.setAttribute("aria-disabled", String(!isOn));
   }
 
   /** What is wanted now: [forward, right], or null if nothing is held. */
   wanted() {
+    if (!this.isOn) return null;
     if (this.pointer !== null) return this.stick;
-    if (this.gamepad !== null) return this.gamepad;
+    if (this.gamepad.stick !== null) return this.gamepad.stick;
     if (this.keys.size === 0) return null;
     let [forward, right] = [0, 0];
-    for (const code of this.keys) { forward += KEYS[code][0]; right += KEYS[code][1]; }
+    for (const code of this.keys) { forward += DRIVES[code][0]; right += DRIVES[code][1]; }
     return [Math.sign(forward), Math.sign(right)];
   }
 
+  press(code) {
+    this.keys.add(code);
+    this.update();
+  }
+
   grab(event) {
-    if (this.pointer !== null || (event.pointerType === "mouse" && event.button !== 0)) return;
+    if (!this.isOn || this.pointer !== null || (event.pointerType === "mouse" && event.button !== 0)) return;
     event.preventDefault();
     this.pad.focus({ preventScroll: true });
     this.pad.setPointerCapture(event.pointerId);
@@ -67,38 +87,28 @@ export class Driving {
     this.update();
   }
 
-  keyDown(event) {
-    if (event.target.closest("input, textarea, select, dialog") || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.code === "Space" || event.code === "Escape") {
-      if (!event.target.closest("button")) event.preventDefault();
-      this.letGo(true);
-    } else if (event.code in KEYS && !(event.target.closest("[role=tablist]") && event.code.startsWith("Arrow"))) {
-      event.preventDefault();
-      if (event.repeat) return; // a key that was let go by a stop counts again only when it is pressed again
-      this.keys.add(event.code);
-      this.update();
-    }
-  }
-
   /** Nothing is held any more, whatever the hands do; a stop is said if something was, or if it has to be. */
   letGo(always = false) {
-    const held = this.timer !== 0;
+    const wasHeld = this.timer !== 0;
+    if (wasHeld) this.hint.hidden = false;
     this.keys.clear();
     this.pointer = null;
-    this.gamepad = null;
+    this.gamepad.spend();
     this.stick = [0, 0];
-    if (held) this.update(); else if (always) this.say({ do: "stop" });
+    if (wasHeld) this.update(); else if (always) this.say({ do: "stop" });
   }
 
-  lookAtGamepads() {
-    const found = [...navigator.getGamepads()].find((one) => one !== null && one.connected);
-    if (!found) { this.gamepad = null; this.update(); return; }
-    const isHeld = SHOULDERS.some((button) => found.buttons[button]?.pressed) && !found.buttons[FACE_STOP]?.pressed;
-    const near = (value) => (Math.abs(value) < DEAD_ZONE ? 0 : Math.max(-1, Math.min(1, value)));
-    this.gamepad = isHeld && document.hasFocus() ? [near(-found.axes[1]), near(found.axes[0])] : null;
-    if (this.gamepad !== null || this.hadGamepadHold) this.update();
-    this.hadGamepadHold = this.gamepad !== null;
-    requestAnimationFrame(() => this.lookAtGamepads());
+  followGamepad() {
+    if (this.isFollowing) return;
+    this.isFollowing = true;
+    const look = () => {
+      const found = [...navigator.getGamepads()].find((one) => one?.connected);
+      this.gamepad.feel(document.hasFocus() ? found : undefined);
+      if (this.timer !== 0 || this.gamepad.stick !== null) this.update();
+      this.isFollowing = found !== undefined;
+      if (found) requestAnimationFrame(look);
+    };
+    look();
   }
 
   update() {
@@ -109,6 +119,7 @@ export class Driving {
     if (wanted === null) {
       if (this.timer !== 0) { clearInterval(this.timer); this.timer = 0; this.say({ do: "stop" }); }
     } else if (this.timer === 0) {
+      this.hint.hidden = true;
       this.timer = setInterval(() => this.tell(), SAY_EVERY_MS);
       this.tell();
     }
@@ -119,4 +130,38 @@ export class Driving {
     if (wanted === null || this.isClogged()) return; // what cannot leave now must not arrive late
     this.say({ do: "drive", forward: wanted[0], right: wanted[1], speed_rad_s: this.speed() });
   }
+}
+
+/** A gamepad as it was felt last. Pure: `feel` gets what the browser says of it. */
+export class Gamepad {
+  constructor(does) {
+    this.does = does;
+    this.stick = null;
+    this.isSpent = true; // a shoulder button that is held from the beginning was not pressed for this page
+    this.pressed = null;
+  }
+
+  /** What is held counts no more. */
+  spend() {
+    this.stick = null;
+    this.isSpent = true;
+  }
+
+  /** Take in how it is; undefined: it is away, or it is another window's. */
+  feel(device) {
+    if (device === undefined) { this.spend(); this.pressed = null; return; }
+    const isDown = (number) => device.buttons[number]?.pressed ?? false;
+    const before = this.pressed;
+    this.pressed = Object.keys(BUTTONS).filter((number) => isDown(number));
+    if (before !== null) {
+      for (const number of this.pressed) if (!before.includes(number)) this.does(BUTTONS[number]);
+    }
+    const isHeld = SHOULDERS.some(isDown);
+    if (!isHeld) this.isSpent = false;
+    this.stick = isHeld && !this.isSpent ? [near(-device.axes[1]), near(device.axes[0])] : null;
+  }
+}
+
+function near(value) {
+  return Math.abs(value) < DEAD_ZONE ? 0 : Math.max(-1, Math.min(1, value));
 }

@@ -1,26 +1,48 @@
-// The connection to the server: says who is there, comes back by itself, hands on what is heard.
+// The connection to the server: says who is there, comes back by itself, hands on what is heard, and knows how old it is.
+
+import { Freshness, makeClock } from "./freshness.js";
 
 const AGAIN_FIRST_MS = 500; // chosen: a server that was restarted is back soon
 const AGAIN_MOST_MS = 5000; // chosen: a person waits no longer before looking
-const SILENT_MS = 2000; // chosen: the server says something four times a second; no browser tells that a network is gone
+const BEAT_EVERY_MS = 250; // chosen: what is shown is known to be fresh to a quarter of a second
+const LOOK_EVERY_MS = 100;
+const OLD_MS = 800; // chosen: with the looks between, it is said before what is shown is a second old
+const SILENT_MS = 2000; // chosen: eight beats that did not come back; no browser tells that a network is gone
 const NOT_LET_IN = 1008;
 
-/** One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets (isUp, why). */
+/**
+ * One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets {is, why, ageMs}, where `is` says
+ * whether what is shown is "fresh", "old" (nothing came back for most of a second), "down", or "refused" (wrong token).
+ */
 export class Link {
-  constructor({ heard, saw, changed, silentMs = SILENT_MS }) {
-    Object.assign(this, { heard, saw, changed });
+  constructor({ heard, saw, changed, silentMs = SILENT_MS, oldMs = OLD_MS }) {
+    Object.assign(this, { heard, saw, changed, silentMs, oldMs });
     this.socket = null;
-    this.isUp = false;
+    this.is = "down";
+    this.why = "";
     this.waitMs = AGAIN_FIRST_MS;
     this.timer = 0;
-    this.heardAt = 0;
-    setInterval(() => { if (this.isUp && performance.now() - this.heardAt > silentMs) this.giveUp(); }, 250);
+    this.now = makeClock();
+    this.freshness = new Freshness();
+    this.seenSince = 0;
+    setInterval(() => this.beat(), BEAT_EVERY_MS);
+    setInterval(() => this.look(), LOOK_EVERY_MS);
+    document.addEventListener("visibilitychange", () => {
+      if (document.hidden) return;
+      this.seenSince = this.now(); // a page that nobody saw was not called often
+      this.beat();
+    });
   }
 
   open(hello) {
     this.hello = hello;
     this.connect();
   }
+
+  get isUp() { return this.is === "fresh" || this.is === "old"; }
+
+  /** How old what is shown can be, in milliseconds. */
+  get ageMs() { return this.freshness.age(this.now()); }
 
   connect() {
     clearTimeout(this.timer);
@@ -30,33 +52,60 @@ export class Link {
     socket.onopen = () => socket.send(JSON.stringify({ do: "hello", ...this.hello }));
     socket.onmessage = (event) => {
       if (socket !== this.socket) return;
-      this.heardAt = performance.now();
       if (typeof event.data !== "string") { this.saw(readPacket(event.data)); return; }
-      if (!this.isUp) { this.isUp = true; this.waitMs = AGAIN_FIRST_MS; this.changed(true, ""); }
-      this.heard(JSON.parse(event.data));
+      if (!this.isUp) this.came();
+      const message = JSON.parse(event.data);
+      if (message.view?.beat !== undefined) this.freshness.returned(message.view.beat);
+      this.heard(message);
+      this.look();
     };
     socket.onclose = (event) => {
       if (socket !== this.socket) return;
-      const wasUp = this.isUp;
-      this.isUp = false;
-      if (event.code === NOT_LET_IN && !wasUp) { this.socket = null; this.changed(false, event.reason, true); return; }
-      this.again(event.reason || "no connection to the server");
+      this.socket = null;
+      if (event.code === NOT_LET_IN && !this.isUp) this.become("refused", event.reason);
+      else this.again(event.reason || "no connection to the server");
     };
+  }
+
+  came() {
+    this.waitMs = AGAIN_FIRST_MS;
+    this.freshness.begin(this.now());
+    this.seenSince = this.now();
+    this.become("fresh", "");
+    this.beat();
+  }
+
+  beat() {
+    if (this.isUp) this.say({ do: "beat", number: this.freshness.beat(this.now()) });
+  }
+
+  /** Find out how old what is shown is; in a page that nobody sees that matters to nobody, and is not looked at in time. */
+  look() {
+    if (!this.isUp || document.hidden) return;
+    const now = this.now(), ageMs = this.freshness.age(now);
+    if (Math.min(ageMs, now - this.seenSince) > this.silentMs) this.giveUp();
+    else if (ageMs > this.oldMs) this.become("old", "the server is silent");
+    else this.become("fresh", "");
   }
 
   /** Nothing is heard any more: whatever this connection still brings is too old. */
   giveUp() {
     const silent = this.socket;
     this.socket = null;
-    this.isUp = false;
     silent.close();
     this.again("the server is silent");
   }
 
   again(why) {
-    this.changed(false, why);
+    this.become("down", why);
     this.timer = setTimeout(() => this.connect(), this.waitMs);
     this.waitMs = Math.min(2 * this.waitMs, AGAIN_MOST_MS);
+  }
+
+  become(is, why) {
+    const isNew = is !== this.is || (is === "down" && why !== this.why);
+    [this.is, this.why] = [is, why];
+    if (isNew) this.changed({ is, why, ageMs: this.ageMs });
   }
 
   /** Say something if it can be said now: nothing is kept for later, least of all a drive. */

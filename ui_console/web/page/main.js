@@ -1,11 +1,19 @@
 // The page: joins the connection, the cards, the hands and the tables.
 
+import { Blindness } from "./blind.js";
+import { Cards } from "./cards.js";
 import { Driving } from "./driving.js";
+import { Hand } from "./hand.js";
+import { Keys } from "./keys.js";
 import { Link } from "./link.js";
 import { Login } from "./login.js";
-import { Cards } from "./pictures.js";
-import { Tables, seconds } from "./tables.js";
+import { notice, read, showAlarm, showHealth } from "./notices.js";
+import { Stopping } from "./stopping.js";
+import { Tables } from "./tables.js";
+import { seconds, set } from "./text.js";
+import { followTheme } from "./theme.js";
 
+const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which nobody is thought to be here
 const find = (id) => document.getElementById(id);
 const view = {};
 
@@ -13,24 +21,34 @@ const link = new Link({ heard, saw: (picture) => cards.saw(picture), changed });
 const say = (message) => link.say(message);
 const cards = new Cards({ root: find("videos"), say, act });
 const tables = new Tables({ tabs: find("tabs"), panel: find("panel"), act });
+const stopping = new Stopping({ say, shown: find("unsure") });
 const driving = new Driving({
-  pad: find("pad"), knob: find("knob"), say,
+  pad: find("pad"), knob: find("knob"), hint: find("let-go"), say,
+  does: (what) => act(what, what === "take" ? cards.meant : ""),
   isClogged: () => link.isClogged,
-  speed: () => Number(find("speed").value),
+  speed: () => hand.speed,
 });
+const hand = new Hand({ act, driving });
+const blindness = new Blindness({
+  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("videos"), find("hand")],
+  stops: () => document.querySelectorAll("button.emergency"),
+});
+new Keys({ isHeld: () => hand.held !== "", does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")) });
+followTheme(find("theme"));
 
 // ---------------------------------------------------------------- coming in
 const login = new Login({ form: find("login"), enter: (hello) => link.open(hello) });
 
-function changed(isUp, why, isRefused = false) {
-  const shown = find("link");
-  shown.classList.toggle("is-down", !isUp);
-  shown.textContent = isUp ? "connected" : `NOT CONNECTED: ${why}`;
-  find("stop-all").disabled = !isUp;
-  document.body.classList.toggle("is-down", !isUp);
-  if (isUp) { find("console").hidden = false; cards.watch(); return; }
+function changed({ is, why, ageMs }) {
+  set(find("link"), is === "fresh" ? "connected" : is === "old" ? `NOT HEARD: ${why}` : `NOT CONNECTED: ${why}`);
+  find("link").classList.toggle("is-down", is !== "fresh");
   driving.letGo();
-  if (isRefused) { find("console").hidden = true; login.ask(why); }
+  cards.letGo();
+  if (link.isUp) find("console").hidden = false;
+  else hand.cut(why, ageMs);
+  if (is === "fresh") cards.watch();
+  if (is === "refused") { find("console").hidden = true; login.ask(why); }
+  blindness.look();
 }
 
 // ---------------------------------------------------------------- what is heard
@@ -39,103 +57,71 @@ function heard(message) {
   Object.assign(view, message.view);
   const changes = message.view;
   if (changes.welcome) {
-    find("mission").textContent = `${view.welcome.mission} · ${view.welcome.user}, priority ${view.welcome.priority}`;
-    document.title = `${view.welcome.mission} – Scout console`;
+    const { mission, user, priority } = view.welcome;
+    find("mission").textContent = `${mission} · ${user}, priority ${priority}`;
+    document.title = `${mission} – Scout console`;
   }
-  if (changes.now_s !== undefined) find("clock").textContent = seconds(view.now_s);
-  if (changes.own) showOwn(view.own);
+  if (changes.now_s !== undefined) set(find("clock"), seconds(view.now_s));
+  if (changes.own) {
+    hand.show(view.own, view.now_s ?? 0);
+    const down_s = view.own.link_down_s ?? -1;
+    blindness.hub(down_s < 0 ? -1 : 1000 * Math.max(0, (view.now_s ?? down_s) - down_s));
+  }
+  if (changes.robots) stopping.heard(view.robots);
   if (changes.robots || changes.own) cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
   if (changes.health !== undefined) showHealth(view.health);
-  if (changes.alarms) showAlarm(view.alarms);
+  if (changes.alarms) showAlarm(view.alarms, act);
   tables.show(view, changes);
-}
-
-function showOwn(own) {
-  set(find("own"), own.status);
-  set(find("taken"), own.taken_because ? `Taken from you: ${own.taken_because}` : "");
-  set(find("applied"), own.applied ? `applied: ${own.applied}` : "");
-  const consent = own.consent;
-  find("consent").hidden = consent === null;
-  if (consent) {
-    const others = consent.others ? `, ${consent.others} more ask` : "";
-    set(find("consent-line"), `${consent.user} asks for ${consent.robot}: ${consent.why} (${Math.ceil(consent.left_s)} s${others})`);
-  }
-  set(find("asked"), own.asked);
-  find("may-i").disabled = !own.is_asked || own.is_held;
-  find("release").disabled = !own.is_asked;
-  find("take").disabled = own.is_asked;
-  find("jump").disabled = !own.is_held;
-  document.body.dataset.held = own.is_held ? own.robot : "";
-}
-
-function showHealth(health) {
-  const shown = find("health");
-  shown.hidden = health === null;
-  if (health === null) return;
-  shown.className = health.word;
-  shown.title = health.lines.join("\n");
-  set(shown, `mission ${[health.word, ...health.lines.slice(0, 1)].join(": ")}`);
-}
-
-function showAlarm(alarms) {
-  const bar = find("alarm-bar");
-  const first = alarms.find((alarm) => !alarm.acknowledged_by);
-  bar.hidden = first === undefined;
-  if (first === undefined || bar.dataset.shown === `${first.key}${first.line}${first.count}`) return;
-  bar.dataset.shown = `${first.key}${first.line}${first.count}`;
-  bar.className = first.severity;
-  const line = document.createElement("span");
-  line.textContent = `${first.severity}: ${first.line}${first.remedy ? ` — ${first.remedy}` : ""}`;
-  const seen = document.createElement("button");
-  seen.type = "button";
-  seen.textContent = "Seen";
-  seen.addEventListener("click", () => act("acknowledge", first.key));
-  bar.replaceChildren(line, seen);
 }
 
 function answered(answer) {
   if (answer.why !== undefined) read(`Why ${answer.why}?`, answer.lines);
-  else if (answer.refused) read("No", [answer.refused]);
-  else if (answer.told === false || answer.done === false) read("It did not answer so", ["See the alarms for what it said."]);
-}
-
-function read(title, lines) {
-  find("reading-title").textContent = title;
-  find("reading-lines").replaceChildren(...lines.map((line) => Object.assign(document.createElement("li"), { textContent: line })));
-  if (!find("reading").open) find("reading").showModal();
-}
-
-function set(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  else if (answer.refused) notice(answer.refused);
+  else if (answer.told === false || answer.done === false) notice("It did not answer so; see the alarms for what it said.");
 }
 
 // ---------------------------------------------------------------- what is wanted
+const words = {
+  take: (name) => ({ do: "take", robot: name }),
+  release: () => ({ do: "release" }),
+  lift: (name, more) => ({ do: "lift", robot: name, ...more }),
+  may_i: () => ({ do: "may_i" }),
+  consent: (isGiven) => ({ do: "decide", is_given: isGiven }),
+  dismiss: () => ({ do: "dismiss_lost" }),
+  jump: () => ({ do: "jump" }),
+  why: (name) => ({ do: "why", name }),
+  acknowledge: (key) => ({ do: "acknowledge", key }),
+  parameters: (name) => ({ do: "parameters", name }),
+  set: (name, more) => ({ do: "set", name, ...more }),
+};
+const LET_GO = ["take", "release", "lift", "consent"]; // what is held down was not meant for what comes of these
+
 function act(what, name, more = {}) {
   switch (what) {
-    case "take": driving.letGo(); return say({ do: "take", robot: name });
-    case "release": driving.letGo(); return say({ do: "release" });
-    case "stop_robot": driving.letGo(); return say({ do: "stop_robot", robot: name });
-    case "lift": return say({ do: "lift", robot: name, number: view.robots?.find((robot) => robot.robot === name)?.stop?.number ?? 0 });
-    case "why": return say({ do: "why", name });
-    case "acknowledge": return say({ do: "acknowledge", key: name });
-    case "parameters": return say({ do: "parameters", name });
-    case "set": return say({ do: "set", name, ...more });
+    case "halt": driving.letGo(true); return;
+    case "stop_robot": driving.letGo(); stopping.one(name); return;
+    case "stop_mine": driving.letGo(); stopMine(hand.held || cards.meant); return;
+    case "stop_all": driving.letGo(); stopping.all(); return;
+    case "faster": hand.change(1); return;
+    case "slower": hand.change(-1); return;
   }
+  if (LET_GO.includes(what)) driving.letGo();
+  if (!say(words[what](name, more))) notice(`NOT CONNECTED: ${what.replace("_", " ")} was not sent.`);
 }
 
-find("stop-all").addEventListener("click", () => { driving.letGo(); say({ do: "stop_all" }); });
-find("take").addEventListener("click", () => act("take", view.own?.robot ?? ""));
-find("release").addEventListener("click", () => act("release"));
-find("may-i").addEventListener("click", () => say({ do: "may_i" }));
-find("consent-yes").addEventListener("click", () => { driving.letGo(); say({ do: "decide", is_given: true }); });
-find("consent-no").addEventListener("click", () => say({ do: "decide", is_given: false }));
-find("halt").addEventListener("click", () => driving.letGo(true));
-find("jump").addEventListener("click", () => say({ do: "jump" }));
-find("speed").addEventListener("input", () => { find("speed-shown").textContent = find("speed").value; });
+function stopMine(name) {
+  if (name) stopping.one(name);
+  else notice("There is no robot to stop.");
+}
+
+find("stop-all").addEventListener("click", () => act("stop_all", ""));
+for (const dialog of document.querySelectorAll("dialog")) {
+  new MutationObserver(() => driving.letGo()).observe(dialog, { attributeFilter: ["open"] });
+}
 document.addEventListener("visibilitychange", () => say({ do: "here", is_there: !document.hidden }));
 let touchedAt = 0;
 addEventListener("pointerdown", () => {
-  if (performance.now() - touchedAt < 5000) return;
+  if (performance.now() - touchedAt < TOUCHED_EVERY_MS) return;
   touchedAt = performance.now();
   say({ do: "here", is_there: true });
 }, true);

@@ -1,6 +1,8 @@
 // Tables of the mission. What is shown was decided by the console model; here it only becomes rows.
 
-const SVG = "http://www.w3.org/2000/svg";
+import { seconds, set } from "./text.js";
+import { timeline } from "./timeline.js";
+
 const NAMES = ["alarms", "robots", "tree", "schedule", "timeline", "links", "parameters", "components", "log"];
 const NOTHING = { alarms: "none", tree: "no behavior is known yet", parameters: "ask a component for its parameters" };
 
@@ -21,51 +23,52 @@ export class Tables {
       tabs.append(button);
       this.buttons.set(name, button);
     }
-    tabs.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-      if (!step) return;
-      event.preventDefault();
-      const next = NAMES[(NAMES.indexOf(this.chosen) + step + NAMES.length) % NAMES.length];
-      this.choose(next);
-      this.buttons.get(next).focus();
-    });
+    tabs.addEventListener("keydown", (event) => this.step(event));
+    addEventListener("resize", () => { if (this.chosen === "timeline") this.draw(); });
     this.choose(this.chosen);
+  }
+
+  /** Arrows go from table to table, unless they drive. */
+  step(event) {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!step || event.defaultPrevented) return;
+    event.preventDefault();
+    const next = NAMES[(NAMES.indexOf(this.chosen) + step + NAMES.length) % NAMES.length];
+    this.choose(next);
+    this.buttons.get(next).focus();
   }
 
   choose(name) {
     this.chosen = name;
-    for (const [other, button] of this.buttons) {
-      button.setAttribute("aria-selected", String(other === name));
-      button.tabIndex = other === name ? 0 : -1;
-    }
+    for (const [other, button] of this.buttons) button.setAttribute("aria-selected", String(other === name));
     this.panel.setAttribute("aria-labelledby", `tab-${name}`);
-    this.shown = "";
     this.draw();
   }
 
   show(view, changed) {
     this.view = view;
     const alarms = (view.alarms ?? []).filter((alarm) => !alarm.acknowledged_by).length;
-    const label = alarms ? `alarms (${alarms})` : "alarms";
-    if (this.buttons.get("alarms").textContent !== label) this.buttons.get("alarms").textContent = label;
-    const section = this.chosen === "schedule" ? "requests" : this.chosen;
-    if (section in changed) this.draw();
+    set(this.buttons.get("alarms"), alarms ? `alarms (${alarms})` : "alarms");
+    if (this.section in changed) this.draw();
   }
 
+  get section() { return this.chosen === "schedule" ? "requests" : this.chosen; }
+
   draw() {
-    if (this.panel.querySelector("input:focus, button:active")) return; // somebody is typing or pressing here
-    const section = this.chosen === "schedule" ? "requests" : this.chosen;
-    const rows = this.view[section];
-    if (rows === undefined) return;
-    const focus = document.activeElement?.dataset?.key;
-    if (section === "timeline") this.panel.replaceChildren(timeline(rows));
-    else this.panel.replaceChildren(rows.length ? this[section](rows) : paragraph(NOTHING[this.chosen] ?? "nothing yet"));
+    const isHeld = this.panel.querySelector("input:focus, button:active") !== null;
+    this.panel.classList.toggle("is-held", isHeld); // somebody is typing or pressing here: it says that it stands still
+    const rows = this.view[this.section];
+    if (isHeld || rows === undefined) return;
+    const focus = this.panel.contains(document.activeElement) ? document.activeElement.dataset.key : "";
+    if (this.chosen === "timeline") this.panel.replaceChildren(timeline(rows, this.panel.clientWidth));
+    else if (rows.length) this.panel.replaceChildren(this[this.section](rows));
+    else this.panel.replaceChildren(paragraph(NOTHING[this.chosen] ?? "nothing yet"));
     if (focus) this.panel.querySelector(`[data-key="${CSS.escape(focus)}"]`)?.focus();
   }
 
   alarms(rows) {
     const all = this.button("Seen all", "acknowledge:", () => this.act("acknowledge", ""));
-    return table(["", "what", "since", "times", all], rows.map((row) => [
+    return table(["level", "what", "since", "times", all], rows.map((row) => [
       span(row.severity, row.is_active ? `${row.severity}, now` : row.severity),
       `${row.line}${row.remedy ? ` — ${row.remedy}` : ""}${row.while_away ? " (while away)" : ""}`,
       seconds(row.first_s), String(row.count),
@@ -74,28 +77,30 @@ export class Tables {
   }
 
   robots(rows) {
-    return table(["robot", "holder", "priority", "since", "slice ends", "lease left", "because", "waiting"], rows.map((row) => [
-      row.robot, row.is_mine ? "you" : row.holder || "–", row.priority, seconds(row.since_s), seconds(row.until_s),
+    const heads = ["robot", "stop", "holder", "priority", "since", "slice ends", "lease left", "because", "waiting"];
+    return table(heads, rows.map((row) => [
+      row.robot, row.stop ? span("alarm", `STOPPED by ${row.stop.by_user || row.stop.by}`) : "",
+      row.is_mine ? "you" : row.holder || "–", row.priority, seconds(row.since_s), seconds(row.until_s),
       seconds(row.lease_left_s), row.because, row.waiting.map((one) => one.who).join(", "),
     ]));
   }
 
   tree(rows) {
-    return table(["behavior", "state", "priority", "does", "because", ""], rows.map((row) => [
+    return table(["behavior", "state", "priority", "does", "because", "ask"], rows.map((row) => [
       "\u2003".repeat(row.depth) + row.name, span(row.state, row.state), row.priority === null ? "" : String(row.priority),
       row.feedback, row.because, this.more(row.name),
     ]));
   }
 
   requests(rows) {
-    return table(["who", "state", "resources", "priority", "since", "until", "expected", "because", ""], rows.map((row) => [
+    return table(["who", "state", "resources", "priority", "since", "until", "expected", "because", "ask"], rows.map((row) => [
       row.who, span(row.state, row.state), row.rcs.join(" "), row.priority, seconds(row.since_s), seconds(row.until_s),
       seconds(row.expected_start_s), row.because, this.button("Why?", `why:${row.arc}`, () => this.act("why", row.arc)),
     ]));
   }
 
   links(rows) {
-    return table(["link", "", "there and back", "more"], rows.map((row) => [
+    return table(["link", "state", "there and back", "more"], rows.map((row) => [
       row.name, span(row.is_up ? "running" : "lost", row.is_up ? "up" : "DOWN"),
       row.latency_s < 0 ? "" : `${(1000 * row.latency_s).toFixed(0)} ms`, row.feedback,
     ]));
@@ -119,7 +124,7 @@ export class Tables {
   }
 
   components(rows) {
-    return table(["component", "type", "host", "pid", "state", "does", ""], rows.map((row) => [
+    return table(["component", "type", "host", "pid", "state", "does", "ask"], rows.map((row) => [
       row.name, row.type, row.host, String(row.pid), row.state, row.feedback, this.more(row.name),
     ]));
   }
@@ -147,48 +152,30 @@ export class Tables {
   }
 }
 
+/** Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still. */
 function table(heads, rows) {
   const made = document.createElement("table");
+  made.setAttribute("role", "table");
   const head = made.createTHead().insertRow();
+  head.setAttribute("role", "row");
   for (const one of heads) {
     const cell = document.createElement("th");
     cell.scope = "col";
+    cell.setAttribute("role", "columnheader");
     cell.append(one);
     head.append(cell);
   }
   const body = made.createTBody();
   for (const row of rows) {
     const line = body.insertRow();
-    for (const one of row) line.insertCell().append(one);
+    line.setAttribute("role", "row");
+    row.forEach((one, number) => {
+      const cell = line.insertCell();
+      cell.setAttribute("role", "cell");
+      cell.dataset.head = typeof heads[number] === "string" ? heads[number] : "";
+      cell.append(one);
+    });
   }
-  return made;
-}
-
-function timeline(view) {
-  const height = 26, left = 120, width = 900;
-  const svg = node("svg", { class: "timeline", viewBox: `0 0 ${left + width} ${height * view.rows.length + 20}`, role: "img", "aria-label": "who had which resource, who has it, who comes next" });
-  const at = (time) => left + (width * (Math.max(view.from_s, Math.min(view.to_s, time)) - view.from_s)) / (view.to_s - view.from_s);
-  view.rows.forEach((row, number) => {
-    const top = number * height;
-    svg.append(node("text", { x: 4, y: top + 17 }, row.rc));
-    for (const slice of row.slices) {
-      const [from, to] = [at(slice.from_s), at(slice.to_s)];
-      const bar = node("rect", { x: from, y: top + 3, width: Math.max(1, to - from), height: height - 6, rx: 3, class: `${slice.certainty}${slice.is_console ? " console" : ""}` });
-      bar.append(node("title", {}, `${slice.who}: ${seconds(slice.from_s)} to ${seconds(slice.to_s)}`));
-      svg.append(bar);
-      if (to - from > 50) svg.append(node("text", { x: from + 4, y: top + 17 }, slice.who.slice(0, Math.floor((to - from) / 8))));
-    }
-  });
-  const here = at(view.now_s);
-  svg.append(node("line", { x1: here, x2: here, y1: 0, y2: height * view.rows.length, class: "here" }));
-  svg.append(node("text", { x: here - 30, y: height * view.rows.length + 15 }, seconds(view.now_s)));
-  return svg;
-}
-
-function node(tag, attributes, text = "") {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  if (text) made.textContent = text;
   return made;
 }
 
@@ -203,8 +190,4 @@ function paragraph(text) {
   const made = document.createElement("p");
   made.textContent = text;
   return made;
-}
-
-export function seconds(time) {
-  return time < 0 ? "" : `${time.toFixed(1)} s`;
 }

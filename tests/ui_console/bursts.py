@@ -1,0 +1,100 @@
+"""Keys pressed faster than a screen answers, every one of them on every screen."""
+
+from __future__ import annotations
+
+import itertools
+import string
+import unicodedata
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+from textual.app import App
+from textual.events import Key
+from textual.pilot import Pilot
+
+SIZES = [(80, 24), (120, 40), (200, 60)]
+LOOKS = list(itertools.product(["textual-dark", "textual-light"], [False, True]))
+"""Theme, and whether ``NO_COLOR`` is set."""
+LEAVE = {"q": 0, "ctrl+q": 0, "ctrl+c": 130}
+NAMED_KEYS = [
+    *("enter", "escape", "space", "tab", "shift+tab", "backspace", "delete", "home", "end", "insert"),
+    *("up", "down", "left", "right", "shift+up", "shift+down", "shift+left", "shift+right", "pageup", "pagedown"),
+    *("plus", "minus", "equals_sign", "question_mark", "left_square_bracket", "right_square_bracket"),
+    *("less_than_sign", "greater_than_sign", "full_stop", "slash", "alt+x", "alt+shift+x", "f1", "f2"),
+    *("ctrl+a", "ctrl+d", "ctrl+k", "ctrl+u", "ctrl+v", "ctrl+w", "ctrl+x", "ctrl+y", "ctrl+z"),
+]
+EVERY_KEY = [*string.ascii_letters, *string.digits, *NAMED_KEYS]
+CHARACTERS = {
+    "enter": "\r",
+    "escape": "\x1b",
+    "backspace": "\x7f",
+    "tab": "\t",
+    "minus": "-",
+    "plus": "+",
+}
+"""Of keys whose name is no Unicode name."""
+
+
+async def answered(pilot: Pilot[Any]) -> None:
+    """Return when the screen has taken in what was pressed; a dialog may be open then."""
+    for _ in range(3):
+        await pilot.pause()
+
+
+def burst(pilot: Pilot[Any], *keys: str) -> None:
+    """Press keys before the screen has answered the first of them."""
+    for key in keys:
+        pilot.app.post_message(Key(key, _character(key)))
+
+
+def _character(key: str) -> str | None:
+    if len(key) == 1 or key in CHARACTERS:
+        return CHARACTERS.get(key, key)
+    try:
+        return unicodedata.lookup(key.replace("_", " ").upper())
+    except KeyError:
+        return None
+
+
+async def press_all_twice(
+    app: App[None],
+    size: tuple[int, int],
+    opening: Sequence[str],
+    keys: Sequence[str],
+    to_main: Callable[[Pilot[None]], Awaitable[None]],
+    *,
+    is_dialog: bool,
+) -> None:
+    """Press each key twice at once on one screen; only the keys that leave may end it, and only in good order.
+
+    Args:
+        app: The program.
+        size: Columns and lines.
+        opening: Keys that bring the screen up from the main one.
+        keys: To be tried.
+        to_main: Goes back to the main screen as it was, once dialogs are closed.
+        is_dialog: Whether the screen is one.
+    """
+    ending = [key for key in keys if key in LEAVE]
+    async with app.run_test(size=size, notifications=True) as pilot:
+        for key in [*(key for key in keys if key not in LEAVE), *ending]:
+            await _close_dialogs(pilot)
+            await to_main(pilot)
+            await pilot.press(*opening)
+            await answered(pilot)
+            assert len(app.screen_stack) == 1 + is_dialog
+            burst(pilot, key, key)
+            await pilot.pause()
+            if not app.is_running:
+                assert key in LEAVE, f"{key} twice ended the screen"
+                break
+            await answered(pilot)
+            assert app.return_code is None, f"{key} twice ended the screen"
+    assert app.return_code in (None, *LEAVE.values())
+
+
+async def _close_dialogs(pilot: Pilot[None]) -> None:
+    while (before := len(pilot.app.screen_stack)) > 1:
+        await pilot.press("escape")
+        await pilot.pause()
+        assert len(pilot.app.screen_stack) < before, "escape closes a dialog"

@@ -1,0 +1,99 @@
+"""Every key of every screen, pressed twice before the screen answers: no console ends but by the keys that end it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bursts import EVERY_KEY, LEAVE, LOOKS, SIZES, burst, press_all_twice
+from console_scenes import STOP, held_model
+from screen_text import screen_text
+from textual.pilot import Pilot
+from written_session import WrittenSession, settle
+
+from ui_console.console_events import StopHeard
+from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.keys import Profile
+from ui_console.terminal.tables import PanelName
+
+CONSOLE_SCREENS: dict[str, list[str]] = {
+    "main": [],
+    "bare": ["v"],
+    "picker": ["p"],
+    "why": ["y"],
+    "keys": ["question_mark"],
+    "reason": ["M"],
+    "parameter": [*["tab"] * 6, "e"],
+    "lift": ["c"],
+}
+
+
+NO_DIALOGS = ("main", "bare")
+
+
+def console(profile: Profile = Profile.TERMINAL) -> ConsoleApp:
+    shown = held_model()
+    shown.apply(StopHeard(11.0, STOP))
+    session = WrittenSession(shown=shown)
+    session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
+    return ConsoleApp(session, profile=profile)
+
+
+async def to_main(pilot: Pilot[None]) -> None:
+    """Show everything again, with the first table chosen."""
+    app = pilot.app
+    assert isinstance(app, ConsoleApp)
+    if app.screen.has_class("-bare"):
+        await pilot.press("v")
+    while app.profile is not Profile.PENDANT and app.chosen is not PanelName.ROBOTS:
+        await pilot.press("tab")
+
+
+# ---------------------------------------------------------------------- what was seen to end a console
+@pytest.mark.parametrize("name", [name for name in CONSOLE_SCREENS if name not in NO_DIALOGS])
+@pytest.mark.parametrize("key", ["enter", "escape", "space", "q", "l"])
+async def test_a_dialog_is_answered_once_however_fast_its_key_comes_twice(name: str, key: str) -> None:
+    app = console()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*CONSOLE_SCREENS[name])
+        await settle(pilot)
+        burst(pilot, key, key)
+        await pilot.pause()
+        assert key == "q" or app.is_running
+        if app.is_running:
+            await settle(pilot)
+
+
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_without_colors_every_console_is_drawn(profile: Profile, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    app = console(profile)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert "scout1" in screen_text(app)
+
+
+# ---------------------------------------------------------------------- every key
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("name", CONSOLE_SCREENS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize(("theme", "is_colorless"), LOOKS)
+async def test_every_key_of_the_console_may_come_twice(
+    name: str, size: tuple[int, int], theme: str, is_colorless: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_colorless:
+        monkeypatch.setenv("NO_COLOR", "1")
+    app = console()
+    app.theme = theme
+    await press_all_twice(
+        app, size, CONSOLE_SCREENS[name], [*EVERY_KEY, *LEAVE], to_main, is_dialog=name not in NO_DIALOGS
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("profile", [Profile.PENDANT, Profile.MONITOR])
+@pytest.mark.parametrize("size", SIZES, ids=str)
+async def test_every_key_of_a_pendant_and_a_monitor_may_come_twice(profile: Profile, size: tuple[int, int]) -> None:
+    for opening in ([], ["question_mark"], ["c"]):
+        await press_all_twice(console(profile), size, opening, [*EVERY_KEY, *LEAVE], to_main, is_dialog=bool(opening))

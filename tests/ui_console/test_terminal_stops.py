@@ -1,0 +1,232 @@
+"""The emergency stop of the terminal console works everywhere, only ever stops, and is lifted by other keys."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from bursts import burst
+from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model
+from screen_text import screen_text
+from textual.events import AppBlur
+from textual.pilot import Pilot
+from textual.widgets import Input
+from written_session import WrittenSession, settle
+
+from ui_console.console_events import ScheduleHeard, StopHeard
+from ui_console.console_model import ConsoleModel
+from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.dialogs import READ_S
+from ui_console.terminal.keys import Profile, robot_meant, stop_meant
+from ui_console.terminal.widgets import DrivePad
+
+SIZE = (80, 24)
+DIALOGS: dict[str, list[str]] = {
+    "none": [],
+    "picture alone": ["v"],
+    "picker": ["p"],
+    "why": ["y"],
+    "keys": ["question_mark"],
+    "reason": ["M"],
+    "parameter": [*["tab"] * 6, "e"],
+    "lift": ["c"],
+}
+"""What is in front, and the keys that bring it there."""
+
+
+def stopped_model() -> ConsoleModel:
+    """Return one that holds scout1, which anna has stopped."""
+    shown = held_model()
+    shown.apply(StopHeard(11.0, STOP))
+    return shown
+
+
+async def opened(pilot: Pilot[None], name: str) -> None:
+    await pilot.press(*DIALOGS[name])
+    await settle(pilot)
+
+
+# ---------------------------------------------------------------------- everywhere
+@pytest.mark.parametrize("name", DIALOGS)
+@pytest.mark.parametrize(
+    ("key", "wanted"),
+    [
+        ("x", ("stop robot", "scout1")),
+        ("X", "stop all"),
+        ("alt+x", ("stop robot", "scout1")),
+        ("alt+shift+x", "stop all"),
+    ],
+)
+async def test_the_emergency_stop_works_whatever_is_in_front(name: str, key: str, wanted: object) -> None:
+    session = WrittenSession(shown=stopped_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await opened(pilot, name)
+        before = [field.value for field in pilot.app.screen.query(Input)]
+        session.wanted.clear()
+        await pilot.press(key)
+        await settle(pilot)
+        assert session.wanted == ["stop", wanted]
+        assert [field.value for field in pilot.app.screen.query(Input)] == before, "a stop is not typed"
+
+
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_every_profile_stops_one_robot_and_all(profile: Profile) -> None:
+    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), shown=held_model())
+    async with ConsoleApp(session, profile=profile).run_test(size=SIZE) as pilot:
+        await pilot.press("x", "X")
+        await settle(pilot)
+    assert [one for one in session.wanted if one != "stop"] == [("stop robot", "scout1"), "stop all"]
+
+
+async def test_a_text_may_hold_an_x_all_the_same() -> None:
+    session = WrittenSession(*TEAM_EVENTS)
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await pilot.press("M")
+        await settle(pilot)
+        assert "ctrl+x types an x" in screen_text(pilot.app)
+        await pilot.press(*"ne", "ctrl+x", *"t", "enter")
+        await settle(pilot)
+    assert session.wanted == [("may I", "next")]
+
+
+# ---------------------------------------------------------------------- only ever stops
+@pytest.mark.parametrize("name", DIALOGS)
+@pytest.mark.parametrize("key", ["x", "X"])
+async def test_a_stop_pressed_twice_lifts_nothing(name: str, key: str) -> None:
+    session = WrittenSession(shown=stopped_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        await opened(pilot, name)
+        session.wanted.clear()
+        burst(pilot, key, key)
+        await settle(pilot)
+        await pilot.press(key, "enter", key)
+        await settle(pilot)
+    assert not [one for one in session.wanted if isinstance(one, tuple) and one[0] == "lift"]
+
+
+@pytest.mark.parametrize("keys", [["c", "c"], ["c", "enter"], ["c", "space"], ["c", "x", "c"], ["c", "y"], ["l"]])
+async def test_no_key_pressed_twice_lifts_a_stop(keys: list[str]) -> None:
+    session = WrittenSession(shown=stopped_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        burst(pilot, *keys)
+        await settle(pilot)
+    assert not [one for one in session.wanted if isinstance(one, tuple) and one[0] == "lift"]
+
+
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_lifting_says_whose_stop_it_is_and_why_and_needs_another_key(profile: Profile) -> None:
+    session = WrittenSession(shown=stopped_model())
+    async with ConsoleApp(session, profile=profile).run_test(size=SIZE) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        told = screen_text(pilot.app)
+        assert "lift the stop of scout1?" in told
+        assert "anna" in told
+        assert "child in the room" in told
+        assert session.wanted == []
+        await pilot.press("l")
+        await settle(pilot)
+    assert session.wanted == [("lift", "scout1", STOP.number)]
+
+
+async def test_a_stop_set_anew_while_the_question_is_open_is_shown_and_not_lifted_unread() -> None:
+    session = WrittenSession(shown=stopped_model())
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        again = msgspec.structs.replace(STOP, number=STOP.number + 1, by="ben", reason="smoke", at_s=11.5)
+        session.model.apply(StopHeard(11.5, again))
+        app.redraw()
+        await pilot.press("l")
+        await settle(pilot)
+        told = screen_text(app)
+        assert "set by ben" in told
+        assert "smoke" in told
+        assert session.wanted == []
+        await pilot.pause(READ_S)
+        await pilot.press("l")
+        await settle(pilot)
+    assert session.wanted == [("lift", "scout1", again.number)]
+
+
+async def test_the_question_closes_when_somebody_else_lifts_the_stop() -> None:
+    session = WrittenSession(shown=stopped_model())
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        session.model.apply(StopHeard(11.5, msgspec.structs.replace(STOP, is_stopped=False, by="ben")))
+        app.redraw()
+        await settle(pilot)
+        assert len(app.screen_stack) == 1
+    assert session.wanted == []
+
+
+async def test_a_lift_that_was_not_granted_is_said_aloud() -> None:
+    session = WrittenSession(shown=stopped_model())
+    session.is_sure = False
+    async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        await pilot.press("l")
+        await settle(pilot)
+        await pilot.pause()
+        assert "scout1 stays stopped" in screen_text(pilot.app)
+
+
+async def test_where_no_robot_is_stopped_lifting_says_so() -> None:
+    session = WrittenSession(shown=held_model())
+    async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("c")
+        await settle(pilot)
+        await pilot.pause()
+        assert "no robot is stopped" in screen_text(pilot.app)
+    assert session.wanted == []
+
+
+def test_a_stop_is_for_the_robot_in_hand_then_for_the_row_then_for_the_one_wanted() -> None:
+    at_hand = {"held": "scout1", "placed": "scout2", "wanted": "scout3", "shown": "scout4"}
+    for name, robot in at_hand.copy().items():
+        assert robot_meant(**at_hand) == robot
+        at_hand[name] = ""
+    assert robot_meant(**at_hand) == ""
+
+
+def test_lifting_is_for_the_row_then_for_the_robot_in_hand_and_only_for_stopped_ones() -> None:
+    at_hand = {"held": "scout1", "placed": "scout2", "wanted": "", "shown": "scout4"}
+    assert stop_meant(["scout1", "scout2"], **at_hand) == "scout2"
+    assert stop_meant(["scout1", "scout3"], **at_hand) == "scout1"
+    assert stop_meant(["scout3"], **at_hand) == "scout3", "there is only one"
+    assert stop_meant(["scout3", "scout5"], **at_hand) == ""
+
+
+# ---------------------------------------------------------------------- a fresh press
+async def test_what_is_held_down_must_be_let_go_when_a_dialog_opens_and_when_it_closes() -> None:
+    session = WrittenSession(shown=stopped_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        for name, keys in DIALOGS.items():
+            before = session.must_let_go
+            await opened(pilot, name)
+            is_dialog = len(pilot.app.screen_stack) > 1
+            assert is_dialog == (name not in ("none", "picture alone")), keys
+            assert session.must_let_go == before + is_dialog
+            await pilot.press("escape")
+            await settle(pilot)
+            assert session.must_let_go == before + 2 * is_dialog
+
+
+@pytest.mark.parametrize("how", ["dialog", "window"])
+async def test_the_drag_pad_lets_go_when_a_dialog_opens_or_the_window_is_left(how: str) -> None:
+    session = WrittenSession(shown=held_model())
+    async with ConsoleApp(session).run_test(size=(120, 40)) as pilot:
+        await pilot.mouse_down(DrivePad, offset=(20, 1))
+        await pilot.pause()
+        assert session.wanted
+        if how == "dialog":
+            await pilot.press("p")
+        else:
+            pilot.app.post_message(AppBlur())
+        await settle(pilot)
+        session.wanted.clear()
+        await pilot.pause(0.3)
+        assert session.wanted == []

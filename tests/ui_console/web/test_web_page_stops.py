@@ -1,0 +1,300 @@
+"""Stops on the page, in a real browser: pressed at any place and in any focus, lifted only by who means it."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+from web_browser import Finger
+from web_page import (
+    ALL_SIZES,
+    GAMEPAD,
+    HANDS,
+    Pad,
+    Wheels,
+    card,
+    page_at,
+    stop_button,
+    take,
+    wait_free,
+    wait_stopped,
+    wait_until,
+)
+from web_stage import LOW, Stage
+
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
+
+HOLD_S = 1.0  # as holding.js has it
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_stop_pressed_twice_at_one_place_stops_and_never_lifts(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        for robot, gap_s in (("scout1", 0.15), ("scout2", 0.3), ("scout3", 0.6)):
+            button = stop_button(page, robot)
+            await button.scroll_into_view_if_needed()
+            box = await button.bounding_box()
+            x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            for _ in range(3):
+                await page.mouse.click(x, y)
+                await asyncio.sleep(gap_s)
+            await wait_stopped(page, robot)
+            await asyncio.sleep(0.3)
+            assert stage.robots[robot].is_stopped
+            assert stage.robots[robot].lifts == 0
+
+
+async def test_take_over_pressed_twice_takes_and_never_gives_back(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        box = await card(page).get_by_role("button", name="Take over").bounding_box()
+        for _ in range(3):
+            await page.mouse.click(box["x"] + 9, box["y"] + 9)
+            await asyncio.sleep(0.4)
+        await page.wait_for_selector("body[data-held=scout1]")
+        await asyncio.sleep(0.3)
+        assert not any(arc.is_idle or arc.released for arc in stage.placer.arcs.values())
+
+
+@pytest.mark.parametrize("by", ["mouse", "enter"])
+async def test_a_stop_is_lifted_by_holding_for_a_second_and_by_nothing_shorter(stage: Stage, by: str) -> None:
+    async def press() -> None:
+        if by == "mouse":
+            await page.mouse.down()
+        else:
+            await page.keyboard.down("Enter")
+
+    async def let_go() -> None:
+        if by == "mouse":
+            await page.mouse.up()
+        else:
+            await page.keyboard.up("Enter")
+
+    async with page_at(stage) as page:
+        await stop_button(page).click()
+        await wait_stopped(page)
+        lift = card(page).locator(".lift")
+        await lift.focus()
+        await lift.hover()
+        for held_s in (0.05, 0.4, 0.8 * HOLD_S):
+            await press()
+            await asyncio.sleep(held_s)
+            await let_go()
+        await lift.dblclick()
+        await page.keyboard.press("Space")
+        await asyncio.sleep(HOLD_S)
+        assert stage.robots["scout1"].lifts == 0
+        await lift.focus()
+        await lift.hover()
+        await press()
+        await wait_free(page)
+        await let_go()
+        assert stage.robots["scout1"].lifts == 1
+
+
+async def test_another_stop_that_comes_while_lift_is_held_is_not_lifted(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await stop_button(page).click()
+        await wait_stopped(page)
+        await card(page).locator(".lift").hover()
+        await page.mouse.down()
+        await asyncio.sleep(0.5)
+        stage.robots["scout1"].stop("ben", "", "somebody on the floor")
+        await asyncio.sleep(HOLD_S + 0.5)
+        await page.mouse.up()
+        assert stage.robots["scout1"].is_stopped
+
+
+async def test_who_lifts_anothers_stop_reads_whose_it_is_and_that_one_is_asked(stage: Stage) -> None:
+    async with page_at(stage) as page, stage.browser(LOW) as ben:
+        await ben.say(do="stop_robot", robot="scout1")
+        await wait_stopped(page)
+        standing = card(page).locator(".standing")
+        assert "STOPPED by ben" in await standing.inner_text()
+        assert "asks ben first" in await standing.inner_text()
+        for is_given in (False, True):
+            await standing.locator(".lift").hover()
+            await page.mouse.down()
+            await ben.wait(lambda: ben.view["own"]["consent"], "ben is asked")
+            await page.mouse.up()
+            assert ben.view["own"]["consent"]["topic"] == "lift"
+            assert stage.robots["scout1"].is_stopped
+            await ben.say(do="decide", is_given=is_given)
+            if is_given:
+                await wait_free(page)
+            else:
+                await page.locator("#asked").get_by_text("ben keeps scout1 stopped").wait_for()
+
+
+@pytest.mark.parametrize("hand", HANDS)
+async def test_what_is_held_through_a_stop_and_its_end_moves_nothing_before_it_is_pressed_anew(
+    stage: Stage, hand: str
+) -> None:
+    async with page_at(stage, script=GAMEPAD) as page, stage.browser() as other:
+        await take(page)
+        if hand == "gamepad":
+            await Pad(page).plug_in()
+        wheels, held = Wheels(stage), HANDS[hand](page)
+        await held.hold()
+        await wheels.wait_turning()
+        await other.say(do="stop_robot", robot="scout1")
+        await wait_stopped(page)
+        stage.robots["scout1"].free()
+        await wait_free(page)
+        await wheels.assert_still("it is still held from before")
+        assert await page.locator("#let-go").is_visible()
+        await held.let_go()
+        wheels.forget()
+        await held.hold()
+        await wheels.wait_turning()
+        assert await page.locator("#let-go").is_hidden()
+        await held.let_go()
+        await wheels.wait_halted()
+
+
+@pytest.mark.parametrize("hand", HANDS)
+async def test_what_is_held_when_the_robot_is_granted_moves_nothing_before_it_is_pressed_anew(
+    stage: Stage, hand: str
+) -> None:
+    async with page_at(stage, script=GAMEPAD) as page:
+        if hand == "gamepad":
+            await Pad(page).plug_in()
+        wheels, held = Wheels(stage), HANDS[hand](page)
+        await held.hold()
+        await page.evaluate("() => document.querySelector('[data-robot=scout1] .row button').click()")
+        await page.wait_for_selector("body[data-held=scout1]")
+        await wheels.assert_still("it was held before the robot was")
+        await held.let_go()
+        await held.hold()
+        await wheels.wait_turning()
+
+
+@pytest.mark.parametrize("hand", HANDS)
+async def test_what_is_held_while_a_dialog_comes_and_goes_moves_nothing_afterwards(stage: Stage, hand: str) -> None:
+    async with page_at(stage, script=GAMEPAD) as page:
+        await take(page)
+        if hand == "gamepad":
+            await Pad(page).plug_in()
+        wheels, held = Wheels(stage), HANDS[hand](page)
+        await held.hold()
+        await wheels.wait_turning()
+        await page.evaluate("() => document.getElementById('reading').showModal()")
+        await wheels.wait_halted()
+        await page.evaluate("() => document.getElementById('reading').close()")
+        await wheels.assert_still("it was held before the dialog came")
+
+
+FOCUS = {
+    "nothing": "document.activeElement.blur()",
+    "speed": "document.getElementById('speed').focus()",
+    "look": "document.getElementById('theme').focus()",
+    "tab": "document.getElementById('tab-log').focus()",
+    "pad": "document.getElementById('pad').focus()",
+    "button": "document.getElementById('release').focus()",
+    "text": "document.getElementById('login').hidden = false; document.getElementById('login-user').focus()",
+    "dialog": "document.getElementById('reading').showModal()",
+}
+
+
+async def test_keys_stop_one_and_all_whatever_has_the_focus(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await take(page)
+        robots = stage.robots.values()
+        for where, focus in FOCUS.items():
+            await page.evaluate(f"() => {{ {focus} }}")
+            await page.keyboard.press("x")
+            await wait_until(lambda: stage.robots["scout1"].is_stopped, f"x stops the robot in hand: {where}")
+            assert not stage.robots["scout2"].is_stopped
+            await page.keyboard.press("Shift+X")
+            await wait_until(lambda: all(robot.is_stopped for robot in robots), f"X stops all: {where}")
+            assert await page.locator("#login-user").input_value() == "", "it is no letter here"
+            for robot in robots:
+                robot.free()
+
+
+async def test_a_letter_that_stops_is_written_with_alt(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await page.evaluate(f"() => {{ {FOCUS['text']} }}")
+        await page.keyboard.type("ma")
+        await page.keyboard.press("Alt+x")
+        await page.keyboard.press("Alt+Shift+X")
+        assert await page.locator("#login-user").input_value() == "maxX"
+        assert not any(robot.orders for robot in stage.robots.values())
+
+
+async def test_space_and_escape_stop_the_wheels_whatever_has_the_focus(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await take(page)
+        wheels = Wheels(stage)
+        for key in ("Space", "Escape"):
+            for focus in FOCUS.values():
+                await page.evaluate(f"() => {{ {focus} }}")
+                wheels.forget()
+                await page.keyboard.press(key)
+                await wheels.wait_halted()
+        await asyncio.sleep(0.2)
+        assert await page.locator("body").get_attribute("data-held") == "scout1", "it is no button's press"
+
+
+async def test_arrows_drive_whatever_has_the_focus_unless_a_text_is_written_there(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await take(page)
+        wheels = Wheels(stage)
+        for where in ("nothing", "speed", "look", "tab", "pad", "button"):
+            await page.evaluate(f"() => {{ {FOCUS[where]} }}")
+            wheels.forget()
+            await page.keyboard.down("ArrowRight")
+            await wheels.wait_turning()
+            await page.keyboard.up("ArrowRight")
+            await wheels.wait_halted()
+        assert await page.locator("#speed").input_value() == "4"
+        assert await page.locator("#theme").input_value() == ""
+        assert await page.locator("#tab-alarms").get_attribute("aria-selected") == "true"
+        await page.keyboard.press("+")
+        assert await page.locator("#speed").input_value() == "5"
+        await page.evaluate(f"() => {{ {FOCUS['text']} }}")
+        await page.keyboard.press("ArrowRight")
+        await wheels.assert_still("it moves within the text")
+
+
+async def test_without_a_robot_x_stops_the_one_whose_card_has_the_focus(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        await card(page, "scout2").get_by_role("button", name="Take over").focus()
+        await page.keyboard.press("x")
+        await wait_until(lambda: stage.robots["scout2"].is_stopped, "stopped")
+        assert not stage.robots["scout1"].is_stopped
+
+
+@pytest.mark.parametrize(("button", "robots"), [(1, ["scout1"]), (3, ["scout1", "scout2", "scout3"])])
+async def test_a_gamepad_stops_one_and_all(stage: Stage, button: int, robots: list[str]) -> None:
+    async with page_at(stage, script=GAMEPAD) as page:
+        await take(page)
+        await Pad(page).plug_in()
+        await Pad(page).hold(button)
+        await wait_until(lambda: all(stage.robots[robot].is_stopped for robot in robots), "stopped")
+        assert [robot for robot, rc in stage.robots.items() if rc.is_stopped] == robots
+        assert all(stage.robots[robot].orders == 1 for robot in robots), "once for each press"
+
+
+async def test_a_stop_that_nobody_confirms_is_said_across_the_page(stage: Stage) -> None:
+    async with page_at(stage) as page:
+        stage.robots["scout2"].is_deaf = True
+        await stop_button(page, "scout2").click()
+        await page.locator("#unsure").get_by_text("NOT CERTAIN to have stopped: scout2").wait_for()
+        assert await page.locator("dialog[open]").count() == 0, "nothing stands before the red buttons"
+
+
+async def test_a_finger_that_was_on_the_pad_at_a_stop_drives_only_when_put_down_anew(stage: Stage) -> None:
+    async with page_at(stage, "phone") as page, stage.browser() as other:
+        await take(page)
+        wheels, finger = Wheels(stage), Finger(page)
+        await finger.push_right()
+        await wheels.wait_turning()
+        await other.say(do="stop_robot", robot="scout1")
+        await wait_stopped(page)
+        stage.robots["scout1"].free()
+        await wait_free(page)
+        await wheels.assert_still("the finger lies there from before")
+        await finger.lift()
+        await finger.push_right()
+        await wheels.wait_turning()
+        await finger.lift()

@@ -1,0 +1,108 @@
+"""A session that writes down what keys of the terminal console want."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from console_scenes import model
+from numpy.typing import NDArray
+from textual.pilot import Pilot
+
+from ui_console.console_events import ConsoleEvent
+from ui_console.console_model import ConsoleModel
+from ui_console.driving import Drive
+
+
+class WrittenSession:
+    """Writes down what keys want."""
+
+    def __init__(self, *events: ConsoleEvent, shown: ConsoleModel | None = None) -> None:
+        self.model = shown or model(*events)
+        self.wanted: list[Any] = []
+        self.touched = 0
+        self.must_let_go = 0
+        self.is_closed = False
+        self.shown: NDArray[np.uint8] | None = None
+        self.is_sure = True
+
+    def picture(self) -> NDArray[np.uint8] | None:
+        return self.shown
+
+    def now_s(self) -> float:
+        return 12.0
+
+    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+        self.wanted.append(drive if lasts_s is None else (drive, lasts_s))
+
+    def stop(self) -> None:
+        self.wanted.append("stop")
+
+    def require_let_go(self) -> None:
+        self.must_let_go += 1
+
+    def dismiss_lost(self) -> None:
+        self.wanted.append("dismiss lost")
+        self.model.dismiss_lost()
+
+    def closed(self) -> None:
+        self.is_closed = True
+
+    def jump(self) -> None:
+        self.wanted.append("jump")
+
+    def take(self) -> None:
+        self.wanted.append("take")
+
+    def release(self) -> None:
+        self.wanted.append("release")
+
+    def ask_consent(self, why: str = "") -> None:
+        self.wanted.append(("may I", why))
+
+    def decide(self, is_given: bool) -> None:
+        self.wanted.append(("decide", is_given))
+
+    async def switch(self, robot: str) -> None:
+        self.wanted.append(("switch", robot))
+
+    def touch(self) -> None:
+        self.touched += 1
+
+    def leave(self) -> None:
+        self.wanted.append("leave")
+
+    def acknowledge(self, key: str) -> None:
+        self.wanted.append(("acknowledge", key))
+        self.model.acknowledge(key)
+
+    async def stop_robot(self, robot: str) -> bool:
+        self.wanted.append(("stop robot", robot))
+        return self.is_sure
+
+    async def stop_all(self) -> list[str]:
+        self.wanted.append("stop all")
+        return [] if self.is_sure else ["scout2"]
+
+    async def lift_stop(self, robot: str, number: int) -> bool:
+        self.wanted.append(("lift", robot, number))
+        return self.is_sure
+
+    async def why(self, name: str) -> list[str]:
+        self.wanted.append(("why", name))
+        return [f"{name}: waiting", "  watch1 has its minimum run time"]
+
+    async def ask_parameters(self, name: str) -> bool:
+        self.wanted.append(("ask", name))
+        return True
+
+    async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
+        self.wanted.append(("set", name, parameter, value))
+        return self.is_sure
+
+
+async def settle(pilot: Pilot[Any]) -> None:
+    """Return when what keys began is done and drawn."""
+    await pilot.app.workers.wait_for_complete()
+    await pilot.pause()
+    await pilot.pause()

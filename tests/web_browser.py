@@ -1,0 +1,159 @@
+"""A real browser before a page of ours, hands for it, and a cable that can be cut.
+
+Screenshots for the documents are kept where ``SCOUT_PICTURES`` says.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import shutil
+from collections.abc import AsyncIterator, Collection
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+WITHIN_S = 30.0
+SIZES = {"desktop": (1440, 900), "tablet": (820, 1180), "phone": (390, 844)}
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), "")
+ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--force-color-profile=srgb"]
+
+
+@asynccontextmanager
+async def page_at(
+    size: str,
+    address: str,
+    *,
+    shows: str,
+    script: str = "",
+    theme: str = "dark",
+    expects: Collection[str] = ("WebSocket",),
+) -> AsyncIterator[Any]:
+    """Open a page in a browser of this size; anything the page complains about fails the test.
+
+    Args:
+        size: Of ``SIZES``.
+        address: With the token.
+        shows: What is on the page once it is connected.
+        script: Run before the page's own.
+        theme: What the system likes: light or dark.
+        expects: Words of complaints that are no fault of the page.
+    """
+    async_api = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
+    if not CHROMIUM:
+        pytest.skip("no Chromium on this machine: apt-get install chromium")
+    width, height = SIZES[size]
+    async with async_api.async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        try:
+            context = await browser.new_context(
+                viewport={"width": width, "height": height},
+                has_touch=size != "desktop",
+                is_mobile=size == "phone",
+                color_scheme=theme,
+            )
+            page = await context.new_page()
+            await page.add_init_script(script)
+            page.set_default_timeout(1000 * WITHIN_S)
+            complaints: list[str] = []
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+            await page.goto(f"{address}&user={size}")
+            await page.wait_for_selector(shows)
+            yield page
+            assert [one for one in complaints if not any(words in one for words in expects)] == []
+        finally:
+            await browser.close()
+
+
+async def keep_picture(page: Any, name: str) -> None:
+    """Take a screenshot for the documents if they are to be had."""
+    folder = os.environ.get("SCOUT_PICTURES")
+    if folder:
+        await page.screenshot(path=Path(folder) / f"{name}.jpg", type="jpeg", quality=60)
+
+
+async def assert_no_sideways_scroll(page: Any) -> None:
+    overhang_px = await page.locator("html").evaluate("page => page.scrollWidth - page.clientWidth")
+    assert overhang_px <= 0
+
+
+class Finger:
+    """A finger on the screen."""
+
+    def __init__(self, page: Any) -> None:
+        self._page = page
+
+    async def push_right(self) -> None:
+        """Put it down in the middle of the drive pad and move it to the right."""
+        await self._page.locator("#pad").scroll_into_view_if_needed()
+        box = await self._page.locator("#pad").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        await self.put_down(x, y)
+        await self._send("touchMove", [{"x": x + 0.45 * box["width"], "y": y}])
+
+    async def put_down(self, x: float, y: float) -> None:
+        self._touches = await self._page.context.new_cdp_session(self._page)
+        await self._send("touchStart", [{"x": x, "y": y}])
+
+    async def lift(self) -> None:
+        """Take it away."""
+        await self._send("touchEnd", [])
+
+    async def _send(self, kind: str, points: list[dict[str, float]]) -> None:
+        await self._touches.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
+class Cable:
+    """A connection to the server that can be pulled out, also one way: nothing passes then, and nobody is told."""
+
+    def __init__(self, to_port: int) -> None:
+        self._to_port, self.port = to_port, 0
+        self.is_cut_up = self.is_cut_down = False
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    @property
+    def is_cut(self) -> bool:
+        return self.is_cut_up and self.is_cut_down
+
+    @is_cut.setter
+    def is_cut(self, is_cut: bool) -> None:
+        self.is_cut_up = self.is_cut_down = is_cut
+
+    @asynccontextmanager
+    async def plugged_in(self) -> AsyncIterator[Cable]:
+        server = await asyncio.start_server(self._meet, "127.0.0.1", 0)
+        self.port = server.sockets[0].getsockname()[1]
+        try:
+            yield self
+        finally:
+            server.close()
+            for task in list(self._tasks):
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _meet(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self._to_port)
+        try:
+            await asyncio.gather(
+                self._carry(reader, far_writer, is_up=True), self._carry(far_reader, writer, is_up=False)
+            )
+        finally:
+            writer.close()
+            far_writer.close()
+
+    async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, is_up: bool) -> None:
+        with contextlib.suppress(ConnectionError):
+            while data := await reader.read(65536):
+                if not (self.is_cut_up if is_up else self.is_cut_down):
+                    writer.write(data)
+                    await writer.drain()
+            if not self.is_cut:
+                writer.close()

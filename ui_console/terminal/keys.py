@@ -1,0 +1,227 @@
+"""Keys of the terminal console: what each does, which console has it, and which of them its last line names.
+
+Rules of this file: no screen; a view and a width in, texts out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rich.style import Style
+from rich.text import Text
+from textual.binding import Binding
+
+from ui_console.views import ConsoleView
+
+MOST_PICKED_BY_KEY = 9
+STOP_KEYS = frozenset({"x", "X"})
+"""Keys of the emergency stop: no dialog and no field takes them for anything else."""
+
+
+class Profile(StrEnum):
+    """How a console looks."""
+
+    TERMINAL = "terminal"  # picture, tables, keys
+    PENDANT = "pendant"  # keys for one hand and the state of one robot; the picture is on a video monitor
+    MONITOR = "monitor"  # tables only; drives nothing
+
+
+DRIVE_KEYS = [
+    Binding("up,w", "drive('forward')", "drive forward while held"),
+    Binding("down,s", "drive('backward')", "drive backward while held"),
+    Binding("left,a", "drive('left')", "turn left on the spot while held"),
+    Binding("right,d", "drive('right')", "turn right on the spot while held"),
+]
+KEYS = [
+    # Escape and x within a tenth of a second reach a program as alt+x.
+    Binding("x,alt+x", "stop_robot", "EMERGENCY STOP of your robot, or of the row's", priority=True),
+    Binding("X,alt+shift+x", "stop_all", "EMERGENCY STOP of all robots", priority=True),
+    Binding("c", "lift", "lift a stop: says whose it is, and asks again"),
+    *DRIVE_KEYS,
+    Binding("space,escape", "stop", "stop the wheels now"),
+    Binding("enter", "take_or_release", "take the robot, or give it back"),
+    Binding("t", "take", "take the robot"),
+    Binding("r", "release", "give the robot back and go on watching"),
+    Binding("p", "pick", "pick a robot from a list, and take it"),
+    *(Binding(str(n), f"choose_robot({n})", "take the robot of this number") for n in range(1, MOST_PICKED_BY_KEY + 1)),
+    Binding("m", "ask_consent", "ask the operator who holds the robot for it"),
+    Binding("M", "ask_consent_because", "the same, with a reason you type"),
+    Binding("g", "decide(True)", "say yes to the operator who asks for the robot, or to lift your stop"),
+    Binding("n", "decide(False)", "say no"),
+    Binding("j", "jump", "jump"),
+    Binding("plus,equals_sign", "faster(1)", "faster"),
+    Binding("minus", "faster(-1)", "slower"),
+    Binding("tab", "panel(1)", "next table", priority=True),
+    Binding("shift+tab", "panel(-1)", "table before", priority=True),
+    Binding("left_square_bracket,pageup", "row(-1)", "cursor up"),
+    Binding("right_square_bracket,pagedown", "row(1)", "cursor down"),
+    Binding("y", "why", "why is this row as it is"),
+    Binding("k", "acknowledge", "a lost robot, or the alarm under the cursor, was seen"),
+    Binding("K", "acknowledge_all", "all alarms were seen"),
+    Binding("i", "ask_parameters", "show the row's parameters"),
+    Binding("e", "edit", "change the parameter under the cursor"),
+    Binding("v", "bare", "picture alone, and back"),
+    Binding("question_mark,f1", "keys", "these keys"),
+    Binding("q", "quit", "give the robot back and leave"),
+    Binding("ctrl+q", "quit", "give the robot back and leave", priority=True),
+    Binding("ctrl+c", "interrupt", "the same from any dialog; exit code 130", priority=True),
+]
+
+DRIVES = frozenset(
+    {
+        "drive",
+        "stop",
+        "jump",
+        "faster",
+        "release",
+        "take",
+        "take_or_release",
+        "pick",
+        "choose_robot",
+        "bare",
+        "ask_consent",
+        "ask_consent_because",
+    }
+)
+"""Actions of those who may drive."""
+STOPS = frozenset({"stop_robot", "stop_all", "lift", "decide"})
+"""Actions every console has: to stop, to lift, and to be asked before somebody else lifts."""
+PENDANT_DOES = STOPS | {"drive", "stop", "take_or_release", "keys", "quit", "interrupt"}
+"""Four keys to drive, one to stop the wheels, one to take and release, and those of the emergency stop."""
+
+
+def has(profile: Profile, action: str) -> bool:
+    """Return whether a console of this profile has this action."""
+    if profile is Profile.PENDANT:
+        return action in PENDANT_DOES
+    return action != "take_or_release" and (profile is not Profile.MONITOR or action not in DRIVES)
+
+
+def keys_help(profile: Profile, name_of: Callable[[Binding], str]) -> list[str]:
+    """Return what each key of this profile does, a line each, those of the emergency stop first.
+
+    Args:
+        profile: Whose keys.
+        name_of: Names a key for people.
+    """
+    keys: dict[str, list[str]] = {}
+    for binding in Binding.make_bindings(KEYS):
+        if has(profile, action_of(binding)) and not binding.key.startswith("alt+"):
+            keys.setdefault(binding.description, []).append(name_of(binding))
+    return [f"{_span(names):<14} {description}" for description, names in keys.items()]
+
+
+def action_of(binding: Binding) -> str:
+    """Return the action of a key without its arguments."""
+    return binding.action.partition("(")[0]
+
+
+def robot_meant(*, held: str, placed: str, wanted: str, shown: str) -> str:
+    """Return the robot that a stop is for, the operator's own first; empty: there is no saying.
+
+    Args:
+        held: The robot in hand.
+        placed: The robot whose row the operator moved the cursor to.
+        wanted: The robot this console asks for.
+        shown: The robot the cursor happens to be on.
+    """
+    return held or placed or wanted or shown
+
+
+def stop_meant(stopped: Sequence[str], *, held: str, placed: str, wanted: str, shown: str) -> str:
+    """Return the stopped robot that is meant to move again, the row's first; empty: none of these is stopped."""
+    meant = next((robot for robot in (placed, held, wanted, shown) if robot in stopped), "")
+    return meant or (stopped[0] if len(stopped) == 1 else "")
+
+
+# ---------------------------------------------------------------------- the last line
+@dataclass(frozen=True)
+class Hint:
+    """A key that the last line names.
+
+    Attributes:
+        key: As people call it.
+        words: What it does now.
+        action: What a click on it does; empty: nothing.
+        weight: Where room is short, those of more weight stay.
+        style: Of the key.
+    """
+
+    key: str
+    words: str
+    action: str
+    weight: int
+    style: str = "bold"
+
+
+STOP_STYLE = "bold white on red"
+
+
+def hints(view: ConsoleView, profile: Profile, meant: str) -> list[Hint]:
+    """Return the keys that matter now, in the order in which they are shown.
+
+    Args:
+        view: What the console shows.
+        profile: How it looks.
+        meant: The robot that a stop is for.
+    """
+    found = [Hint("x", f"STOP {meant or 'ROBOT'}", "stop_robot", 9, STOP_STYLE)]
+    found.append(Hint("X", "STOP ALL", "stop_all", 9, STOP_STYLE))
+    if any(robot.stop is not None for robot in view.robots):
+        found.append(Hint("c", "lift a stop", "lift", 8))
+    if view.own.consent is not None:
+        found += [Hint("g", "yes", "decide(True)", 8), Hint("n", "no", "decide(False)", 8)]
+    if profile is not Profile.MONITOR:
+        found += _hands(view, profile)
+    if profile is not Profile.PENDANT:
+        found += [Hint("tab", "table", "panel(1)", 4), Hint("y", "why", "why", 4)]
+        if view.own.lost is not None or any(not alarm.acknowledged_by for alarm in view.alarms):
+            found.append(Hint("k", "seen", "acknowledge", 3))
+    return [*found, Hint("?", "keys", "keys", 7), Hint("q", "quit", "quit", 7)]
+
+
+def _hands(view: ConsoleView, profile: Profile) -> Iterator[Hint]:
+    own, is_pendant = view.own, profile is Profile.PENDANT
+    if own.is_held:
+        yield Hint("←↑↓→", "drive", "", 5)
+        yield Hint("space", "halt", "stop", 6)
+    if is_pendant:
+        yield Hint("enter", "give back" if own.is_asked else "take", "take_or_release", 6)
+        return
+    if own.is_asked:
+        if not own.is_held:
+            yield Hint("m", "may I?", "ask_consent", 6)
+        yield Hint("r", "give back" if own.is_held else "ask no more", "release", 6)
+    else:
+        yield Hint("t", "take it again" if own.lost is not None else "take", "take", 6)
+    yield Hint("p", "pick robot", "pick", 3)
+    if own.is_held:
+        yield Hint("+ -", "speed", "", 2)
+        yield Hint("j", "jump", "jump", 1)
+
+
+def key_lines(found: Sequence[Hint], columns: int, rows: int) -> Text:
+    """Return as many of these keys as fit, the heaviest; none is cut."""
+    shown = list(found)
+    while shown and len(lines := _packed(shown, columns)) > rows:
+        shown.remove(min(reversed(shown), key=lambda hint: hint.weight))
+    return Text("\n").join(lines) if shown else Text()
+
+
+def _packed(shown: Sequence[Hint], columns: int) -> list[Text]:
+    lines: list[Text] = []
+    for hint in shown:
+        on = Style(meta={"@click": f"app.{hint.action}"}) if hint.action else Style.null()
+        text = Text.assemble((f" {hint.key} ", Style.parse(hint.style) + on), (f"{hint.words} ", on))
+        if lines and lines[-1].cell_len + text.cell_len <= columns:
+            lines[-1].append_text(text)
+        else:
+            lines.append(text)
+    return lines
+
+
+def _span(names: Sequence[str]) -> str:
+    """Return the names of keys, a long row of them by its first and last."""
+    return f"{names[0]} … {names[-1]}" if len(names) > 4 else ", ".join(names)

@@ -1,0 +1,40 @@
+// What is across the screen while this page cannot stop a robot, or what it shows is old.
+
+import { set } from "./text.js";
+
+const LOOK_EVERY_MS = 250;
+
+/**
+ * Says that the page is cut off, since when, and what else stops robots; everything is gray meanwhile. A server that does
+ * not hear the mission counts as well: its page is connected, and stops nothing.
+ */
+export class Blindness {
+  constructor({ link, root, title, why, areas, stops }) {
+    Object.assign(this, { link, root, title, why, areas, stops });
+    this.hubAgeMs = -1;
+    this.wasUp = false;
+    setInterval(() => this.look(), LOOK_EVERY_MS);
+  }
+
+  /** Since when the server does not hear the mission, in milliseconds; negative: it does. */
+  hub(ageMs) {
+    this.hubAgeMs = ageMs;
+    this.look();
+  }
+
+  look() {
+    const { is, isUp } = this.link;
+    this.wasUp = this.wasUp || isUp;
+    const isBlind = this.wasUp && (is !== "fresh" || this.hubAgeMs >= 0);
+    document.body.classList.toggle("is-blind", isBlind);
+    this.root.hidden = !isBlind;
+    for (const area of this.areas) area.inert = this.wasUp && !isUp;
+    for (const stop of this.stops()) stop.disabled = !isUp;
+    if (!isBlind) return;
+    set(this.title, !isUp ? "THIS PAGE CANNOT STOP A ROBOT" : "A STOP PRESSED HERE MAY NOT ARRIVE");
+    const since = (ageMs) => `${Math.max(1, Math.round(ageMs / 1000))} s`;
+    set(this.why, is === "fresh"
+      ? `The server has not heard the mission for ${since(this.hubAgeMs)}. What you see is older than that.`
+      : `Nothing was heard for ${since(this.link.ageMs)} (${this.link.why}). What you see is as old as that.`);
+  }
+}

@@ -1,0 +1,49 @@
+// How old what is shown can be at most. Pure: times are milliseconds of a clock that the caller has.
+
+/**
+ * Each beat goes to the server and comes back with what it says next. What is shown is at most as old as the newest beat
+ * that came back: that holds however long anything waited on its way, at the server, or in a page that slept.
+ */
+export class Freshness {
+  constructor() {
+    this.sent = new Map();
+    this.number = 0;
+    this.provenAt = -Infinity;
+  }
+
+  /** A connection began: whatever it brings is newer than this. */
+  begin(now) {
+    this.sent.clear();
+    this.provenAt = now;
+  }
+
+  /** Returns the number of a beat that is sent now. */
+  beat(now) {
+    this.number += 1;
+    this.sent.set(this.number, now);
+    return this.number;
+  }
+
+  /** A beat came back. */
+  returned(number) {
+    if (!this.sent.has(number)) return;
+    this.provenAt = this.sent.get(number);
+    for (const earlier of [...this.sent.keys()].filter((one) => one <= number)) this.sent.delete(earlier);
+  }
+
+  age(now) { return now - this.provenAt; }
+}
+
+/**
+ * Returns a clock, in milliseconds, that a device cannot hold up: one of its own stops while it sleeps, the other may be
+ * set back; this one goes as the faster of both.
+ */
+export function makeClock(steady = () => performance.now(), wall = () => Date.now()) {
+  let [steadyAt, wallAt, total] = [steady(), wall(), 0];
+  return () => {
+    const [steadyNow, wallNow] = [steady(), wall()];
+    total += Math.max(steadyNow - steadyAt, wallNow - wallAt, 0);
+    [steadyAt, wallAt] = [steadyNow, wallNow];
+    return total;
+  };
+}

@@ -1,0 +1,104 @@
+// This operator's own part: what is held, what was lost, who asks for it.
+
+import { lasting, set } from "./text.js";
+
+const find = (id) => document.getElementById(id);
+const MEMORY = "held";
+
+/** Shows `own` of the view; `act(what, name)` does what a person wants. */
+export class Hand {
+  constructor({ act, driving }) {
+    Object.assign(this, { act, driving });
+    this.own = null;
+    this.memory = new Memory();
+    find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
+    find("release").addEventListener("click", () => act("release"));
+    find("may-i").addEventListener("click", () => act("may_i"));
+    find("halt").addEventListener("click", () => act("halt"));
+    find("jump").addEventListener("click", () => act("jump"));
+    find("consent-yes").addEventListener("click", () => act("consent", true));
+    find("consent-no").addEventListener("click", () => act("consent", false));
+    find("retake").addEventListener("click", () => { this.memory.forget(); act("take", find("retake").dataset.robot); });
+    find("dismiss").addEventListener("click", () => { this.memory.forget(); act("dismiss"); this.showLost(); });
+    find("speed").addEventListener("input", () => this.showSpeed());
+    this.showSpeed();
+    addEventListener("pagehide", () => this.cut("this page was left", 0));
+  }
+
+  get held() { return this.own?.is_held ? this.own.robot : ""; }
+
+  get speed() { return Number(find("speed").value); }
+
+  change(step) {
+    find("speed").value = String(this.speed + step);
+    this.showSpeed();
+  }
+
+  showSpeed() { set(find("speed-shown"), find("speed").value); }
+
+  /** The connection ended: what was held may be somebody else's by now. */
+  cut(why, ageMs) {
+    if (this.held) this.memory.keep(this.held, why, Date.now() - ageMs);
+    this.own = null;
+    this.driving.turn(false);
+  }
+
+  show(own, now_s) {
+    const before = this.own;
+    this.own = own;
+    this.now_s = now_s;
+    if (isOther(before, own)) this.driving.letGo(own.is_held); // what is held down was meant for another moment
+    this.driving.turn(own.is_held);
+    if (own.is_asked) this.memory.forget();
+    set(find("own"), own.status);
+    set(find("taken"), own.taken_because ? `Taken from you: ${own.taken_because}` : "");
+    set(find("applied"), own.applied ? `applied: ${own.applied}` : "");
+    set(find("asked"), own.asked);
+    this.showLost();
+    this.showConsent();
+    find("may-i").disabled = !own.is_asked || own.is_held;
+    find("release").disabled = !own.is_asked;
+    find("take").disabled = own.is_asked;
+    find("halt").disabled = find("jump").disabled = !own.is_held;
+    document.body.dataset.held = this.held;
+    document.body.classList.toggle("is-asking", own.is_asked);
+  }
+
+  /** Say which robot was lost, when and why, and offer it again: the server's word first, then what this page saw. */
+  showLost() {
+    const told = this.own?.lost ?? null, kept = told ? null : this.memory.kept;
+    find("lost").hidden = (told ?? kept) === null || this.own?.is_asked === true;
+    if (find("lost").hidden) return;
+    const robot = (told ?? kept).robot;
+    const age_s = told ? this.now_s - told.at_s : (Date.now() - kept.at) / 1000;
+    set(find("lost-line"), `You lost ${robot}${lasting(age_s)}: ${(told ?? kept).why}`);
+    set(find("retake"), `Take ${robot} again`);
+    find("retake").dataset.robot = robot;
+    find("retake").disabled = told ? !told.may_retake : false;
+  }
+
+  showConsent() {
+    const { consent } = this.own;
+    find("consent").hidden = consent === null;
+    if (consent === null) return;
+    const others = consent.others ? `, ${consent.others} more ask` : "";
+    const left = `${Math.ceil(consent.left_s)} s${others}`;
+    set(find("consent-line"), `${consent.user} asks for ${consent.robot}: ${consent.why} (${left})`);
+  }
+}
+
+/** Is this another moment than that, so that whatever is held down has to be let go first? */
+export function isOther(before, own) {
+  if (before === null) return true;
+  return before.is_held !== own.is_held || before.robot !== own.robot || before.epoch !== own.epoch
+    || before.stop?.number !== own.stop?.number || (own.must_let_go === true && before.must_let_go !== true);
+}
+
+/** What this tab held when its connection ended: it outlives the connection, a reload, and the server. */
+class Memory {
+  keep(robot, why, at) { sessionStorage.setItem(MEMORY, JSON.stringify({ robot, why, at })); }
+
+  forget() { sessionStorage.removeItem(MEMORY); }
+
+  get kept() { return JSON.parse(sessionStorage.getItem(MEMORY) ?? "null"); }
+}

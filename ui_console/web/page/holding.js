@@ -1,0 +1,29 @@
+// A button that acts only when it was held for a second, by pointer or by Enter: nobody lifts a stop by pressing twice.
+
+export const HOLD_MS = 1000; // chosen: longer than any double press, short enough for whoever means it
+
+/** Have `act` called once the button was held; whatever else happens meanwhile lets it go. Space never holds: it stops. */
+export function actWhenHeld(button, act) {
+  let timer = 0;
+  const drop = () => {
+    clearTimeout(timer);
+    timer = 0;
+    button.classList.remove("is-held");
+  };
+  const hold = () => {
+    if (timer !== 0 || button.disabled) return;
+    button.classList.add("is-held");
+    timer = setTimeout(() => { drop(); act(); }, HOLD_MS);
+  };
+  button.addEventListener("pointerdown", (event) => { if (event.isPrimary && event.button === 0) hold(); });
+  button.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter") { drop(); return; }
+    event.preventDefault();
+    if (!event.repeat) hold();
+  });
+  for (const end of ["pointerup", "pointerleave", "pointercancel", "keyup", "blur"]) button.addEventListener(end, drop);
+  button.addEventListener("contextmenu", (event) => event.preventDefault()); // a finger that rests asks for one
+  addEventListener("blur", drop);
+  document.addEventListener("visibilitychange", drop);
+  return drop;
+}

@@ -1,0 +1,76 @@
+// What a key means at this moment. Pure: a key and where it is pressed go in, an act comes out.
+
+export const DRIVES = {
+  ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0],
+  ArrowLeft: [0, -1], KeyA: [0, -1], ArrowRight: [0, 1], KeyD: [0, 1],
+};
+const STOPS = { x: "stop_mine", X: "stop_all", " ": "halt", Escape: "halt" };
+const SPEEDS = { "+": "faster", "=": "faster", "-": "slower" };
+const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "color", "file"];
+
+/**
+ * Returns {act, isTaken}, or null: the key means what it means to the browser. If `isTaken`, the browser must not do
+ * anything with it.
+ *
+ * Stops are heard wherever the focus is, in dialogs and in fields too. Drives are heard everywhere but where arrows and
+ * letters write, and not while a dialog asks for something.
+ *
+ * @param key {key, code, isRepeat, hasModifier} of the event.
+ * @param at {isText, isRed, isDialog, isHeld}: a text is written there; a red button has the focus; a dialog is open; a
+ *   robot is held.
+ */
+export function meaningOf(key, at) {
+  if (key.hasModifier) return null;
+  const stop = STOPS[key.key];
+  if (stop) return { act: key.isRepeat ? "" : stop, isTaken: isStopTaken(key.key, at) };
+  if (at.isText || at.isDialog || !at.isHeld) return null;
+  if (key.code in DRIVES) return { act: key.isRepeat ? "" : "drive", isTaken: true };
+  const speed = SPEEDS[key.key];
+  return speed ? { act: speed, isTaken: true } : null;
+}
+
+/** A letter that stops is not written; a blank is, and closes no button's press unless a robot is driven meanwhile. */
+function isStopTaken(key, at) {
+  if (key === "Escape") return false; // it closes dialogs, too
+  if (key === " ") return at.isHeld && !at.isText && !at.isRed;
+  return true;
+}
+
+/** Says whether what is typed there is written. */
+export function isText(element) {
+  if (element.isContentEditable || element.tagName === "TEXTAREA") return true;
+  return element.tagName === "INPUT" && !NO_TEXT.includes(element.type);
+}
+
+/** Listens to every key of the page; `does` is called with an act and the key's code, `isHeld` says what is driven. */
+export class Keys {
+  constructor({ does, isHeld }) {
+    let isSpaceTaken = false;
+    addEventListener("keyup", (event) => { if (event.key === " " && isSpaceTaken) event.preventDefault(); }, true);
+    addEventListener("keydown", (event) => {
+      const hasModifier = event.ctrlKey || event.metaKey || event.altKey;
+      if (event.altKey && isText(event.target) && event.code === "KeyX") { write(event); return; }
+      const meaning = meaningOf(
+        { key: event.key, code: event.code, isRepeat: event.repeat, hasModifier },
+        {
+          isText: isText(event.target),
+          isRed: Boolean(event.target.closest?.(".emergency")),
+          isDialog: document.querySelector("dialog[open]") !== null,
+          isHeld: isHeld(),
+        },
+      );
+      if (event.key === " ") isSpaceTaken = meaning?.isTaken ?? false; // a button is pressed when it comes up again
+      if (meaning === null) return;
+      if (meaning.isTaken) event.preventDefault();
+      if (meaning.act) does(meaning.act, event.code);
+    }, true);
+  }
+}
+
+/** Have the letter written that stops otherwise. */
+function write(event) {
+  event.preventDefault();
+  const field = event.target, letter = event.shiftKey ? "X" : "x";
+  field.setRangeText(letter, field.selectionStart, field.selectionEnd, "end");
+  field.dispatchEvent(new Event("input", { bubbles: true }));
+}

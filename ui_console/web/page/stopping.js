@@ -1,0 +1,43 @@
+// Emergency stops: said at once, and not believed before the robot's own word is heard.
+
+import { set } from "./text.js";
+
+const CONFIRMED_WITHIN_MS = 1000; // chosen: wheels stand within 0.7 s wherever the link is there
+
+/** Stops one robot or all, and says in `shown` which ones are not known to stand. */
+export class Stopping {
+  constructor({ say, shown }) {
+    Object.assign(this, { say, shown });
+    this.robots = [];
+    this.pending = new Map(); // robot → when it was told to stop
+    this.unsent = "";
+    setInterval(() => this.look(performance.now()), 100);
+  }
+
+  one(name) { this.stop({ do: "stop_robot", robot: name }, [name]); }
+
+  all() { this.stop({ do: "stop_all" }, this.robots.map((robot) => robot.robot)); }
+
+  stop(message, names) {
+    const isSent = this.say(message);
+    this.unsent = isSent ? "" : `NOT SENT: ${names.join(", ") || "no robot"} was not told to stop.`;
+    for (const name of names) this.pending.set(name, performance.now());
+    if (!isSent) this.pending.clear();
+    this.look(performance.now());
+  }
+
+  /** Take in what is heard of the robots. */
+  heard(robots) {
+    this.robots = robots;
+    for (const robot of robots) if (robot.stop?.is_confirmed) this.pending.delete(robot.robot);
+    this.look(performance.now());
+  }
+
+  look(now) {
+    const late = [...this.pending].filter(([, at]) => now - at > CONFIRMED_WITHIN_MS).map(([name]) => name);
+    const line = late.length ? `NOT CERTAIN to have stopped: ${late.join(", ")}.` : "";
+    const said = [this.unsent, line].filter(Boolean).join(" ");
+    this.shown.hidden = said === "";
+    set(this.shown, said && `${said} Press Stop again, or use another way to stop it.`);
+  }
+}
