@@ -70,7 +70,8 @@ from ui_console.console_events import (
     StoryHeard,
     TeamEvent,
 )
-from ui_console.team_model import LOG_KEPT, ROBOT_KIND
+from ui_console.log_board import LOG_KEPT
+from ui_console.team_model import ROBOT_KIND
 
 log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ from backbone.component.messages import LogLevel, StoryEvent
 from backbone.mission_log import AskLog
 from backbone.operators import OperatorActed, OperatorAction
 from ui_console.console_events import ActHeard, LogHeard, StoryHeard
-from ui_console.team_model import LOG_KEPT
+from ui_console.log_board import LOG_KEPT
 
 CONSOLE = "ui_console/console-9"
 DROVE = OperatorActed("ben", OperatorAction.DRIVE_BEGIN, "scout2", "left +4.0, right +4.0 rad/s", 10.0)
