@@ -15,18 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import (
-    ExitCode,
-    SecretFile,
-    WholeHelp,
-    complete_mission,
-    finite,
-    hub_endpoint,
-    picture_for,
-    read_secret_option,
-    run,
-    say,
-)
+from backbone.cli import ExitCode, read_secret_option, run, say
+from backbone.cli_options import SecretFile, WholeHelp, complete_mission, finite, hub_endpoint, picture_for
 
 if TYPE_CHECKING:
     from ssl import SSLContext
