@@ -363,7 +363,7 @@ def log(
             say("nothing of that kind happened")
         if told.left_out:
             say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
-        if told.since_s > since_s:
+        if told.since_s > max(0.0, since_s):
             say(f"what was before {told.since_s:.1f} s is not kept any more")
         return ExitCode.DONE
 

@@ -72,6 +72,7 @@ STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
 OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
 NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
+_LIFE = list(LifeState)
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
 
 
@@ -384,7 +385,7 @@ class TeamModel:
         self.people.heard(component)
         self._needs.heard(component)
         known = self._components.get(component.address)
-        if known is not None and known.pid == component.pid and known.since_s > component.since_s:
+        if known is not None and known.pid == component.pid and _is_older(component, known):
             return
         name = component_of(component.address)
         (self._left.add if component.state in LEAVING else self._left.discard)(name)
@@ -559,6 +560,14 @@ class TeamModel:
             self.alarms.begin(kind, subject, line, at_s, remedy)
         else:
             self.alarms.end(kind, subject, at_s)
+
+
+def _is_older(one: ComponentState, other: ComponentState) -> bool:
+    """Say whether one was said before the other by the same process: its life only goes on.
+
+    Their times do not tell: the nameserver dates a readiness by when it saw it.
+    """
+    return _LIFE.index(one.state) < _LIFE.index(other.state)
 
 
 def _is_in(subsystem: Subsystem, address: str) -> bool:
