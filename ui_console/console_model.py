@@ -303,6 +303,7 @@ class ConsoleModel:
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
+                alarms.mended((AlarmKind.TAKEN, AlarmKind.REFUSED, AlarmKind.NO_ANSWER))
                 self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s):
@@ -315,6 +316,7 @@ class ConsoleModel:
                     alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
             case CommandApplied():
                 self.applied = event
+                alarms.mended((AlarmKind.NO_ANSWER,))
             case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
                 if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
