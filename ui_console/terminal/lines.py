@@ -264,10 +264,9 @@ def _alarm(alarm: AlarmView, now_s: float) -> Text:
     age_s = max(0.0, now_s - (alarm.first_s if alarm.is_active else alarm.last_s))
     mark = "◆ " if alarm.while_away else "● " if not alarm.acknowledged_by else "○ "
     lines = Text.assemble((mark, style), (alarm.line, style), (f"{times}{since} {age_s:.0f} s ago", "dim"))
-    if not alarm.acknowledged_by:
-        follows = f"and {plural(len(alarm.also), 'more line')} from the same cause" if alarm.also else ""
-        below = " · ".join(part for part in (alarm.remedy, alarm.where, follows) if part)
-        lines.append(f"\n  {below}" if below else "", style="dim")
+    below = [alarm.remedy, *(f"also: {one}" for one in alarm.also)] if not alarm.acknowledged_by else []
+    for line in filter(None, below):
+        lines.append(f"\n  {line}", style="dim")
     return lines
 
 
