@@ -132,21 +132,6 @@ class GivenBack:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotLost:
-    """A robot went from this operator before this console could know: a page that slept, a link that was cut.
-
-    Attributes:
-        at_s: When.
-        robot: Which.
-        why: For people.
-    """
-
-    at_s: float
-    robot: str
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
 class LetGoNeeded:
     """A control that is held moves nothing before it is let go, or no longer so.
 
@@ -434,7 +419,6 @@ OwnEvent = (
     | CommandRefused
     | LinkTrouble
     | GivenBack
-    | RobotLost
     | LetGoNeeded
     | PictureSeen
     | WhyHeard
@@ -470,7 +454,6 @@ _WORDS: dict[type[Any], str] = {
     CommandRefused: "refused",
     LinkTrouble: "no_answer",
     GivenBack: "released",
-    RobotLost: "lost",
     LetGoNeeded: "let_go",
     PictureSeen: "picture",
     WhyHeard: "why",

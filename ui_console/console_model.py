@@ -10,6 +10,7 @@ operator's part: what is wanted, what is held, the pictures that arrive.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from typing import cast, get_args
 
 import msgspec
@@ -35,7 +36,6 @@ from ui_console.console_events import (
     Lost,
     OwnEvent,
     PictureSeen,
-    RobotLost,
     TeamEvent,
     WhyHeard,
 )
@@ -64,6 +64,15 @@ SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 _TEAM_EVENTS = get_args(TeamEvent)
+
+
+@dataclass(frozen=True, slots=True)
+class _Went:
+    """A robot that went without its operator asking for it."""
+
+    at_s: float
+    robot: str
+    why: str
 
 
 class ConsoleModel:
@@ -101,7 +110,7 @@ class ConsoleModel:
         self._pictures: dict[str, deque[PictureSeen]] = {}
         self._sought: dict[tuple[str, Topic], Sought] = {}
         self._must_let_go = False
-        self._went: RobotLost | None = None
+        self._went: _Went | None = None
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
         self._blind = ""  # robot that is held without pictures to drive by
@@ -296,8 +305,6 @@ class ConsoleModel:
                 self._sought.pop((settled.sought.asker, settled.sought.topic), None)
             case LetGoNeeded(is_needed=is_needed):
                 self._must_let_go = is_needed
-            case RobotLost():
-                self._went = event
             case Asked(robot=robot):
                 self._asked_whom = self._went = None
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
@@ -309,7 +316,7 @@ class ConsoleModel:
             case Lost(at_s=at_s):
                 self.held, self.lost = None, event
                 if event.reason in UNRENEWED:
-                    self._went = RobotLost(at_s, self.robot, "the link to it was away for too long")
+                    self._went = _Went(at_s, self.robot, "the link to it was away for too long")
                 self._pictures.clear()
                 if event.reason != WANTED:
                     line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
@@ -325,7 +332,7 @@ class ConsoleModel:
             case LinkTrouble(at_s=at_s, detail=detail):
                 alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
             case GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
-                self._went = None if wanted else RobotLost(at_s, self.robot, reason)
+                self._went = None if wanted else _Went(at_s, self.robot, reason)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:

@@ -159,6 +159,16 @@ class ConsoleFeed:
         self._show(StopHeard(self._clock.now_s(), stop))
         return stop
 
+    async def consoles(self) -> list[str]:
+        """Return the addresses of all consoles of the mission; none if the nameserver did not answer."""
+        try:
+            question = ListComponents(subsystem=str(Subsystem.UI_CONSOLE))
+            listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
+        except LinkError as error:
+            self._trouble(error)
+            return []
+        return [component.address for component in listing.components]
+
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again; return whether it may."""
         try:

@@ -22,7 +22,7 @@ from backbone.naming import Subsystem, component_of
 from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
 from backbone.spoken import value_text
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.console_events import (
     ActHeard,
@@ -494,12 +494,11 @@ class TeamModel:
         line = f"{fell.name} fell: {fell.how}; {again}{said}"
         self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
-    def _is_there(self, address: str) -> bool:
-        """Return whether this component is there; True as long as nothing was heard of who is."""
-        component = self._components.get(address)
-        if component is None:
-            return not self._components
-        return component.state not in LEAVING and address not in self._lost
+    def _is_there(self, author: Stopper) -> bool:
+        """Return whether who stopped a robot is there; True as long as nothing was heard of who is."""
+        at = {author.console, *(screen.address for screen in self.screens_of(author.by))} & self._components.keys()
+        there = [at for at in at if self._components[at].state not in LEAVING and at not in self._lost]
+        return bool(there) or not self._components
 
     # ------------------------------------------------------------------ what happened
     def _take_link(self, link: LinkHeard) -> None:
@@ -522,8 +521,11 @@ class TeamModel:
         self._stops[stop.rc] = stop
         unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
         line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
-        remedy = "Lift the stop when the robot may move."
-        self._so(stop.is_stopped, AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+        if stop.is_stopped:
+            remedy = "Lift the stop when the robot may move."
+            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+        else:
+            self.alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
 
     def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
         self._radios[radio] = values

@@ -346,7 +346,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
             holds, by_script = self._holding if self.is_held else "", self._work is not None
             return await self._hand_over.answer(asked.body, holds, self._asked_s, by_script=by_script)
         if isinstance(asked.body, AskLift) and self._work is not None:
-            return Consent(False, self.user, "a script drives, and stopped it")
+            stopped_it = asked.body.console == self.address
+            return Consent(False, self.user, "a script drives, and stopped it", is_here=stopped_it)
         if not isinstance(asked.body, ArcNotice):
             return await super().answer(asked)
         if self._arc is None:
@@ -388,15 +389,17 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._keeping is None:
             log.info("%s was granted after it was given back", notice.arc)
             return  # its wish for no time reached the RC manager later than its turn did; that takes the RCs back
+        robot = notice.rcs.get(ROBOT_KIND, "no robot")
+        self.require_let_go()
+        await self._ear.listen(robot)
+        if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
+            return  # it went again meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
         now_s = self.clock.now_s()
-        robot = notice.rcs.get(ROBOT_KIND, "no robot")
         self.report(f"drives {robot}")
         if not again:
             self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
-        self.require_let_go()
-        self._ear.listen(robot)
         self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 

@@ -19,6 +19,7 @@ from ui_console.gamepad import (
     ABS_X,
     ABS_Y,
     BTN_EAST,
+    BTN_NORTH,
     BTN_SELECT,
     BTN_SOUTH,
     BTN_START,
@@ -69,6 +70,7 @@ def test_without_the_dead_man_button_nothing_drives_and_with_it_never_faster_tha
     [
         (BTN_SOUTH, PadWish.JUMP),
         (BTN_EAST, PadWish.STOP_ROBOT),
+        (BTN_NORTH, PadWish.STOP_ALL),
         (BTN_START, PadWish.TAKE),
         (BTN_SELECT, PadWish.RELEASE),
     ],
