@@ -261,6 +261,21 @@ class StoryHeard:
 
 
 @dataclass(frozen=True, slots=True)
+class LogHeard:
+    """The launcher told what happened before this console listened.
+
+    Attributes:
+        at_s: When.
+        events: Oldest first.
+        consoles: Name of each console that was ever there → the person's.
+    """
+
+    at_s: float
+    events: Sequence[StoryEvent]
+    consoles: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
 class ActHeard:
     """An operator did something.
 
@@ -417,6 +432,7 @@ TeamEvent = (
     ScheduleHeard
     | LeasesHeard
     | StoryHeard
+    | LogHeard
     | ActHeard
     | ComponentHeard
     | ComponentsListed
@@ -449,6 +465,7 @@ _WORDS: dict[type[Any], str] = {
     ScheduleHeard: "schedule",
     LeasesHeard: "leases",
     StoryHeard: "story",
+    LogHeard: "log",
     ActHeard: "operator",
     ComponentHeard: "component",
     ComponentsListed: "components",

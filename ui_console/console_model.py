@@ -208,7 +208,7 @@ class ConsoleModel:
     def other_screens(self) -> list[str]:
         """Return where else this console's person sits, and what they hold there, one line each."""
         own = [screen for screen in self.team.screens_of(self.user) if component_of(screen.address) != self.name]
-        return [f"{screen.type} on {screen.host}: {screen.feedback or screen.state}" for screen in own]
+        return [f"on {screen.host} {screen.feedback or f'is {screen.state}'}" for screen in own]
 
     def consent(self, now_s: float) -> ConsentView | None:
         """Return what this operator is to decide first; None: nobody asks."""
@@ -282,8 +282,8 @@ class ConsoleModel:
             slice_end = _slice_end(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
         if self.asked is None:
-            there = "; ".join(self.other_screens())
-            return f"watching; you hold no robot{f' here; your other screen, {there}' if there else ''}"
+            there = ", the one ".join(self.other_screens())
+            return f"watching; you hold no robot{f' here; your other screen {there}' if there else ''}"
         wanted = self.robot or "a robot"
         if self.why is not None and self.why.why.lines:
             return f"waiting for {wanted}: {self.team.people.named(self.why.why.lines[0])}"
@@ -310,6 +310,7 @@ class ConsoleModel:
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
+                alarms.mended((AlarmKind.TAKEN, AlarmKind.REFUSED, AlarmKind.NO_ANSWER))
                 self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s):
@@ -322,6 +323,7 @@ class ConsoleModel:
                     alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
             case CommandApplied():
                 self.applied = event
+                alarms.mended((AlarmKind.NO_ANSWER,))
             case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
                 if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
