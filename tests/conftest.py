@@ -86,9 +86,11 @@ async def _wait_ready(component: Component[Any]) -> None:
 
 
 @asynccontextmanager
-async def mission_on_local_network(mission: str = "local", clock: Clock | None = None) -> AsyncIterator[LocalNetwork]:
+async def mission_on_local_network(
+    mission: str = "local", clock: Clock | None = None, network: LocalNetwork | None = None
+) -> AsyncIterator[LocalNetwork]:
     """Give a network inside this process on which the mission's first nameserver is ready."""
-    network = LocalNetwork(mission)
+    network = network or LocalNetwork(mission)
     time = clock or VirtualClock()
     with tempfile.TemporaryDirectory() as run_directory:
         launch = Launch(

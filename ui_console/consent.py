@@ -55,11 +55,13 @@ class Consent(Message, frozen=True):
         is_given: True: it is being given back, or may move.
         user: Who decided.
         reason: For people; empty: none was said.
+        is_here: False: nobody decided, for the person who was asked is not there.
     """
 
     is_given: bool
     user: Mention
     reason: Line
+    is_here: bool = True
 
 
 class AskedAlready(Refusal):

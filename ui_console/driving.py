@@ -43,8 +43,23 @@ class GiveBack:
     """Release the robot."""
 
 
+@dataclass(frozen=True, slots=True)
+class StopRobot:
+    """Emergency stop of one robot, whoever holds it."""
+
+    robot: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StopAll:
+    """Emergency stop of all robots."""
+
+    reason: str = ""
+
+
 Command = Drive | Halt | Jump
-Wish = Command | GiveBack
+Wish = Command | GiveBack | StopRobot | StopAll
 
 Direction = Literal["forward", "backward", "left", "right"]
 

@@ -11,7 +11,7 @@ from backbone.operators import OperatorAction
 from resource_pool.arc_client import OtherStop, Stopper, StopState
 from ui_console.consent import CONSENT_WITHIN_S, Consent, Topic
 from ui_console.console_events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent
-from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, author_name, decide_lift, is_agreed
+from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, answer_of, author_name, decide_lift, is_agreed
 
 if TYPE_CHECKING:
     from ui_console.observer import Observer
@@ -64,18 +64,22 @@ class LiftTalk:
         return is_agreed(answers)
 
     async def _ask_one(self, robot: str, author: Stopper) -> Consent:
-        name, bus = author_name(author), self._console.bus
-        try:
-            question = AskLift(robot, author.by, self._user)
-            consent = await bus.ask(author.console, question, Consent, within_s=ANSWER_TIME_S)
-        except NoResponder:  # who left in whatever way cannot be asked, and keeps no robot standing
-            consent = Consent(True, name, "is not here any more")
-        except LinkError:
-            consent = Consent(False, name, "does not answer")
-        except Refusal as refusal:
-            consent = Consent(False, name, refusal.detail)
-        heard = ConsentHeard(
-            self._console.clock.now_s(), robot, consent.user, consent.is_given, consent.reason, Topic.LIFT
-        )
-        self._show(heard)
+        """Ask an author where they stopped the robot, or else wherever they sit now."""
+        question = AskLift(robot, author.by, author.console, self._user)
+        answers = [await self._ask_at(author.console, question)]
+        if not answers[0].is_here:
+            others = [at for at in await self._console.feed.consoles() if at != author.console]
+            answers += await asyncio.gather(*(self._ask_at(at, question) for at in others))
+        consent, now_s = answer_of(author, answers), self._console.clock.now_s()
+        self._show(ConsentHeard(now_s, robot, author_name(author), consent.is_given, consent.reason, Topic.LIFT))
         return consent
+
+    async def _ask_at(self, console: str, question: AskLift) -> Consent:
+        try:
+            return await self._console.bus.ask(console, question, Consent, within_s=ANSWER_TIME_S)
+        except NoResponder:
+            return Consent(False, question.author, "is not here", is_here=False)
+        except LinkError:  # it may be a console at which they sit
+            return Consent(False, question.author, "does not answer", is_here=console == question.console)
+        except Refusal as refusal:
+            return Consent(False, question.author, refusal.detail, is_here=console == question.console)

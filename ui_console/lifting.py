@@ -1,6 +1,6 @@
 """Whose stop is it, and who is asked before it is lifted?
 
-Rules of this file: no bus, no clock, no screen. Why it is so: docs/decisions/0017.
+Rules of this file: no bus, no clock, no screen. Why it is so: docs/decisions/0018.
 
 * To stop is one act, to lift another. A lift names the stop that was seen by its number: a newer one is never lifted.
 * Your own stop is lifted at once. Whoever else stopped the robot is asked first, each of them.
@@ -23,17 +23,19 @@ from ui_console.consent import MAX_WHY, Consent
 
 
 class AskLift(Message, frozen=True):
-    """May this robot move again? Asked by a console of the one its author stopped it from; answered by ``Consent``.
+    """May this robot move again? Asked where it was stopped, and everywhere else if its author left that console.
 
     Attributes:
         robot: Which.
         author: Who stopped it: the one who decides.
+        console: By which console.
         user: Who asks.
         why: For people.
     """
 
     robot: Mention
     author: Mention
+    console: Mention
     user: Mention
     why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)] = ""
 
@@ -78,6 +80,13 @@ def decide_lift(stop: StopState, number: int, user: str, console: str) -> LiftDe
     return AskFirst(others) if others else LiftNow()
 
 
+def answer_of(author: Stopper, answers: Iterable[Consent]) -> Consent:
+    """Return what an author says who was asked at several consoles: one yes is a yes, and who is at none has left."""
+    here = [answer for answer in answers if answer.is_here]
+    left = Consent(True, author_name(author), "is not here any more", False)
+    return next((answer for answer in here if answer.is_given), here[0] if here else left)
+
+
 def is_agreed(answers: Iterable[Consent]) -> bool:
     """Return whether the stop is lifted after these answers of all who were asked."""
     return all(answer.is_given for answer in answers)
@@ -98,17 +107,17 @@ def is_own(stop: StopState, user: str, console: str) -> bool:
     return all(_is(author, user, console) for author in authors(stop))
 
 
-def lift_line(stop: StopState, user: str, console: str, is_there: Callable[[str], bool]) -> str:
+def lift_line(stop: StopState, user: str, console: str, is_there: Callable[[Stopper], bool]) -> str:
     """Return in one line for people what it takes to lift the stop.
 
     Args:
         stop: In force.
         user: Who may want to lift it.
         console: Address of the console they sit at.
-        is_there: Says whether the console of this address is there, as far as is known.
+        is_there: Says whether this author is there, as far as is known.
     """
     match decide_lift(stop, stop.number, user, console):
-        case AskFirst(others) if names := _names(author for author in others if is_there(author.console)):
+        case AskFirst(others) if names := _names(author for author in others if is_there(author)):
             return f"asks {_joined(names)} first"
         case AskFirst(others):
             names = _names(others)

@@ -63,7 +63,7 @@ class Observer(Component[P], Generic[P]):
         """What it listens by, and the verbs that need no grant."""
         self.answers = answers or ConsentAnswers(self.user, clock, self.show, self.acted)
         """What its operator is asked."""
-        self._answers_of = answers_of or (lambda _user: self.answers)
+        self._answers_of = answers_of or (lambda user: self.answers if user in (self.user, self.address) else None)
 
     # ------------------------------------------------------------------ what the operator did
     def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
@@ -146,7 +146,7 @@ class Observer(Component[P], Generic[P]):
                 require_console(self.name, asked.source)
                 answers = self._answers_of(author)
                 if answers is None:
-                    return Consent(True, author, "is not here any more")
+                    return Consent(False, author, "is not here", is_here=False)
                 return await answers.seek(asked.source, user, robot, why, Topic.LIFT)
             case _:
                 return await super().answer(asked)

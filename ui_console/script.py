@@ -2,7 +2,8 @@
 
 ``{"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}`` drives until the next line, ``{"at_s": 1, "halt":
 true}`` stops, ``{"at_s": 2, "jump": true}`` jumps, ``{"at_s": 3, "release": true}`` gives the robot
-back. The end of the script releases too.
+back. The end of the script releases too. ``{"stop_robot": "scout2", "reason": "a child"}`` and ``{"stop_all": true}``
+are emergency stops; without ``at_s`` they count as soon as they are read from a pipe, also before the grant.
 
 Rules of this file: no bus, no clock, no files. Times are mission seconds since the grant.
 """
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.errors import Refusal
-from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, Wish
+from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
 
 
 class WrongScript(Refusal):
@@ -24,26 +25,36 @@ class WrongScript(Refusal):
 
     code = "script.line"
     remedy = (
-        'Write one JSON object a line: {"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}, or with "halt", "jump" '
-        'or "release": true; at_s never decreases.'
+        'Write one JSON object a line: {"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}, or with "halt", "jump", '
+        '"release" or "stop_all": true, or "stop_robot": NAME; at_s never decreases.'
     )
 
 
 class _Line(msgspec.Struct, forbid_unknown_fields=True):
-    at_s: float
+    at_s: float | None = None
     left_rad_s: float | None = None
     right_rad_s: float | None = None
     halt: bool = False
     jump: bool = False
     release: bool = False
+    stop_robot: str = ""
+    stop_all: bool = False
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One line of a script: from this time since the grant, this is wanted."""
+    """One line of a script: from this time since the grant, this is wanted.
+
+    Attributes:
+        at_s: That time.
+        wish: What is wanted.
+        at_once: True: if it comes from a pipe, it is wanted now.
+    """
 
     at_s: float
     wish: Wish
+    at_once: bool = False
 
 
 class ScriptReader:
@@ -65,18 +76,25 @@ class ScriptReader:
             line = msgspec.json.decode(text, type=_Line)
         except msgspec.DecodeError as error:
             raise self._wrong(str(error)) from None
-        step = Step(line.at_s, self._wish(line))
-        if not (math.isfinite(line.at_s) and line.at_s >= self._last_s):
-            raise self._wrong(f"at_s {line.at_s:g} comes after {self._last_s:g}")
+        wish, at_s = self._wish(line), self._last_s if line.at_s is None else line.at_s
+        if line.at_s is None and not isinstance(wish, StopRobot | StopAll):
+            raise self._wrong("at_s is missing")
+        if not (math.isfinite(at_s) and at_s >= self._last_s):
+            raise self._wrong(f"at_s {at_s:g} comes after {self._last_s:g}")
         if self._released:
             raise self._wrong("nothing can follow a release")
-        self._last_s, self._released = line.at_s, isinstance(step.wish, GiveBack)
-        return step
+        self._last_s, self._released = at_s, isinstance(wish, GiveBack)
+        return Step(at_s, wish, line.at_s is None)
 
     def _wish(self, line: _Line) -> Wish:
         drives = (line.left_rad_s, line.right_rad_s) != (None, None)
-        if [drives, line.halt, line.jump, line.release].count(True) != 1:
-            raise self._wrong("exactly one of: both wheel speeds, halt, jump, release")
+        wished = [drives, line.halt, line.jump, line.release, bool(line.stop_robot), line.stop_all]
+        if wished.count(True) != 1:
+            raise self._wrong("exactly one of: both wheel speeds, halt, jump, release, stop_robot, stop_all")
+        if line.stop_robot:
+            return StopRobot(line.stop_robot, line.reason)
+        if line.stop_all:
+            return StopAll(line.reason)
         if line.halt:
             return Halt()
         if line.jump:
@@ -111,7 +129,8 @@ class ScriptPlayer:
     """Turns steps and time into commands.
 
     Laws: no command before its time; a drive is repeated until the next line, as commands end by
-    themselves at the robot; nothing after ``GiveBack``, which comes exactly once.
+    themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no drive and
+    no jump before a halt: what a hand does by letting go, a script does by that line.
     """
 
     def __init__(self, steps: list[Step] | None = None) -> None:
@@ -119,7 +138,13 @@ class ScriptPlayer:
         self._ended = steps is not None
         self._drive: Drive | None = None
         self._next_s = 0.0
-        self._over = False
+        self._over = self._must_let_go = False
+        self.held_back = 0
+        """How many lines were left out because no halt came before them."""
+
+    def require_let_go(self) -> None:
+        """From now on lines move nothing before one of them halts."""
+        self._drive, self._must_let_go = None, True
 
     @property
     def is_over(self) -> bool:
@@ -143,8 +168,13 @@ class ScriptPlayer:
         wishes: list[Wish] = []
         while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
             wish = self._steps.popleft().wish
+            self._must_let_go = self._must_let_go and not isinstance(wish, Halt)
+            if self._must_let_go and isinstance(wish, Drive | Jump):
+                self.held_back += 1
+                continue
             self._over = isinstance(wish, GiveBack)
-            self._drive = wish if isinstance(wish, Drive) else self._drive if isinstance(wish, Jump) else None
+            if isinstance(wish, Drive | Halt | GiveBack):
+                self._drive = wish if isinstance(wish, Drive) else None
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(wish)
         if self._ended and not self._steps and not self._over:

@@ -10,12 +10,13 @@ from collections.abc import Callable
 from backbone.errors import Refusal, code_of
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import SwappedOut
-from ui_console.console_events import Asked, CommandRefused, ConsoleEvent, PictureSeen, event_json
-from ui_console.driving import GiveBack, Jump
+from ui_console.console_events import Asked, CommandRefused, ConsoleEvent, PictureSeen, StopHeard, event_json
+from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.teleoperation import Teleoperation
 
 DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
+INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
 _FOR_SCREENS_ONLY = (Asked, PictureSeen)
 
@@ -38,11 +39,17 @@ class ScriptDriver:
         self._news = asyncio.Event()
         self._granted = self._failed = False
         self._wrong: WrongScript | None = None
+        self._console: Teleoperation | None = None
+        self._stops: list[StopRobot | StopAll] = []
+        self._stopped = False
 
     def show(self, event: ConsoleEvent) -> None:
         """Write the event, if it is one for scripts."""
         if isinstance(event, _FOR_SCREENS_ONLY):
             return
+        if isinstance(event, StopHeard) and (event.stop.is_stopped or self._stopped):
+            self._stopped = event.stop.is_stopped
+            self._player.require_let_go()
         if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True
         self._write(event_json(event))
@@ -54,7 +61,10 @@ class ScriptDriver:
                 step = None if line is None else self._reader.read(line)
             except WrongScript as wrong:
                 self._wrong, step, line = wrong, None, None
-            if step is not None:
+            if step is not None and step.at_once and isinstance(step.wish, StopRobot | StopAll):
+                self._stops.append(step.wish)
+                self._begin_stops()
+            elif step is not None:
                 self._player.add(step)
             if line is None:
                 self._player.end()
@@ -62,6 +72,8 @@ class ScriptDriver:
 
     async def drive(self, console: Teleoperation) -> None:
         """Wait for the grant, play the script to its end, give the robot back."""
+        self._console = console
+        self._begin_stops()
         try:
             async with asyncio.timeout(self._within_s / console.clock.rate if self._within_s else None):
                 await console.wait_granted()
@@ -82,7 +94,7 @@ class ScriptDriver:
         """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
         if self._wrong is not None:
             return USAGE
-        if console.refusal is not None or self._failed:
+        if console.refusal is not None or self._failed or self._player.held_back:
             return REFUSED
         return DONE if self._granted and console.given_back else NO_BACKBONE
 
@@ -90,14 +102,38 @@ class ScriptDriver:
         clock = console.clock
         while True:
             self._news.clear()
-            for wish in self._player.due(clock.now_s() - granted_s):
-                if isinstance(wish, GiveBack):
-                    self._tell_wrong(clock.now_s())
-                    await console.give_back("the script is over")
-                    return
-                if console.is_held or isinstance(wish, Jump):
-                    await console.do(wish)
+            since_s, next_s = clock.now_s() - granted_s, self._player.next_s
+            if next_s is not None and abs(since_s - next_s) < INSTANT_S:
+                since_s = next_s  # what was waited for is due, however the times were rounded
+            for wish in self._player.due(since_s):
+                match wish:
+                    case GiveBack():
+                        self._tell_wrong(clock.now_s())
+                        await console.give_back("the script is over")
+                        return
+                    case StopRobot() | StopAll():
+                        await self._stop(console, wish)
+                    case Jump():
+                        await console.do(wish)
+                    case Drive() | Halt() if console.is_held:
+                        await console.do(wish)
             await self._wait_news(console, granted_s)
+
+    def _begin_stops(self) -> None:
+        """Carry out the emergency stops that count at once, if there is a console to do it by yet."""
+        if self._console is None or not self._console.is_ready:
+            return
+        stops, self._stops = self._stops, []
+        for stop in stops:
+            self._console.start_task(self._stop(self._console, stop), "stop")
+
+    async def _stop(self, console: Teleoperation, stop: StopRobot | StopAll) -> None:
+        """Stop one robot or all; one that does not confirm it is told, and the script failed."""
+        if isinstance(stop, StopRobot):
+            is_sure = await console.stop_robot(stop.robot, stop.reason)
+        else:
+            is_sure = not await console.stop_all(stop.reason)
+        self._failed = self._failed or not is_sure
 
     async def _wait_news(self, console: Teleoperation, granted_s: float) -> None:
         """Return when the next step is due or another one arrived."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from ui_console.observer import Observer
 
 log = logging.getLogger(__name__)
+
+LEARN_WITHIN_S = 0.3  # chosen: many times what an answer takes, less than an ARC waits until its notice is noted
 
 
 class StopEar:
@@ -28,20 +31,18 @@ class StopEar:
         self._console, self._heard = console, heard
         self._listening: Subscription | None = None
 
-    def listen(self, robot: str) -> None:
-        """Hear of this robot from now on, and of no other."""
+    async def listen(self, robot: str) -> None:
+        """Hear of this robot from now on, and of no other; return when it is known how it is, or soon."""
         self.close()
         self._listening = watch_stops(self._console.bus, self._heard, robot)
-        self._console.start_task(self._ask(robot), "stop")
+        try:
+            async with asyncio.timeout(LEARN_WITHIN_S):
+                self._heard(await ask_stop(self._console.bus, robot))
+        except (Refusal, LinkError, TimeoutError) as error:  # a robot of another make may know no such stop
+            log.info("%s did not say whether it is stopped: %s", robot, error)
 
     def close(self) -> None:
         """Hear of none."""
         if self._listening is not None:
             self._listening.close()
             self._listening = None
-
-    async def _ask(self, robot: str) -> None:
-        try:
-            self._heard(await ask_stop(self._console.bus, robot))
-        except (Refusal, LinkError) as error:  # a robot of another make may know no such stop
-            log.info("%s did not say whether it is stopped: %s", robot, error)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -18,10 +20,12 @@ from backbone.wire import Envelope, Message
 from resource_pool.arc_client import EmergencyStopped
 from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.messages import Drive as ArcDrive
+from resource_pool.messages import Halt as ArcHalt
 from resource_pool.messages import Jump as ArcJump
 from resource_pool.stop_latch import StopLatch
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import FIRST_HOLD_S, STICK_LASTS_S, DeadMan, Drive, Halt, drive_towards
+from ui_console.scripted import ScriptDriver
 from ui_console.teleoperation import Teleoperation
 
 FORWARD = drive_towards("forward", 4.0)
@@ -104,9 +108,17 @@ def test_a_jump_key_that_is_held_jumps_no_more_until_it_was_let_go() -> None:
 class Stage:
     """A console whose screens show what it hears, and the RC of the robot that it holds."""
 
-    def __init__(self, placer: FakePlacer, **options: Any) -> None:
+    def __init__(self, placer: FakePlacer, *, is_scripted: bool = False) -> None:
         self.placer, self.clock = placer, placer.clock
         self.model = ConsoleModel("console-7", "anna")
+        if not is_scripted:
+            self.make_console(show=self.model.apply)
+        self.latch = StopLatch("scout1")
+        self.rc = placer.network.join("resource_pool/scout1", placer.clock)
+        self.rc.serve("resource_pool/scout1", AskStop | EmergencyStop | LiftStop, self._answer)
+        self.rc.declare_alive("resource_pool/scout1")
+
+    def make_console(self, **options: Any) -> None:
         parameters = {"robot": "scout1", "kind": "drive", "priority": 100}
         launch = Launch(
             "iros2001",
@@ -120,25 +132,20 @@ class Stage:
             1.0,
             parameters,
         )
-        bus = placer.network.join(launch.address, placer.clock)
-        self.console = Teleoperation(
-            launch, bus, placer.clock, show=self.model.apply, watches=False, user="anna", **options
-        )
-        self.latch = StopLatch("scout1")
-        self.rc = placer.network.join("resource_pool/scout1", placer.clock)
-        self.rc.serve("resource_pool/scout1", AskStop | EmergencyStop | LiftStop, self._answer)
-        self.rc.declare_alive("resource_pool/scout1")
+        bus = self.placer.network.join(launch.address, self.clock)
+        self.console = Teleoperation(launch, bus, self.clock, watches=False, user="anna", **options)
 
     @property
     def arc(self) -> FakeArc:
         return self.placer.arcs["console-7-drive"]
 
-    def stop(self, by: str = "ben") -> None:
+    def stop(self, by: str = "ben", reason: str = "") -> None:
         """Somebody stops the robot: its commands are refused from now on, and everybody hears of it."""
-        self.latch.stop(by, "", self.clock.now_s(), f"ui_console/{by}")
-        self.arc.refusal = EmergencyStopped(
-            "scout1 was stopped", rc="scout1", number=self.latch.state.number, is_stopped=True
-        )
+        self.latch.stop(by, reason, self.clock.now_s(), f"ui_console/{by}")
+        for arc in self.placer.arcs.values():
+            arc.refusal = EmergencyStopped(
+                "scout1 was stopped", rc="scout1", number=self.latch.state.number, is_stopped=True
+            )
         self.rc.publish("resource_pool/scout1", Conversation.EVENTS, self.latch.state)
 
     def lift(self) -> None:
@@ -163,8 +170,8 @@ class Stage:
 
     async def _answer(self, asked: Envelope[Any]) -> Message:
         match asked.body:
-            case EmergencyStop(user=user):
-                self.stop(user)
+            case EmergencyStop(user=user, reason=reason):
+                self.stop(user, reason)
         return self.latch.state
 
 
@@ -182,6 +189,26 @@ def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
                     async with beside(on.console):
                         await on.held()
                         await scene(on)
+                finally:
+                    await on.rc.close()
+                    await placer.close()
+
+        run_virtual(main())
+
+    return run
+
+
+@pytest.fixture
+def scripted(local_mission: Any) -> Callable[[Scene], None]:
+    """Like ``stage``, with a console that the scene starts."""
+
+    def run(scene: Scene) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network:
+                placer = FakePlacer(network, VirtualClock(), {})
+                on = Stage(placer, is_scripted=True)
+                try:
+                    await scene(on)
                 finally:
                     await on.rc.close()
                     await placer.close()
@@ -312,3 +339,62 @@ def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_th
         assert on.drives()
 
     stage(scene)
+
+
+# ---------------------------------------------------------------------- scripts
+async def play(on: Stage, lines: list[tuple[float, str | None]]) -> tuple[int, list[str]]:
+    """Write these lines into the script's pipe, each after its pause; return how it ended and the words it said."""
+    said: list[bytes] = []
+    driver = ScriptDriver(said.append)
+    on.make_console(show=driver.show, work=driver.drive)
+    living = asyncio.create_task(on.console.run())
+    for pause_s, line in lines:
+        await on.clock.sleep_s(pause_s)
+        driver.feed(line)
+    await living
+    return driver.exit_code(on.console), [json.loads(line)["event"] for line in said]
+
+
+def test_a_script_drives_on_after_a_lift_only_when_it_halted_first(scripted: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        drive = '{"at_s":%s,"left_rad_s":4,"right_rad_s":4}'
+        playing = asyncio.create_task(
+            play(
+                on, [(0.0, drive % 0), (3.0, drive % 3), (1.0, '{"at_s":4,"halt":true}'), (1.0, drive % 5), (1.0, None)]
+            )
+        )
+        await on.held()
+        await on.clock.sleep_s(1.0)
+        assert on.drives()
+        on.stop()
+        await on.clock.sleep_s(0.5)
+        on.lift()
+        on.arc.commands.clear()
+        await on.clock.sleep_s(2.0)
+        assert not on.drives(), "neither the line that was repeated nor the next one"
+        arc = on.arc
+        code, words = await playing
+        drives = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcDrive)]
+        halts = [at_s for at_s, _epoch, command in arc.commands if isinstance(command, ArcHalt)]
+        assert drives
+        assert min(drives) > max(halts)
+        assert (code, "stop" in words) == (5, True)
+
+    scripted(scene)
+
+
+def test_a_script_stops_robots_before_its_grant_and_at_once(scripted: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        playing = asyncio.create_task(
+            play(
+                on,
+                [(0.5, '{"stop_robot":"scout1","reason":"a child"}'), (2.0, '{"at_s":0,"release":true}'), (0.0, None)],
+            )
+        )
+        await on.clock.sleep_s(0.6)
+        state = on.latch.state
+        assert (state.is_stopped, state.by, state.reason) == (True, "anna", "a child")
+        await on.held()
+        await playing
+
+    scripted(scene)

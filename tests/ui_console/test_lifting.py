@@ -10,17 +10,16 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from stoppable_robot import StoppableRobot
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
-from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.operators import OperatorActed, OperatorAction
-from backbone.wire import Envelope, Message
+from backbone.wire import Envelope
 from resource_pool.arc_client import Stopper, StopState
-from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch
 from ui_console.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
 from ui_console.console_model import ConsoleModel
@@ -76,7 +75,7 @@ def test_a_stop_that_nobody_can_be_asked_about_is_lifted_by_anybody() -> None:
 )
 def test_people_read_what_it_takes_to_lift_a_stop(stoppers: list[str], there: list[str], line: str) -> None:
     stop = stopped_by(*stoppers)
-    assert lift_line(stop, "anna", "ui_console/anna", lambda at: at.removeprefix("ui_console/") in there) == line
+    assert lift_line(stop, "anna", "ui_console/anna", lambda author: author.by in there) == line
 
 
 def test_who_stopped_under_no_name_is_known_by_the_console() -> None:
@@ -87,32 +86,13 @@ def test_who_stopped_under_no_name_is_known_by_the_console() -> None:
 
 
 # ---------------------------------------------------------------------- three people at consoles that only watch
-class Robot(Component[Any]):
-    """Only stops and moves again."""
-
-    accepts = AskStop | EmergencyStop | LiftStop
-
-    def __init__(self, *given: Any) -> None:
-        super().__init__(*given)
-        self.latch = StopLatch(self.name)
-
-    async def answer(self, asked: Envelope[Any]) -> Message:
-        match asked.body:
-            case EmergencyStop(reason=reason, user=user):
-                self.latch.stop(user, reason, self.clock.now_s(), asked.source)
-            case LiftStop(number=number, user=user):
-                self.latch.lift(number, user, self.clock.now_s())
-        self.bus.publish(self.address, Conversation.EVENTS, self.latch.state)
-        return self.latch.state
-
-
 class Person:
     """Somebody at a console, and what its screens show."""
 
-    def __init__(self, name: str, stage: Stage) -> None:
+    def __init__(self, name: str, stage: Stage, console: str = "") -> None:
         self.name, self.clock = name, stage.clock
         self.model = ConsoleModel(name, name)
-        launch = stage.launch(Subsystem.UI_CONSOLE, name, "console")
+        launch = stage.launch(Subsystem.UI_CONSOLE, console or name, "console")
         bus = stage.network.join(launch.address, stage.clock)
         self.console: Observer[Any] = Observer(launch, bus, stage.clock, show=self.model.apply, user=name)
 
@@ -131,7 +111,7 @@ class Stage:
     def __init__(self, network: Any) -> None:
         self.network, self.clock = network, VirtualClock()
         launch = self.launch(Subsystem.RESOURCE_POOL, "scout1", "scout")
-        self.robot = Robot(launch, network.join(launch.address, self.clock), self.clock)
+        self.robot = StoppableRobot(launch, network.join(launch.address, self.clock), self.clock)
         self.people = {name: Person(name, self) for name in PEOPLE}
         self.acts: list[tuple[str, OperatorAction]] = []
         self.ear: Bus = network.join("mission_control/ear", self.clock)
@@ -250,6 +230,24 @@ def test_an_author_who_left_keeps_no_robot_standing(stage: Callable[[Scene], Non
     stage(scene)
 
 
+def test_an_author_who_sits_at_another_screen_by_now_is_asked_there(
+    stage: Callable[[Scene], None], beside: Any
+) -> None:
+    async def scene(on: Stage) -> None:
+        anna = on.people["anna"]
+        await anna.console.stop_robot("scout1")
+        anna.console.end("goes to another room")
+        there = Person("anna", on, "tablet")
+        async with beside(there.console):
+            lifting = on.lift("ben")
+            await on.until(there.question)
+            there.console.decide(False, "not yet")
+            assert not await lifting
+            assert on.people["ben"].asked() == "anna keeps scout1 stopped: not yet"
+
+    stage(scene)
+
+
 def test_an_author_who_leaves_while_being_asked_keeps_it_no_longer(stage: Callable[[Scene], None]) -> None:
     async def scene(on: Stage) -> None:
         anna = on.people["anna"]
@@ -320,7 +318,9 @@ def test_stopping_twice_never_lifts(stage: Callable[[Scene], None]) -> None:
 def test_programs_cannot_ask_for_a_lift(stage: Callable[[Scene], None]) -> None:
     async def scene(on: Stage) -> None:
         with pytest.raises(NotAnOperator):
-            await on.ear.ask("ui_console/anna", AskLift("scout1", "anna", "ear"), Consent, within_s=1.0)
+            await on.ear.ask(
+                "ui_console/anna", AskLift("scout1", "anna", "ui_console/anna", "ear"), Consent, within_s=1.0
+            )
 
     stage(scene)
 

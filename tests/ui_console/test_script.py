@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, Wish
+from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
 
 EXAMPLE = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
@@ -50,6 +50,40 @@ def test_a_jump_does_not_interrupt_a_drive() -> None:
     wishes = [wish for _at_s, wish in play(ScriptPlayer(read_script(script)), 10.0)]
     assert wishes.count(Jump()) == 1
     assert wishes[-2] == Drive(1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("line", "step"),
+    [
+        ('{"at_s":2,"stop_robot":"scout2","reason":"a child"}', Step(2.0, StopRobot("scout2", "a child"))),
+        ('{"stop_robot":"scout2"}', Step(0.0, StopRobot("scout2"), at_once=True)),
+        ('{"stop_all":true}', Step(0.0, StopAll(), at_once=True)),
+    ],
+)
+def test_an_emergency_stop_needs_no_time(line: str, step: Step) -> None:
+    assert read_script(line) == [step]
+
+
+def test_a_stop_of_another_robot_does_not_end_the_drive() -> None:
+    script = '{"at_s":0,"left_rad_s":1,"right_rad_s":1}\n{"at_s":0.25,"stop_robot":"x"}\n{"at_s":0.6,"release":true}'
+    wishes = [wish for _at_s, wish in play(ScriptPlayer(read_script(script)), 10.0)]
+    assert wishes.count(StopRobot("x")) == 1
+    assert wishes[-2] == Drive(1.0, 1.0)
+
+
+def test_when_letting_go_is_required_nothing_moves_before_a_line_that_halts() -> None:
+    player = ScriptPlayer()
+    player.add(Step(0.0, Drive(1.0, 1.0)))
+    assert player.due(0.0) == [Drive(1.0, 1.0)]
+    player.require_let_go()
+    assert player.due(1.0) == []
+    for step in (Step(1.1, Drive(2.0, 2.0)), Step(1.2, Jump())):
+        player.add(step)
+    assert player.due(1.5) == []
+    assert player.held_back == 2
+    for step in (Step(1.6, Halt()), Step(1.7, Drive(3.0, 3.0))):
+        player.add(step)
+    assert player.due(2.0) == [Halt(), Drive(3.0, 3.0)]
 
 
 def test_a_streamed_script_waits_for_its_next_line_and_repeats_the_last_meanwhile() -> None:

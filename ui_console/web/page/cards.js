@@ -69,6 +69,15 @@ export class Cards {
 
   /** What is held down on a card counts no more. */
   letGo() { for (const card of this.cards.values()) card.dropLift(); }
+
+  /** The connection ended: who has which robot is not known here. */
+  cut() {
+    for (const card of this.cards.values()) {
+      card.root.classList.remove("is-mine");
+      set(card.state, "not known");
+      set(card.holder, "");
+    }
+  }
 }
 
 class Card {

@@ -39,8 +39,11 @@ export class Hand {
   /** The connection ended: what was held may be somebody else's by now. */
   cut(why, ageMs) {
     if (this.held) this.memory.keep(this.held, why, Date.now() - ageMs);
+    set(find("own"), this.held ? `You held ${this.held} when the connection ended.` : "Not connected.");
     this.own = null;
     this.driving.turn(false);
+    document.body.dataset.held = "";
+    document.body.classList.remove("is-asking");
   }
 
   show(own, now_s) {
