@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import string
+import time
 import unicodedata
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
@@ -15,6 +16,7 @@ from textual.pilot import Pilot
 SIZES = [(80, 24), (120, 40), (200, 60)]
 LOOKS = list(itertools.product(["textual-dark", "textual-light"], [False, True]))
 """Theme, and whether ``NO_COLOR`` is set."""
+SETTLES_WITHIN_S = 10.0
 LEAVE = {"q": 0, "ctrl+q": 0, "ctrl+c": 130}
 NAMED_KEYS = [
     *("enter", "escape", "space", "tab", "shift+tab", "backspace", "delete", "home", "end", "insert"),
@@ -82,8 +84,7 @@ async def press_all_twice(
             await to_main(pilot)
             if opening:
                 await pilot.press(*opening)
-                await answered(pilot)
-            assert len(app.screen_stack) == 1 + is_dialog
+            await until(pilot, lambda: len(app.screen_stack) == 1 + is_dialog, "the screen that the keys open is there")
             burst(pilot, key, key)
             await pilot.pause()
             if not app.is_running:
@@ -94,8 +95,20 @@ async def press_all_twice(
     assert app.return_code in (None, *LEAVE.values())
 
 
+async def until(pilot: Pilot[Any], is_so: Callable[[], bool], what: str) -> None:
+    """Return when it is so.
+
+    Raises:
+        AssertionError: It did not become so in time.
+    """
+    deadline_s = time.monotonic() + SETTLES_WITHIN_S
+    while not is_so():
+        assert time.monotonic() < deadline_s, what
+        await pilot.pause(0.01)
+
+
 async def _close_dialogs(pilot: Pilot[None]) -> None:
-    while (before := len(pilot.app.screen_stack)) > 1:
+    while len(pilot.app.screen_stack) > 1:
+        closing = pilot.app.screen
         await pilot.press("escape")
-        await pilot.pause()
-        assert len(pilot.app.screen_stack) < before, "escape closes a dialog"
+        await until(pilot, lambda: pilot.app.screen is not closing, f"escape closes {closing}")  # noqa: B023

@@ -86,6 +86,27 @@ async def test_without_colors_every_console_is_drawn(profile: Profile, monkeypat
         assert "scout1" in screen_text(app)
 
 
+async def test_a_dialog_may_be_looked_at_before_it_is_laid_out() -> None:
+    app = console()
+    async with app.run_test(size=(80, 24)) as pilot:
+        for action in (app.action_pick, app.action_lift):
+            action()
+            app.redraw()
+            await settle(pilot)
+            assert len(app.screen_stack) == 2
+            await pilot.press("escape")
+            await settle(pilot)
+
+
+@pytest.mark.parametrize("key", LEAVE)
+async def test_keys_typed_ahead_of_the_end_are_not_heard(key: str) -> None:
+    app = console()
+    async with app.run_test(size=(80, 24)) as pilot:
+        burst(pilot, key, key, "x", "p", "y", "M", "enter", key, "c")
+        await pilot.pause()
+    assert app.return_code == LEAVE[key]
+
+
 # ---------------------------------------------------------------------- every key
 @pytest.mark.slow
 @pytest.mark.timeout(600)

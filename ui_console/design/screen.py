@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path as FilePath
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 from rich.text import Text
 from textual import work
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
+from textual.screen import Screen
 from textual.widgets import Footer, Static
 
 from backbone.errors import Refusal
@@ -31,9 +32,11 @@ from ui_console.design.lines import key_of, path_of, problem_rows, property_rows
 from ui_console.design.offers import Asked, Offer, offers
 from ui_console.design.properties import Property, properties
 from ui_console.terminal.dialogs import Reading
+from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.lines import Row, plural
 from ui_console.terminal.widgets import Panel
 
+A = TypeVar("A")
 LookUp = Callable[[Sequence[str]], Awaitable[dict[str, ClassFacts]]]
 FOLDED_AT_FIRST = frozenset({"core", "types"})
 """What is the same in most missions, and filled by what is added elsewhere."""
@@ -55,7 +58,7 @@ class DesignPanel(Panel):
         self._key = key
 
 
-class DesignApp(App[None]):
+class DesignApp(EndingApp):
     """The designer's screen.
 
     Args:
@@ -224,6 +227,13 @@ class DesignApp(App[None]):
         self._panel(PanelName.TREE).choose(key_of(self._at))
 
     # ------------------------------------------------------------------ changing
+    async def _answer_to(self, dialog: Screen[A]) -> A | None:
+        """Return what was answered; None: it was closed, or never opened as keys in a burst had opened another."""
+        if len(self.screen_stack) > 1:
+            return None
+        answer: A = await self.push_screen_wait(dialog)
+        return answer
+
     def do(self, command: Command) -> bool:
         """Carry out a command and go to what it touched; say so if it is refused."""
         try:
@@ -242,12 +252,12 @@ class DesignApp(App[None]):
         """Pick what to add, answer what it needs, add it."""
         found = offers(self.draft.mission, self._at)
         labels = [offer.label for offer in found]
-        number = await self.push_screen_wait(Picker("add what?", labels, [self._about(offer) for offer in found]))
+        number = await self._answer_to(Picker("add what?", labels, [self._about(offer) for offer in found]))
         if number is None:
             return
         given = []
         for asked in found[number].asks:
-            answer = await self.push_screen_wait(Ask(asked))
+            answer = await self._answer_to(Ask(asked))
             if answer is None:
                 return
             given.append(answer)
@@ -285,7 +295,7 @@ class DesignApp(App[None]):
     async def _set(self, found: Property) -> None:
         path, tag = self._at, self.node.tag
         asked = Asked(found.name, found.doc, found.value or "", found.choices)
-        answer = await self.push_screen_wait(Ask(asked))
+        answer = await self._answer_to(Ask(asked))
         if answer is not None:
             self.do(found.command(path, tag, answer.strip()))
 
@@ -362,13 +372,13 @@ class DesignApp(App[None]):
             f"{entry.role:<9} {entry.name}{'' if entry.is_declared else ' (not declared yet)'}" for entry in found
         ]
         docs = [description(entry, self.facts) for entry in found]
-        number = await self.push_screen_wait(Picker("catalogue (enter: read all of it)", labels, docs))
+        number = await self._answer_to(Picker("catalogue (enter: read all of it)", labels, docs))
         if number is None:
             return
         entry = found[number]
         if entry.class_path not in self.facts:
             self.facts = {**self.facts, **await self._look_up([entry.class_path])}
-        await self.push_screen_wait(Reading(entry.name, description(entry, self.facts)))
+        await self._answer_to(Reading(entry.name, description(entry, self.facts)))
 
     def action_text(self) -> None:
         """Read the file as it would be saved, from the element on."""
@@ -402,7 +412,7 @@ class DesignApp(App[None]):
     async def action_save_as(self) -> None:
         """Save under another name, and go on with that."""
         asked = Asked("save as", "The file to write.", self.draft.source)
-        answer = await self.push_screen_wait(Ask(asked))
+        answer = await self._answer_to(Ask(asked))
         if answer:
             await self._save(FilePath(answer))
 
@@ -411,7 +421,7 @@ class DesignApp(App[None]):
             try:
                 self.draft = save(self.draft, path)
             except FileChanged as changed:
-                if not await self.push_screen_wait(Sure(f"{changed.detail}. Overwrite it?")):
+                if not await self._answer_to(Sure(f"{changed.detail}. Overwrite it?")):
                     return
                 self.draft = save(self.draft, path, overwrite=True)
         except Refusal as refusal:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, TypeVar
 import msgspec
 from rich.text import Text
 from textual import work
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 from textual.events import AppBlur, AppFocus, Key, MouseDown, Resize, Unmount
@@ -26,6 +26,7 @@ from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
+from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
 from ui_console.terminal.lines import Row, robot_rows
@@ -43,7 +44,7 @@ NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are b
 A = TypeVar("A")
 
 
-class ConsoleApp(App[None]):
+class ConsoleApp(EndingApp):
     """One console's screen.
 
     Args:
@@ -155,10 +156,6 @@ class ConsoleApp(App[None]):
     def on_unmount(self, _event: Unmount) -> None:
         """Let the session know before anything else is done about what ended the screen."""
         self._session.closed()
-
-    def exit(self, result: None = None, return_code: int = 0, message: Any = None) -> None:
-        """End; what ended by a crash stays a crash."""
-        super().exit(result, return_code or self.return_code or 0, message)
 
     def redraw(self) -> None:
         """Show what the model says now."""

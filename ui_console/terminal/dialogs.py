@@ -78,9 +78,9 @@ class RobotPicker(Dialog[str]):
 
     @property
     def subject(self) -> str:
-        """The robot the cursor is on."""
-        chosen = self.query_one(OptionList).highlighted
-        return self._robots[chosen].subject if chosen is not None else ""
+        """The robot the cursor is on; empty before the list is there."""
+        chosen = [options.highlighted for options in self.query(OptionList)]
+        return "".join(self._robots[number].subject for number in chosen if number is not None)
 
     def compose(self) -> ComposeResult:
         """Lay out the list."""
@@ -171,7 +171,8 @@ class LiftQuestion(Dialog[int]):
         if stop.number != self._stop.number:
             self._changed_s = asyncio.get_running_loop().time()
         self._stop = stop
-        self.query_one("#stop", Static).update(self._text())
+        for shown in self.query("#stop").results(Static):  # none before it is laid out, which shows the newest
+            shown.update(self._text())
 
     def action_lift(self) -> None:
         """Answer, unless the stop has just become another one, which nobody can have read yet."""

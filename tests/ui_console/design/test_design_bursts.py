@@ -12,6 +12,7 @@ from screen_text import screen_text
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from ui_console.design.dialogs import Sure
 from ui_console.design.draft import Draft
 from ui_console.design.screen import DesignApp, PanelName
 
@@ -82,6 +83,26 @@ async def test_leaving_a_field_of_the_designer_asks_once(tmp_path: Path) -> None
         await answered(pilot)
         assert "not saved. Leave?" in screen_text(app)
         assert len(app.screen_stack) == 3
+
+
+@pytest.mark.parametrize("keys", [["enter", "enter", "q", "y"], ["a", "a", "c", "w"], ["enter", "enter", "enter", "n"]])
+async def test_no_dialog_opens_over_another_however_fast_their_keys_come(keys: list[str], tmp_path: Path) -> None:
+    app = designer(tmp_path)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("plus", "tab")
+        burst(pilot, *keys)
+        await answered(pilot)
+        assert len([screen for screen in app.screen_stack if not isinstance(screen, Sure)]) <= 2
+
+
+async def test_keys_typed_ahead_of_the_end_are_not_heard(tmp_path: Path) -> None:
+    app = designer(tmp_path)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("s")
+        await answered(pilot)
+        burst(pilot, "q", "q", "a", "n", "enter", "ctrl+c", "y")
+        await answered(pilot)
+    assert app.return_code == 0
 
 
 @pytest.mark.slow
