@@ -49,7 +49,7 @@ from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health_watch import HealthWatch
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
-from backbone.mission_log import AskLog, LogKeeper
+from backbone.mission_log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
@@ -122,7 +122,7 @@ class Observer(Protocol):
 class Launcher(Component[NoParameters]):
     """Starts core services and mission, restarts core services, stops all."""
 
-    accepts: ClassVar[Any] = ListProcesses | AskLog
+    accepts: ClassVar[Any] = ListProcesses | AskLog | AskPeople
 
     def __init__(
         self,
@@ -193,6 +193,8 @@ class Launcher(Component[NoParameters]):
                 return Processes(self.launch.host, [], self._keeper.processes())
             case AskLog() as wanted:
                 return self._log.log.told(wanted)
+            case AskPeople():
+                return PeopleKnown(self._log.log.people.consoles)
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:

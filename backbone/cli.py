@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-import math
 import os
-import re
 import sys
 from collections.abc import Awaitable, Callable, Iterable
 from contextlib import AbstractAsyncContextManager, suppress
@@ -20,8 +18,22 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
+from backbone.cli_options import (
+    AsJson,
+    ComponentName,
+    Endpoint,
+    MissionFile,
+    MissionName,
+    NameOrCause,
+    SecretFile,
+    WholeHelp,
+    complete_name,
+    complete_person,
+    complete_resource,
+    finite,
+    hub_endpoint,
+)
 from backbone.component.messages import LogLevel
 from backbone.errors import BackboneError, HubUnreachable, LinkError, Refusal, code_of
 from backbone.printable import printable_lines
@@ -39,23 +51,6 @@ class ExitCode(IntEnum):
     REFUSED = 5
     MISSION_FAILED = 6
     INTERRUPTED = 130
-
-
-class WholeHelp(TyperGroup):
-    """Lists commands with all that is said of each; other lists cut it at the end of the line."""
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write a row for each command."""
-        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        rows = [
-            (name, _first_paragraph(one.help or "")) for name, one in commands if one is not None and not one.hidden
-        ]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
-
-
-def _first_paragraph(text: str) -> str:
-    return " ".join(text.partition("\n\n")[0].split())
 
 
 app = typer.Typer(
@@ -77,90 +72,6 @@ LARGEST_SEED = 2**32 - 1  # as numpy has it
 MOST_EVENTS = 10_000  # as in mission_log
 LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link
 PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
-
-ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
-
-
-def hub_endpoint(value: str | None) -> str | None:
-    """Refuse what names no hub; for options that take an endpoint."""
-    if value is not None and ENDPOINT.fullmatch(value) is None:
-        raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
-    return value
-
-
-def complete_mission() -> list[str]:
-    """Return the missions that are up on this machine."""
-    from backbone.completion import missions_now
-
-    return missions_now()
-
-
-def picture_for(ctx: typer.Context) -> Any:
-    """Return how the mission is that the words typed so far are about; None if there is none."""
-    from backbone.completion import picture_now
-
-    return picture_now(ctx.params.get("mission"), ctx.params.get("connect"), ctx.params.get("secret_file"))
-
-
-def complete_name(ctx: typer.Context) -> list[str]:
-    """Return what can be asked about in the mission that is up."""
-    from backbone.completion import names_of
-
-    picture = picture_for(ctx)
-    return names_of(picture) if picture is not None else []
-
-
-def complete_resource(ctx: typer.Context) -> list[str]:
-    """Return the resources of the mission that is up."""
-    from backbone.completion import resources_of
-
-    picture = picture_for(ctx)
-    return resources_of(picture) if picture is not None else []
-
-
-def complete_person(ctx: typer.Context) -> list[str]:
-    """Return the people at the consoles of the mission that is up."""
-    from backbone.completion import people_of
-
-    picture = picture_for(ctx)
-    return people_of(picture) if picture is not None else []
-
-
-MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
-MissionName = Annotated[
-    str | None,
-    typer.Option("--mission", autocompletion=complete_mission, help="Name of the mission; needed if several are up."),
-]
-Endpoint = Annotated[
-    str | None,
-    typer.Option(
-        "--connect", callback=hub_endpoint, help="Hub of a mission elsewhere, e.g. tcp/192.0.2.7:7447, with --mission."
-    ),
-]
-SecretFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--secret-file",
-        envvar="SCOUT_SECRET_FILE",
-        help="File with the mission's secret, with --connect; '-' reads it from standard input.",
-    ),
-]
-NameOrCause = Annotated[
-    str,
-    typer.Argument(
-        autocompletion=complete_name,
-        help="A component, resource, host, person or alarm; or a cause as stories show it: rc_manager#112.",
-    ),
-]
-ComponentName = Annotated[str, typer.Argument(autocompletion=complete_name, help="A component of the mission.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
-
-
-def finite(value: float | None) -> float | None:
-    """Refuse what is no number, which no range refuses; for options with a range."""
-    if value is not None and not math.isfinite(value):
-        raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
-    return value
 
 
 def main() -> None:
@@ -399,7 +310,8 @@ def story(
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
-        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(told.events))
+        events = [*map(told.people.named_event, told.events)]
+        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(events))
         if not told.events:
             say(f"no component has an event about {name}")
         if told.missing:
@@ -451,7 +363,7 @@ def log(
             say("nothing of that kind happened")
         if told.left_out:
             say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
-        if told.since_s > since_s:
+        if told.since_s > max(0.0, since_s):
             say(f"what was before {told.since_s:.1f} s is not kept any more")
         return ExitCode.DONE
 

@@ -86,6 +86,20 @@ class Log(Message, frozen=True):
     since_s: Instant = 0.0
 
 
+class AskPeople(Message, frozen=True):
+    """Who sits at which console, or sat there?"""
+
+
+class PeopleKnown(Message, frozen=True):
+    """Answer to ``AskPeople``.
+
+    Attributes:
+        consoles: Name of the console → the person's.
+    """
+
+    consoles: Annotated[dict[Mention, Mention], MANY]
+
+
 class MissionLog:
     """The newest of what happened. Pure.
 

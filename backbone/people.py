@@ -11,7 +11,7 @@ Rules of this file: pure. Who sits where is what consoles say of themselves; not
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar, cast
 
 import msgspec
@@ -45,6 +45,19 @@ class People:
             self._called[name] = component.user
         while len(self._called) > CONSOLES_KEPT:
             del self._called[next(iter(self._called))]
+
+    def remember(self, consoles: Mapping[str, str]) -> None:
+        """Take in who sat where; what is known already is newer.
+
+        Args:
+            consoles: Name of the console → the person's.
+        """
+        self._called = {**consoles, **self._called}
+
+    @property
+    def consoles(self) -> dict[str, str]:
+        """Name of each console → the person's."""
+        return dict(self._called)
 
     def person(self, name: str) -> str:
         """Return whom a console, or what it claims, is there for; the name itself if nobody is known.

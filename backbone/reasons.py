@@ -15,7 +15,8 @@ from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
 from backbone.health import line
 from backbone.log_lines import event_json
-from backbone.mission_picture import MissionPicture, look, stop_line
+from backbone.mission_log import AskPeople, PeopleKnown
+from backbone.mission_picture import LAUNCHER, MissionPicture, look, stop_line
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import component_of
@@ -150,12 +151,13 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
     """
     asked = Asked.of(text)
     name = asked.name
-    why, placement, resolved, picture, told = await asyncio.gather(
+    why, placement, resolved, picture, told, known = await asyncio.gather(
         _or_error(bus, RC_MANAGER, AskWhy(name), Why),
         _or_error(bus, PLACER, AskPlacement(name), Placement),
         _or_error(bus, NAMESERVER, Resolve(name), Resolved),
         _look_or_none(bus, clock),
         story_of(bus, text, clock) if asked.message else _nothing_told(),
+        _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown),
     )
     absent = picture.health.absent if picture is not None else ()
     remarks = [*host_remarks(name, picture), *person_remarks(name, picture)] if picture is not None else []
@@ -171,7 +173,7 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         next((absence for absence in absent if absence.name == name), None),
         told.events,
         remarks,
-        picture.people if picture is not None else People(),
+        _people(picture, known),
     )
     if not reasons.is_known:
         errors = (why, placement, resolved)
@@ -214,10 +216,12 @@ class Told:
     Attributes:
         events: In the order of their times.
         missing: Components that did not tell, and why: the events are not all there are.
+        people: Who sits at the consoles that are spoken of, or sat there.
     """
 
     events: Sequence[StoryEvent]
     missing: Sequence[str] = ()
+    people: People = field(default_factory=People)
 
 
 async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
@@ -228,8 +232,9 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     """
     asked = Asked.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    picture, *stories = await asyncio.gather(
+    picture, known, *stories = await asyncio.gather(
         _look_or_none(bus, clock),
+        _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown),
         *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
     )
     events = [event for story in stories if isinstance(story, Story) for event in story.events]
@@ -244,7 +249,15 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     missing += [f"{each.name}: it is absent, {each.cause}" for each in absent if each.name not in named]
     if not listing.complete:
         missing.append("the nameserver began a moment ago: components may be missing in its list")
-    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing))
+    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing, _people(picture, known)))
+
+
+def _people(picture: MissionPicture | None, known: Any) -> People:
+    """Return who sits at the consoles there are, and who sat at those that have left as far as the launcher knows."""
+    people = picture.people if picture is not None else People()
+    if isinstance(known, PeopleKnown):
+        people.remember(known.consoles)
+    return people
 
 
 async def _nothing_told() -> Told:

@@ -475,6 +475,11 @@ class ArcClient:
         if self.granted is not None:
             await self.handle(Suspended(self.arc, "lost", self.arc, -1.0))
 
+    @property
+    def epochs(self) -> dict[str, int]:
+        """RC → epoch of what is held now; empty while nothing is."""
+        return self.granted.epochs if self.granted is not None else {}
+
     def _last_stop(self) -> int:
         return self._stops.number(self.granted.rcs.get("scout", "")) if self.granted is not None else 0
 

@@ -61,6 +61,7 @@ class FakeArc:
         self.epoch, self.granted = 0, False
         self.commands: list[tuple[float, int, Message]] = []
         self.refusal: Refusal | None = None
+        self.require: Callable[[Any], None] = lambda command: None  # raises what its robot would
         self.released = ""
         self.is_idle = self.stays = False  # stays: holds on to its RCs although it is told to rest
         self.wishes: list[Message] = []
@@ -126,6 +127,8 @@ class FakeArc:
             raise SwappedOut(f"{self.name} holds nothing", reason="slice", by="other", expected_start_s=-1.0)
         if self.refusal is not None:
             raise self.refusal
+        if not isinstance(command, Halt):
+            self.require(command)
         self.commands.append((self.clock.now_s(), self.epoch, command))
         values = (
             {"left_rad_s": command.left_rad_s, "right_rad_s": command.right_rad_s} if isinstance(command, Drive) else {}

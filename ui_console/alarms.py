@@ -22,6 +22,8 @@ from ui_console.views import NONE_S, AlarmKind, AlarmView, Severity
 ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the recording
 FADES_AFTER_S = {Severity.NOTICE: 20.0, Severity.WARNING: 60.0}  # chosen: read twice; a real alarm never fades
 
+AT_ONCE_S = 5.0  # chosen: a lease, and the time in which a component is back; what happens later has its own cause
+
 SEVERITIES: dict[AlarmKind, Severity] = {
     AlarmKind.STOPPED: Severity.ALARM,
     AlarmKind.LOST: Severity.ALARM,
@@ -43,6 +45,7 @@ SEVERITIES: dict[AlarmKind, Severity] = {
 _WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}
 _CAUSES = (AlarmKind.LINK, AlarmKind.ABSENT, AlarmKind.LOST, AlarmKind.RC_DOWN)
 """Kinds from which others follow, the one that says most first."""
+_RANKS = len(_CAUSES) + 1
 
 
 @dataclass(slots=True)
@@ -116,6 +119,12 @@ class AlarmBook:
         alarm = self._alarms.get(key or alarm_key(kind, subject))
         if alarm is not None and alarm.is_active:
             alarm.is_active, alarm.is_over, alarm.last_s, alarm.remedy = False, True, at_s, ""
+
+    def mended(self, kinds: Sequence[AlarmKind]) -> None:
+        """What happened of these kinds matters no longer: what was wanted has come about since."""
+        for alarm in self._alarms.values():
+            if alarm.kind in kinds and not alarm.is_active:
+                alarm.is_over, alarm.remedy = True, ""
 
     def retract(self, kind: AlarmKind, subject: str, key: str = "") -> None:
         """It was none: what explains it was heard later."""
@@ -216,7 +225,7 @@ def one_line_for_one_cause(
         alarms: Any.
         explained_by: Names of that without which a subject cannot be well: its host's creator, what it uses.
     """
-    causes = [one for one in alarms if one.is_active and one.kind in _CAUSES]
+    causes = [one for one in alarms if _rank(one) < _RANKS]
     root_of = {one.key: _cause_of(one, causes, explained_by) for one in alarms}
     below: dict[str, list[AlarmView]] = {}
     for one in alarms:
@@ -239,13 +248,16 @@ def _cause_of(
             return cause.subject in needs and len(explained_by(cause.subject)) < len(needs)
         is_near = cause.subject in {one.subject, *needs}
         is_unseen = cause.kind is AlarmKind.LINK and one.last_s >= cause.first_s  # nothing is heard, so all looks lost
-        return _rank(cause) < rank and (is_near or is_unseen)
+        is_at_once = cause.is_active or abs(one.last_s - cause.last_s) <= AT_ONCE_S
+        return _rank(cause) < rank and is_at_once and (is_near or is_unseen)
 
     return min(filter(explains, causes), key=_rank, default=None)
 
 
 def _rank(alarm: AlarmView) -> int:
-    return _CAUSES.index(alarm.kind) if alarm.is_active and alarm.kind in _CAUSES else len(_CAUSES)
+    if alarm.is_active and alarm.kind in _CAUSES:
+        return _CAUSES.index(alarm.kind)
+    return len(_CAUSES) if alarm.kind is AlarmKind.LOST else _RANKS  # a fall explains what happened around it
 
 
 def _with(root: AlarmView, others: Sequence[AlarmView]) -> AlarmView:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Mapping
@@ -14,18 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from backbone.cli import (
-    ExitCode,
-    SecretFile,
-    WholeHelp,
-    complete_mission,
-    finite,
-    hub_endpoint,
-    picture_for,
-    read_secret_option,
-    run,
-    say,
-)
+from backbone.cli import ExitCode, read_secret_option, run, say
+from backbone.cli_options import SecretFile, WholeHelp, complete_mission, finite, hub_endpoint, picture_for
 
 if TYPE_CHECKING:
     from ssl import SSLContext
@@ -45,6 +36,7 @@ others; a script needs no picture, so it waits for none to settle and leaves the
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104  only compared with what the operator said
 WEB_PORT = 8420  # chosen: free on most machines
+MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
 LEAST_PRIORITY, MOST_PRIORITY = -(2**31), 2**31 - 1  # as in a mission file
 LONGEST_WAIT_S = 86_400.0  # chosen: a day, as in a mission file
 SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
@@ -580,8 +572,8 @@ async def _launch(where: _Where, parameters: dict[str, Any]) -> tuple[Launch, Cl
     from backbone.naming import Subsystem
     from backbone.visit import clock_elsewhere
 
-    name = f"console-{os.getpid()}"
     mission, connect = where.mission, where.connect
+    name = f"console-{os.getpid()}" if connect is None else _name_elsewhere(socket.gethostname())
     if connect is None:
         found = run_files.find(mission)
         mission, endpoint, secret = found.mission, found.endpoint, run_files.secret(found)
@@ -604,6 +596,17 @@ async def _launch(where: _Where, parameters: dict[str, Any]) -> tuple[Launch, Cl
         parameters,
     )
     return launch, clock, secret
+
+
+def _name_elsewhere(host: str) -> str:
+    """Return a console's name that those of other machines do not have: processes are numbered anew on each.
+
+    Example:
+        >>> _name_elsewhere("Lab PC.local").rpartition("-")[0]
+        'console-lab-pc-local'
+    """
+    plain = re.sub(r"[^a-z0-9]+", "-", host.lower()).strip("-")[:MOST_OF_HOST].strip("-")
+    return f"console-{plain}-{os.getpid()}"
 
 
 async def _open_bus(launch: Launch, clock: Clock, secret: str) -> Any:

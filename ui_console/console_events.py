@@ -132,21 +132,6 @@ class GivenBack:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotLost:
-    """A robot went from this operator before this console could know: a page that slept, a link that was cut.
-
-    Attributes:
-        at_s: When.
-        robot: Which.
-        why: For people.
-    """
-
-    at_s: float
-    robot: str
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
 class LetGoNeeded:
     """A control that is held moves nothing before it is let go, or no longer so.
 
@@ -273,6 +258,21 @@ class StoryHeard:
 
     at_s: float
     story: StoryEvent
+
+
+@dataclass(frozen=True, slots=True)
+class LogHeard:
+    """The launcher told what happened before this console listened.
+
+    Attributes:
+        at_s: When.
+        events: Oldest first.
+        consoles: Name of each console that was ever there → the person's.
+    """
+
+    at_s: float
+    events: Sequence[StoryEvent]
+    consoles: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,7 +419,6 @@ OwnEvent = (
     | CommandRefused
     | LinkTrouble
     | GivenBack
-    | RobotLost
     | LetGoNeeded
     | PictureSeen
     | WhyHeard
@@ -433,6 +432,7 @@ TeamEvent = (
     ScheduleHeard
     | LeasesHeard
     | StoryHeard
+    | LogHeard
     | ActHeard
     | ComponentHeard
     | ComponentsListed
@@ -454,7 +454,6 @@ _WORDS: dict[type[Any], str] = {
     CommandRefused: "refused",
     LinkTrouble: "no_answer",
     GivenBack: "released",
-    RobotLost: "lost",
     LetGoNeeded: "let_go",
     PictureSeen: "picture",
     WhyHeard: "why",
@@ -466,6 +465,7 @@ _WORDS: dict[type[Any], str] = {
     ScheduleHeard: "schedule",
     LeasesHeard: "leases",
     StoryHeard: "story",
+    LogHeard: "log",
     ActHeard: "operator",
     ComponentHeard: "component",
     ComponentsListed: "components",

@@ -10,6 +10,7 @@ operator's part: what is wanted, what is held, the pictures that arrive.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 from typing import cast, get_args
 
 import msgspec
@@ -35,7 +36,6 @@ from ui_console.console_events import (
     Lost,
     OwnEvent,
     PictureSeen,
-    RobotLost,
     TeamEvent,
     WhyHeard,
 )
@@ -64,6 +64,15 @@ SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
 _TEAM_EVENTS = get_args(TeamEvent)
+
+
+@dataclass(frozen=True, slots=True)
+class _Went:
+    """A robot that went without its operator asking for it."""
+
+    at_s: float
+    robot: str
+    why: str
 
 
 class ConsoleModel:
@@ -101,7 +110,7 @@ class ConsoleModel:
         self._pictures: dict[str, deque[PictureSeen]] = {}
         self._sought: dict[tuple[str, Topic], Sought] = {}
         self._must_let_go = False
-        self._went: RobotLost | None = None
+        self._went: _Went | None = None
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
         self._blind = ""  # robot that is held without pictures to drive by
@@ -199,7 +208,7 @@ class ConsoleModel:
     def other_screens(self) -> list[str]:
         """Return where else this console's person sits, and what they hold there, one line each."""
         own = [screen for screen in self.team.screens_of(self.user) if component_of(screen.address) != self.name]
-        return [f"{screen.type} on {screen.host}: {screen.feedback or screen.state}" for screen in own]
+        return [f"on {screen.host} {screen.feedback or f'is {screen.state}'}" for screen in own]
 
     def consent(self, now_s: float) -> ConsentView | None:
         """Return what this operator is to decide first; None: nobody asks."""
@@ -273,8 +282,8 @@ class ConsoleModel:
             slice_end = _slice_end(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
         if self.asked is None:
-            there = "; ".join(self.other_screens())
-            return f"watching; you hold no robot{f' here; your other screen, {there}' if there else ''}"
+            there = ", the one ".join(self.other_screens())
+            return f"watching; you hold no robot{f' here; your other screen {there}' if there else ''}"
         wanted = self.robot or "a robot"
         if self.why is not None and self.why.why.lines:
             return f"waiting for {wanted}: {self.team.people.named(self.why.why.lines[0])}"
@@ -296,25 +305,25 @@ class ConsoleModel:
                 self._sought.pop((settled.sought.asker, settled.sought.topic), None)
             case LetGoNeeded(is_needed=is_needed):
                 self._must_let_go = is_needed
-            case RobotLost():
-                self._went = event
             case Asked(robot=robot):
                 self._asked_whom = self._went = None
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
+                alarms.mended((AlarmKind.TAKEN, AlarmKind.REFUSED, AlarmKind.NO_ANSWER))
                 self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s):
                 self.held, self.lost = None, event
                 if event.reason in UNRENEWED:
-                    self._went = RobotLost(at_s, self.robot, "the link to it was away for too long")
+                    self._went = _Went(at_s, self.robot, "the link to it was away for too long")
                 self._pictures.clear()
                 if event.reason != WANTED:
                     line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
                     alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
             case CommandApplied():
                 self.applied = event
+                alarms.mended((AlarmKind.NO_ANSWER,))
             case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
                 if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
@@ -323,7 +332,7 @@ class ConsoleModel:
             case LinkTrouble(at_s=at_s, detail=detail):
                 alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
             case GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
-                self._went = None if wanted else RobotLost(at_s, self.robot, reason)
+                self._went = None if wanted else _Went(at_s, self.robot, reason)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:

@@ -32,6 +32,7 @@ from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
 from backbone.health import SILENT_AFTER_S, MissionHealth
 from backbone.keys import Conversation
+from backbone.mission_log import AskLog, AskPeople, Log, PeopleKnown
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import (
@@ -60,6 +61,7 @@ from ui_console.console_events import (
     LinkHeard,
     LinkTrouble,
     LoadHeard,
+    LogHeard,
     ParametersHeard,
     ProcessFallen,
     RadioCounted,
@@ -68,6 +70,7 @@ from ui_console.console_events import (
     StoryHeard,
     TeamEvent,
 )
+from ui_console.log_board import LOG_KEPT
 from ui_console.team_model import ROBOT_KIND
 
 log = logging.getLogger(__name__)
@@ -251,7 +254,7 @@ class ConsoleFeed:
         self._show(ComponentsListed(self._clock.now_s(), listing.components, listing.complete))
         behaviors = [at for c in listing.components if (at := c.address).startswith(f"{Subsystem.MISSION_CONTROL}/")]
         robots = [component_of(c.address) for c in listing.components if c.type == ROBOT_KIND]
-        await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots))
+        await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
 
     async def _ask_schedule(self) -> None:
         try:
@@ -271,6 +274,16 @@ class ConsoleFeed:
         for event in story.events:
             if event.what.startswith("finished: "):
                 self._show(StoryHeard(self._clock.now_s(), event))
+
+    async def _ask_log(self) -> None:
+        """Hear of what happened before this console listened, or while its link was away."""
+        try:
+            known = await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S)
+            told = await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S)
+        except (Refusal, LinkError) as error:
+            log.info("the launcher did not tell what happened: %s", error)
+        else:
+            self._show(LogHeard(self._clock.now_s(), told.events, known.consoles))
 
     async def _ask_stop(self, robot: str) -> None:
         try:

@@ -10,15 +10,14 @@ model calls before it shows it.
 from __future__ import annotations
 
 import dataclasses
-from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import assert_never
 
 import msgspec
 
 from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
-from backbone.creator.messages import HostLoad, ProcessFell, creator_name
-from backbone.mission_log import AskLog, chosen
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.mission_log import AskLog
 from backbone.naming import Subsystem, component_of
 from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
@@ -34,6 +33,7 @@ from ui_console.console_events import (
     LeasesHeard,
     LinkHeard,
     LoadHeard,
+    LogHeard,
     ParametersHeard,
     ProcessFallen,
     RadioCounted,
@@ -44,7 +44,10 @@ from ui_console.console_events import (
 )
 from ui_console.health_board import HealthBoard
 from ui_console.lifting import author_name, authors, is_own, lift_line
+from ui_console.log_board import LOG_KEPT, LogBoard
+from ui_console.needs import Needs
 from ui_console.timeline import Timeline
+from ui_console.tree_board import TreeBoard, because
 from ui_console.views import (
     NONE_S,
     AlarmKind,
@@ -54,7 +57,6 @@ from ui_console.views import (
     HostView,
     LinkView,
     LogRow,
-    NodeState,
     NodeView,
     ParameterView,
     RequestRow,
@@ -66,19 +68,12 @@ from ui_console.views import (
 )
 
 ROBOT_KIND = "scout"
-LOG_KEPT = 500  # chosen: some minutes of a busy mission; the rest is in the recording
 STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
 OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
 NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
+_LIFE = list(LifeState)
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
-_STATE_OF_REQUEST = {
-    RequestState.RUNNING: NodeState.RUNNING,
-    RequestState.REVOKING: NodeState.RUNNING,
-    RequestState.CONNECTING: NodeState.WAITING,
-    RequestState.WAITING: NodeState.WAITING,
-    RequestState.IDLE: NodeState.IDLE,
-}
 
 
 class TeamModel:
@@ -99,14 +94,13 @@ class TeamModel:
         self._timeline = Timeline(self.person)
         self._components: dict[str, ComponentState] = {}
         self._lost: dict[str, float] = {}
-        self._finished: dict[str, tuple[float, NodeState]] = {}
+        self._tree = TreeBoard(self.people)
         self._arcs: set[str] = set()
-        self._priorities: dict[str, int] = {}
         self._leases: Leases | None = None
         self._leases_s = NONE_S
         self._renewed: dict[tuple[str, str, int], float] = {}
         self._stops: dict[str, StopState] = {}
-        self._needs: dict[str, frozenset[str]] = {}
+        self._needs = Needs()
         self._left: set[str] = set()
         self._hosts: dict[str, tuple[float, HostLoad]] = {}
         self._overruns: dict[tuple[str, str], float] = {}
@@ -114,7 +108,7 @@ class TeamModel:
         self._link = LinkHeard(0.0, True)
         self._link_heard_s = 0.0
         self._parameters: dict[tuple[str, str], ParameterView] = {}
-        self._log: deque[StoryEvent] = deque(maxlen=LOG_KEPT)
+        self._log = LogBoard(self.people)
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
@@ -126,8 +120,11 @@ class TeamModel:
                 self._take_leases(leases, at_s)
             case StoryHeard(story=story):
                 self._take_story(story)
+            case LogHeard(events=events, consoles=consoles):
+                self.people.remember(consoles)
+                self._log.recall(events)
             case ActHeard(act=act, where=where):
-                self._log.append(act.event(where))
+                self._log.add(act.event(where))
             case ComponentHeard(at_s=at_s, component=component):
                 self._take_component(component, at_s)
             case ComponentsListed(at_s=at_s, components=components, is_complete=is_complete):
@@ -163,7 +160,7 @@ class TeamModel:
             is_endless = request.state is RequestState.WAITING and request.expected_start_s < 0
             starves = is_endless and not is_wanted and waits_s >= STARVING_S
             who = self.person(request.owner)
-            line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {self._because(request)}"
+            line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {because(request, self.people)}"
             self._so(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
 
     # ------------------------------------------------------------------ views out
@@ -231,24 +228,7 @@ class TeamModel:
 
     def tree(self) -> list[NodeView]:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
-        requests = {component_of(r.owner): r for r in (self.schedule.requests if self.schedule else [])}
-        priorities = self._priorities
-        nodes = {c.address: c for c in self._components.values() if _is_in(Subsystem.MISSION_CONTROL, c.address)}
-        below: dict[str, list[ComponentState]] = {}
-        for node in nodes.values():
-            below.setdefault(node.requester if node.requester in nodes else "", []).append(node)
-        views: list[NodeView] = []
-        pending = [(root, 0) for root in _siblings(below.get("", []), priorities)]
-        shown: set[str] = set()
-        while pending:
-            node, depth = pending.pop(0)
-            if node.address in shown:
-                continue
-            shown.add(node.address)
-            name = component_of(node.address)
-            views.append(self._node(node, depth, priorities.get(name), requests.get(name)))
-            pending[:0] = [(child, depth + 1) for child in _siblings(below.get(node.address, []), priorities)]
-        return views
+        return self._tree.views(self._components.values(), self._lost, self.schedule)
 
     def requests(self) -> list[RequestRow]:
         """Return the requests, running ones first, then by predicted start."""
@@ -300,9 +280,7 @@ class TeamModel:
             count: At most so many.
             asked: Only what fits; None: all.
         """
-        events = chosen(map(self.people.named_event, self._log), asked) if asked is not None else self._log
-        newest = list(events)[-count:] if count else []
-        return [_log_row(self.people.named_event(event)) for event in newest]
+        return self._log.rows(count, asked)
 
     def alarm_views(self, *own: AlarmBook) -> list[AlarmView]:
         """Return the alarms of the mission and of these books: one line for one cause, by the names of people."""
@@ -316,7 +294,7 @@ class TeamModel:
         self._timeline.heard(schedule)
         now = {request.arc for request in schedule.requests}
         self._arcs |= now
-        self._priorities |= _priorities(schedule.requests)
+        self._tree.scheduled(schedule)
         for arc in before - now:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
@@ -382,11 +360,8 @@ class TeamModel:
             until_s=request.until_s if request else NONE_S,
             lease_left_s=max(0.0, lease_s - age_s),
             lease_age_s=age_s,
-            because=self._because(request) if request else "",
+            because=because(request, self.people) if request else "",
         )
-
-    def _because(self, request: RequestView) -> str:
-        return self.people.named(request.because.removeprefix(f"{request.arc} {request.state}: "))
 
     def _request_row(self, request: RequestView) -> RequestRow:
         named = self.people.named
@@ -400,7 +375,7 @@ class TeamModel:
             request.since_s,
             request.until_s,
             request.expected_start_s,
-            self._because(request),
+            because(request, self.people),
             named(request.would_change),
             request.blockers,
         )
@@ -408,9 +383,9 @@ class TeamModel:
     # ------------------------------------------------------------------ components
     def _take_component(self, component: ComponentState, at_s: float) -> None:
         self.people.heard(component)
-        self._learn_needs(component)
+        self._needs.heard(component)
         known = self._components.get(component.address)
-        if known is not None and known.pid == component.pid and known.since_s > component.since_s:
+        if known is not None and known.pid == component.pid and _is_older(component, known):
             return
         name = component_of(component.address)
         (self._left.add if component.state in LEAVING else self._left.discard)(name)
@@ -426,7 +401,7 @@ class TeamModel:
             self.alarms.happened(AlarmKind.LOST, name, f"{name} failed: {component.feedback}", at_s)
             return
         if known is None or known.pid != component.pid:
-            self._finished.pop(name, None)
+            self._tree.begins(name)
         self._components[component.address] = component
         self._lost.pop(component.address, None)
         self.alarms.end(AlarmKind.LOST, name, at_s)
@@ -449,7 +424,7 @@ class TeamModel:
         if component is None or component.state in LEAVING:
             self._forget(name)
             return
-        self._log.append(StoryEvent(at_s, "", "is lost", name, "", LogLevel.WARNING))
+        self._log.add(StoryEvent(at_s, "", "is lost", name, "", LogLevel.WARNING))
         is_arc = name in self._arcs
         self._arcs.discard(name)
         if is_arc and is_console(component.requester):
@@ -468,9 +443,8 @@ class TeamModel:
     def _forget(self, name: str) -> None:
         """Forget what was known of one that left for good: consoles and their ARCs come and go all day."""
         self._arcs.discard(name)
-        self._needs.pop(name, None)
-        self._finished.pop(name, None)
-        self._priorities.pop(name, None)
+        self._needs.forget(name)
+        self._tree.forget(name)
         for key in [key for key in self._parameters if key[0] == name]:
             del self._parameters[key]
 
@@ -478,30 +452,6 @@ class TeamModel:
         self._hosts[load.host] = (at_s, load)
         line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
         self._so(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
-
-    def _node(self, node: ComponentState, depth: int, priority: int | None, request: RequestView | None) -> NodeView:
-        name = component_of(node.address)
-        state, since_s = NodeState.RUNNING, node.since_s
-        if node.address in self._lost:
-            state, since_s = NodeState.LOST, self._lost[node.address]
-        elif name in self._finished:
-            since_s, state = self._finished[name]
-        elif node.state is LifeState.CONNECTING:
-            state = NodeState.STARTING
-        elif request is not None:
-            state, since_s = _STATE_OF_REQUEST[request.state], request.since_s
-        return NodeView(
-            name,
-            node.type,
-            component_of(node.requester) if depth else "",
-            depth,
-            priority,
-            state,
-            since_s,
-            self.people.named(node.feedback),
-            request.arc if request is not None else "",
-            self._because(request) if request is not None else "",
-        )
 
     def _component_row(self, component: ComponentState) -> ComponentRow:
         return ComponentRow(
@@ -517,19 +467,8 @@ class TeamModel:
         )
 
     # ------------------------------------------------------------------ what alarms are about
-    def _learn_needs(self, component: ComponentState) -> None:
-        """Remember without what a component cannot be well: its machine, and whoever claimed it."""
-        name = component_of(component.address)
-        needs = {component_of(component.requester)} if is_console(component.requester) else set[str]()
-        if not is_console(component.address):
-            needs.add(creator_name(component.host))
-        self._needs[name] = frozenset(needs - {name})
-
     def _explained_by(self, subject: str) -> frozenset[str]:
-        uses = [
-            set(request.rcs) for request in (self.schedule.requests if self.schedule else []) if request.arc == subject
-        ]
-        return self._needs.get(subject, frozenset()).union(*uses)
+        return self._needs.of(subject, self.schedule)
 
     def _located(self, alarm: AlarmView) -> AlarmView:
         named, component = self.people.named, self.component(alarm.subject)
@@ -572,10 +511,8 @@ class TeamModel:
         self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
     def _take_story(self, story: StoryEvent) -> None:
-        self._log.append(story)
-        head, _, status = story.what.partition(": ")
-        if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
-            self._finished[story.subject] = (story.at_s, NodeState(status))
+        self._log.add(story)
+        self._tree.told(story)
 
     def _take_stop(self, stop: StopState, at_s: float) -> None:
         former = self._stops.get(stop.rc)
@@ -627,31 +564,17 @@ class TeamModel:
             self.alarms.end(kind, subject, at_s)
 
 
+def _is_older(one: ComponentState, other: ComponentState) -> bool:
+    """Say whether one was said before the other by the same process: its life only goes on.
+
+    Their times do not tell: the nameserver dates a readiness by when it saw it.
+    """
+    return _LIFE.index(one.state) < _LIFE.index(other.state)
+
+
 def _is_in(subsystem: Subsystem, address: str) -> bool:
     return address.startswith(f"{subsystem}/")
 
 
-def _log_row(event: StoryEvent) -> LogRow:
-    return LogRow(event.at_s, event.subject, event.what, event.where, str(event.level), event.user)
-
-
 def _request_order(row: RequestRow) -> tuple[bool, bool, float, str]:
     return row.state != RequestState.RUNNING, row.expected_start_s < 0, row.expected_start_s, row.arc
-
-
-def _priorities(requests: Iterable[RequestView]) -> dict[str, int]:
-    """Return the priorities of all nodes on the paths of these requests."""
-    found: dict[str, int] = {}
-    for request in requests:
-        for step in request.priority.split("/"):
-            name, _, number = step.rpartition(":")
-            if name and number.lstrip("-").isdecimal():
-                found[name] = int(number)
-    return found
-
-
-def _siblings(nodes: list[ComponentState], priorities: Mapping[str, int]) -> list[ComponentState]:
-    def order(node: ComponentState) -> tuple[int, str]:
-        return -priorities.get(component_of(node.address), 0), node.address
-
-    return sorted(nodes, key=order)

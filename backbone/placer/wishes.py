@@ -162,6 +162,7 @@ async def _wait_missing(
             on_changed()
         await _first_of(
             component.wait_gone(),
+            *([] if component.is_there else [component.wait_there()]),
             placer.wait_risen(max(compared_with, 1) + 1),
             clock.sleep_s(COMPARE_EVERY_S * clock.rate),
         )

@@ -116,10 +116,15 @@ class MasterSchedule(Table):
         return self._line.due(now_s)
 
     def forgotten(self, now_s: float) -> ArcEntry | None:
-        """Return an ARC whose time is now in a group that is planned whole, wherever that is; for checks."""
+        """Return an ARC whose time is now in a group that is planned whole, wherever that is; for checks.
+
+        Where RCs are freed late, plans change as time passes; such a group is looked at when they are.
+        """
         self._plans.clear()
         for group in {self._groups.of(arc): None for arc in self.arcs.values() if arc.active}:
-            turn = self._due_in(group, now_s) if len(group) <= self._exact_up_to else None
+            if len(group) > self._exact_up_to or any(self.is_overdue(arc, now_s) for arc in group.arcs):
+                continue
+            turn = self._due_in(group, now_s)
             if turn is not None:
                 return turn.arc
         return None

@@ -340,6 +340,10 @@ class Table:
         """Return when the RCs of an ARC that is being revoked are expected to be free."""
         return max(now_s + SOON_S, revoked.since_s + revoked.release_s)
 
+    def is_overdue(self, arc: ArcEntry, now_s: float) -> bool:
+        """Say whether the RCs of the ARC should have been free by now."""
+        return arc.state is RequestState.REVOKING and now_s > arc.since_s + arc.release_s
+
     def is_held(self, rc: str) -> bool:
         """Say whether somebody holds the RC alone, and its slice is not over."""
         return bool(self._busy & self._bits[rc])

@@ -14,17 +14,22 @@ from mission_control.experiments.conditions import PUBLISHED
 from mission_control.experiments.harness import Progress as Told
 from mission_control.experiments.intervals import wilson
 from mission_control.experiments.servoing import ServoOutcome, ServoTrial
-from mission_control.experiments.surveillance import Outcome, Row
+from mission_control.experiments.surveillance import Outcome, Row, trials_line
 
 AGREES_WITHIN = 3.0
 """Standard errors between rate and prediction that are no disagreement."""
+EXPLAINED = (
+    "95 %: Wilson's interval. off by: standard errors between rate and prediction; beyond "
+    f"{AGREES_WITHIN:g} (marked !) one of both is wrong, or the trials are too few: take more, or another seed."
+)
 BANDS_DEG = (15.0, 30.0, 45.0)
 """Starts off the zero-angle line, in rows of the table."""
 
 
 def table(outcome: Outcome, title: str) -> Table:
     """Return the rows as a table: ours, the prediction, and what the papers say beside it."""
-    found = Table(title=title, title_justify="left")
+    headline = f"{title}: {trials_line(outcome)}"
+    found = Table(title=headline, title_justify="left", caption=EXPLAINED, caption_justify="left")
     for heading in ("condition", "policy"):
         found.add_column(heading)
     for heading in (

@@ -142,6 +142,12 @@ class Outcome(msgspec.Struct, frozen=True):
         }
 
 
+def trials_line(outcome: Outcome) -> str:
+    """Return how often each condition was tried, and from which seed."""
+    counts = sorted({row.trials for row in outcome.rows})
+    return f"{' or '.join(map(str, counts))} trials of each condition, seed {outcome.seed}"
+
+
 def geometry_json() -> Mapping[str, Any]:
     """Return what is the same in all conditions, as plain data."""
     return {

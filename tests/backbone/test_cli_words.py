@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from backbone.cli import ExitCode, app, complaint_of, hub_endpoint
+from backbone.cli import ExitCode, app, complaint_of
+from backbone.cli_options import hub_endpoint
 from backbone.completion import names_of, people_of, resources_of
 from backbone.component.messages import ComponentState, LifeState
 from backbone.errors import HubUnreachable

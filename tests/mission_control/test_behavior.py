@@ -320,6 +320,30 @@ def test_while_an_operators_stop_stands_it_says_so_and_acts_again_when_it_is_lif
     placer_world(scene)
 
 
+def test_a_stop_it_never_heard_of_and_that_is_lifted_already_costs_it_one_command(placer_world: Run) -> None:
+    async def scene(placer: FakePlacer) -> None:
+        latch = StopLatch("scout1")
+        latch.stop("anna", "child in the room", 0.0)
+        latch.lift(1, "anna", 1.0)
+        robot = placer.network.join("resource_pool/scout1", placer.clock)
+
+        async def answer(_asked: Any) -> StopState:
+            return latch.state
+
+        robot.serve(robot.source, AskStop, answer)
+        robot.declare_alive(robot.source)
+        await root(placer, node("driver", "driver", arc=ARC))
+        await placer.wait(lambda: placer.arcs)
+        arc = placer.arcs["driver-capture"]
+        arc.require = lambda command: latch.require_moving(command.after_stop)
+        await arc.grant()
+        await placer.wait(lambda: arc.commands, within_s=0.5)
+        assert [command.after_stop for _at_s, _epoch, command in arc.commands] == [1]
+        await robot.close()
+
+    placer_world(scene)
+
+
 def test_told_to_stop_it_gives_its_arc_back(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         await root(placer, node("watch1", arc=ARC))

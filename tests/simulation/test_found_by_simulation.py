@@ -41,6 +41,10 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
         9,
         [MessageFault("resource_pool/behavior2-video_drive > backbone/rc_manager SchedulingRequest 2", "lost")],
     ),
+    "RCs that are freed late make no turn a forgotten one": (
+        1085,
+        [MessageFault("resource_pool/console7-drive > backbone/nameserver Register 1", "lost")],
+    ),
     "a notice that was lost is told again": (
         282,
         [

@@ -80,8 +80,9 @@ async def press_all_twice(
         for key in [*(key for key in keys if key not in LEAVE), *ending]:
             await _close_dialogs(pilot)
             await to_main(pilot)
-            await pilot.press(*opening)
-            await answered(pilot)
+            if opening:
+                await pilot.press(*opening)
+                await answered(pilot)
             assert len(app.screen_stack) == 1 + is_dialog
             burst(pilot, key, key)
             await pilot.pause()

@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
+from console_scenes import ASK, GRANT, STOP, TEAM_EVENTS, component, model, rc, request
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.component.messages import Absence
+from backbone.creator.messages import ProcessFell
+from backbone.health import HealthWord, MissionHealth
+from backbone.rc_manager.messages import Holder, RequestState, Schedule
 from ui_console.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause
+from ui_console.console_events import (
+    CommandRefused,
+    ComponentGone,
+    ComponentHeard,
+    ConsoleEvent,
+    GivenBack,
+    Granted,
+    HealthHeard,
+    LinkTrouble,
+    Lost,
+    ProcessFallen,
+    ScheduleHeard,
+    StopHeard,
+)
 from ui_console.views import AlarmKind, AlarmView, Severity
 
 KIND = AlarmKind.LOST
@@ -194,3 +214,60 @@ def test_whatever_explains_whatever_every_alarm_is_told_exactly_once(
     lines = [line for view in views for line in (view.line, *view.also)]
     assert sorted(lines) == sorted(view.line for view in book.views())
     assert sorted(key for view in views for key in view.keys) == sorted(view.key for view in book.views())
+
+
+# ---------------------------------------------------------------------- ordinary use
+def test_five_minutes_of_ordinary_use_are_few_alarms_and_in_the_end_none() -> None:
+    """Take over, drive, stop and lift, a robot that dies and comes back, colleagues who come and go, all day's work."""
+    fell = ProcessFell("scout1", "killed by SIGKILL", 0.05, ["last words"])
+    gone = MissionHealth(HealthWord.DEGRADED, [Absence("scout1", 60.0, "killed by SIGKILL", "starts again in 0.1 s")])
+    fine = MissionHealth(HealthWord.OK)
+    held = Schedule(
+        20.0,
+        [rc("scout1", "scout", [Holder("console-1-capture", 7, 20.0, 22.0)], ["watch1-capture"])],
+        [
+            request("console-1-capture", "ui_console/console-1", RequestState.RUNNING, priority="console-1:100"),
+            msgspec.structs.replace(
+                request("watch1-capture", "mission_control/watch1", RequestState.WAITING, since_s=20.0),
+                blockers=["console-1-capture"],
+            ),
+        ],
+        [],
+    )
+    down = msgspec.structs.replace(held, rcs=[msgspec.structs.replace(rc("scout1", "scout", []), state="down")])
+    ben = msgspec.structs.replace(component("ui_console/console-2", "console", pid=9), user="ben")
+    lifted = msgspec.structs.replace(STOP, is_stopped=False)
+    steps: dict[float, list[ConsoleEvent]] = {
+        20.0: [ASK, GRANT, ScheduleHeard(20.0, held)],
+        30.0: [StopHeard(30.0, STOP)],
+        35.0: [StopHeard(35.0, lifted)],
+        60.0: [
+            ProcessFallen(60.0, fell),
+            ComponentGone(60.0, "resource_pool/scout1"),
+            HealthHeard(60.0, gone, 62.0),
+            ScheduleHeard(60.0, down),
+            Lost(60.0, "rc", "scout1", -1.0),
+            CommandRefused(60.1, "arc.swapped_out", "holds nothing", "wait"),
+            LinkTrouble(60.2, "nobody answers"),
+        ],
+        61.0: [
+            ComponentHeard(61.0, component("resource_pool/scout1", "scout", since_s=61.0, pid=77)),
+            HealthHeard(61.0, fine, 1e9),
+            ScheduleHeard(61.0, held),
+            Granted(61.0, GRANT.rcs, GRANT.epochs, 300.0, 60.0, True),
+        ],
+        90.0: [ComponentHeard(90.0, ben)],
+        150.0: [ComponentGone(150.0, ben.address)],
+        200.0: [Lost(200.0, "self", "", -1.0), GivenBack(200.0, "released", True)],
+    }
+    shown = model(*TEAM_EVENTS)
+    shown.sees = False
+    most = {}
+    for second in range(20, 321):
+        for event in steps.get(float(second), []):
+            shown.apply(event)
+        lines = [alarm.line for alarm in shown.view(float(second)).alarms]
+        most[second] = len(lines)
+        assert len(lines) <= 3, (second, lines)
+    assert sum(count > 0 for count in most.values()) < 150
+    assert most[320] == 0

@@ -11,7 +11,8 @@ from backbone.health import HealthWord, MissionHealth
 from backbone.printable import printable_all
 from ui_console.console_events import HealthHeard, event_json
 from ui_console.console_model import ConsoleModel
-from ui_console.terminal.lines import status_text
+from ui_console.terminal.head import head
+from ui_console.terminal.keys import Profile
 from ui_console.views import AlarmKind, AlarmView, view_json
 
 GRABBER = Absence("grabber", 4.0, "killed by SIGKILL", "starts again in 0.1 s")
@@ -48,7 +49,7 @@ def test_the_word_and_the_lines_of_the_launcher_are_shown(word: HealthWord) -> N
         "placer is absent for 5.0 s: no answer; the launcher restarts it; Nothing.",
         "grabber is absent for 2.0 s: killed by SIGKILL; starts again in 0.1 s",
     ]
-    assert f"mission {word}: placer is absent" in status_text(view, None, "").plain
+    assert f"mission {word}: placer is absent" in head(view, 400, Profile.MONITOR, 4.0).status.plain
     assert json.loads(view_json(view))["health"]["word"] == word
 
 
@@ -89,5 +90,5 @@ def test_a_silent_launcher_makes_no_failed_mission_better_and_ends_no_alarm() ->
 def test_nothing_that_a_console_hears_commands_its_terminal(text: str) -> None:
     event = printable_all(heard(5.0, HealthWord.FAILED, Absence(text, 1.0, text)))
     view = model(event).view(6.0)
-    assert status_text(view, None, "").plain.isprintable()
+    assert head(view, 400, Profile.MONITOR, 4.0).status.plain.isprintable()
     assert event_json(event).decode().isprintable()

@@ -422,3 +422,16 @@ def test_a_slice_that_ends_now_has_no_number_and_one_kept_longer_says_so() -> No
     assert "slice" not in shown.status_line(GRANT.until_s - 0.4)
     assert "slice" not in shown.status_line(GRANT.until_s + 0.4)
     assert shown.status_line(GRANT.until_s + 7.0).endswith(", beyond its slice")
+
+
+def test_what_a_component_says_of_itself_counts_also_if_its_readiness_was_dated_later_by_who_saw_it() -> None:
+    appeared = component("ui_console/console-9", "console", since_s=5.2)
+    shown = model(
+        ComponentHeard(5.2, appeared),
+        ComponentHeard(6.0, component(appeared.address, "console", since_s=5.0, feedback="drives scout1")),
+    )
+    assert [row.feedback for row in shown.team.components()] == ["drives scout1"]
+    draining = component(appeared.address, "console", since_s=7.0, state=LifeState.DRAINING)
+    shown.apply(ComponentHeard(7.0, draining))
+    shown.apply(ComponentHeard(7.1, appeared))
+    assert [row.state for row in shown.team.components()] == ["draining"]

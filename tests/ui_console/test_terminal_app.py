@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from console_scenes import ASK, GRANT, SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 from screen_text import same_as_before, screen_text
+from textual.binding import Binding
 from textual.events import AppBlur, AppFocus
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
+from backbone.component.messages import StoryEvent
 from ui_console.consent import Consent, Settled, Sought
 from ui_console.console_events import (
     Attention,
@@ -23,14 +25,18 @@ from ui_console.console_events import (
     ConsentSettled,
     ConsentSought,
     ConsoleEvent,
+    GivenBack,
+    LinkHeard,
     LinkTrouble,
     Lost,
     ScheduleHeard,
     StopHeard,
+    StoryHeard,
 )
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
 from ui_console.terminal.keys import DRIVES, Profile
+from ui_console.terminal.keys import KEYS as KEYS_OF_THE_CONSOLE
 from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import DrivePad, Panel, Video
 
@@ -59,6 +65,7 @@ KEYS: list[tuple[str, list[Any]]] = [
     ("x", ["stop", ("stop robot", "scout1")]),
     ("X", ["stop", "stop all"]),
     ("alt+x", ["stop", ("stop robot", "scout1")]),
+    ("shift+x", ["stop", "stop all"]),
     ("alt+shift+x", ["stop", "stop all"]),
     ("c", []),
     ("1", [("switch", "scout1")]),
@@ -101,6 +108,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
         "question_mark",
         "f1",
         "e",
+        "slash",
     }
     elsewhere |= {"left_square_bracket", "pageup", "right_square_bracket", "pagedown", "4", "5", "6", "7", "8", "9"}
     known = set(ConsoleApp(WrittenSession())._bindings.key_to_bindings)  # noqa: SLF001  what the footer is made of
@@ -119,6 +127,16 @@ def test_the_reference_names_every_key_and_who_has_it() -> None:
         bindings = screen._bindings.key_to_bindings  # noqa: SLF001  what the footer is made of
         can = {key for key, found in bindings.items() if screen.check_action(found[0].action.partition("(")[0], ())}
         assert {key for key, who in listed.items() if name in who} == can
+
+
+def test_the_how_to_names_only_keys_that_there_are() -> None:
+    page = (Path(__file__).parents[2] / "docs/how-to/operate-from-a-terminal.md").read_text().replace("```", "")
+    signs = {"plus": "+", "minus": "-", "slash": "/", "question_mark": "?"}
+    signs |= {"left_square_bracket": "[", "right_square_bracket": "]"}
+    known = {signs.get(binding.key, binding.key) for binding in Binding.make_bindings(KEYS_OF_THE_CONSOLE)}
+    lifts = {"l"}
+    assert set(re.findall(r"`(\S)`", page)) <= known | lifts
+    assert {"x", "X", "c", "l", "t", "r", "m", "g", "n", "/", "y"} <= set(re.findall(r"`(\S)`", page))
 
 
 async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds() -> None:
@@ -210,6 +228,30 @@ async def test_tab_goes_through_all_tables_and_back() -> None:
         assert screen.chosen is PanelName.LOG
 
 
+async def test_the_log_is_searched_by_words_and_by_fields() -> None:
+    story = [
+        StoryHeard(9.0, StoryEvent(9.0, "ui_console/console-1", f"anna tells {n}", "scout2", "")) for n in range(3)
+    ]
+    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, *story))
+    async with app.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("slash")
+        await pilot.press(*"robot", "colon", *"scout2 ", *"tells 1", "enter")
+        await settle(pilot)
+        told = screen_text(app)
+        assert "log: robot:scout2 tells 1" in told
+        assert "anna tells 1" in told
+        assert "anna tells 2" not in told
+        assert "saw motion" not in told
+        await pilot.press("slash")
+        await pilot.press(*"since", "colon", *"soon", "enter")
+        await settle(pilot)
+        await pilot.pause()
+        assert "no number of mission seconds" in screen_text(app)
+        await pilot.press("slash", "delete", "enter")
+        await settle(pilot)
+        assert "saw motion" in screen_text(app)
+
+
 async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:
     session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
     screen = ConsoleApp(session)
@@ -234,6 +276,16 @@ async def test_why_is_shown_and_closed_and_drives_nothing_meanwhile() -> None:
         await pilot.pause()
         assert "minimum run time" not in screen_text(pilot.app)
     assert session.wanted == [("why", "scout1")]
+
+
+async def test_why_of_an_alarm_says_where_to_look_too() -> None:
+    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, StopHeard(11.0, STOP)))
+    async with app.run_test(size=SIZE) as pilot:
+        while app.chosen is not PanelName.ALARMS:
+            await pilot.press("tab")
+        await pilot.press("y")
+        await settle(pilot)
+        assert "where: scout on base" in screen_text(app)
 
 
 @pytest.mark.parametrize("is_sure", [True, False])
@@ -392,6 +444,40 @@ async def test_the_pendants_key_gives_back_what_is_wanted_or_held() -> None:
     async with ConsoleApp(session, profile=Profile.PENDANT).run_test(size=(50, 20)) as pilot:
         await pilot.press("enter")
     assert session.wanted == ["release"]
+
+
+# ---------------------------------------------------------------------- no link, and a robot that was lost
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_a_console_without_a_link_says_across_the_screen_that_it_stops_nothing(profile: Profile) -> None:
+    session = WrittenSession(shown=held_model())
+    app = ConsoleApp(session, profile=profile)
+    async with app.run_test(size=(80, 24)) as pilot:
+        session.model.apply(LinkHeard(11.0, False))
+        await pilot.pause(0.5)  # no key is pressed: it is the console that has to look
+        shown = " ".join(screen_text(app).split())
+        assert "NO LINK to the mission" in shown
+        assert "x and X reach no robot now: stop at another console, or at the robot itself" in shown
+        assert "you hold" not in shown
+        assert app.screen.has_class("-unlinked")
+        session.model.apply(LinkHeard(11.5, True, 0.001))
+        await pilot.pause(0.5)
+        assert "NO LINK" not in screen_text(app)
+        assert not app.screen.has_class("-unlinked")
+
+
+async def test_a_robot_that_was_lost_is_taken_again_by_one_key_or_known_to_be_lost_by_another() -> None:
+    shown = held_model()
+    shown.apply(GivenBack(11.0, "anna is away", True, wanted=False))
+    session = WrittenSession(shown=shown)
+    app = ConsoleApp(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        told = "you lost scout1 1 s ago: anna is away [t: take it again, k: seen]"
+        assert told in " ".join(screen_text(app).split())
+        await pilot.press("t", "k")
+        await settle(pilot)
+        assert session.wanted == ["take", "dismiss lost"]
+        assert "you lost" not in screen_text(app)
 
 
 # ---------------------------------------------------------------------- the picture

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import warnings
+
 import numpy as np
 import pytest
 from bursts import EVERY_KEY, LEAVE, LOOKS, SIZES, burst, press_all_twice
@@ -61,6 +64,17 @@ async def test_a_dialog_is_answered_once_however_fast_its_key_comes_twice(name: 
         assert key == "q" or app.is_running
         if app.is_running:
             await settle(pilot)
+
+
+@pytest.mark.parametrize("key", ["y", "i"])
+async def test_what_is_asked_for_twice_at_once_is_asked_for(key: str) -> None:
+    app = console()
+    async with app.run_test(size=(80, 24)) as pilot:
+        with warnings.catch_warnings(record=True) as never_awaited:
+            burst(pilot, key, key)
+            await settle(pilot)
+            gc.collect()
+        assert not never_awaited
 
 
 @pytest.mark.parametrize("profile", list(Profile))

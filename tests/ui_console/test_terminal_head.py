@@ -155,3 +155,8 @@ def test_the_keys_of_a_profile_are_listed_once_each_those_that_stop_first() -> N
         assert len(listed) == len(set(listed))
         assert not [line for line in listed if "Quit" in line or "alt+" in line]
         assert has(profile, "lift")
+
+
+def test_one_person_at_two_screens_is_told_so() -> None:
+    told = shown_at(own(busy(), other_screens=["you also sit at console-9: it holds scout2"]), 80).says
+    assert "you also sit at console-9: it holds scout2" in [one.plain for one in told]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
@@ -12,6 +13,7 @@ from textual.pilot import Pilot
 from backbone.bus.clock import MissionClock
 from backbone.cli import ExitCode
 from backbone.component.messages import LifeState
+from ui_console.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
 from ui_console.observer import Observer
 from ui_console.terminal.session import TerminalSession
 
@@ -69,3 +71,46 @@ async def test_a_crash_of_the_screen_never_ends_with_0_and_the_robot_goes_back_b
     assert console.ended_for == ["the screen was closed"]
     assert "broken on purpose" not in console.seen_at_end
     assert "broken on purpose" in capsys.readouterr().err
+
+
+class StopsAtOnce(StandIn):
+    """A component whose stops are noted."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stopped: list[str] = []
+
+    async def stop_robot(self, robot: str) -> bool:
+        self.stopped.append(robot)
+        return True
+
+    async def stop_all(self) -> list[str]:
+        self.stopped.append("all")
+        return []
+
+
+class OneButtonPad:
+    """A gamepad of which two buttons are pressed, one after the other."""
+
+    def __init__(self, codes: list[int]) -> None:
+        self._codes = codes
+
+    async def async_read_loop(self) -> AsyncIterator[Any]:
+        for code in self._codes:
+            await asyncio.sleep(0.3)
+            yield SimpleNamespace(type=EV_KEY, code=code, value=1)
+        await asyncio.Event().wait()
+
+
+async def test_a_gamepads_buttons_stop_one_robot_and_all_with_a_dialog_in_front() -> None:
+    console = StopsAtOnce()
+    session = TerminalSession("console-1", gamepad=(OneButtonPad([BTN_EAST, BTN_NORTH]), {}))
+    session.model.robot = "scout1"
+
+    async def open_a_dialog(pilot: Pilot[Any]) -> None:
+        await pilot.press("question_mark")
+        await pilot.pause(1.0)
+        await pilot.press("ctrl+q")
+
+    await session.run(cast(Observer[Any], console), pilot=open_a_dialog)
+    assert console.stopped == ["scout1", "all"]

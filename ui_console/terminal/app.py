@@ -6,11 +6,13 @@ Widgets are thin: what they show is in ``ConsoleModel``, what keys do is in the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any, ClassVar, TypeVar
 
 import msgspec
 from rich.text import Text
+from textual import work
 from textual.app import App, ComposeResult
 from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
@@ -19,6 +21,7 @@ from textual.screen import Screen
 from textual.widgets import Input, Static
 
 from backbone.cli import ExitCode
+from ui_console.console_model import LOG_SHOWN
 from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
@@ -26,6 +29,7 @@ from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading,
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
 from ui_console.terminal.lines import Row, robot_rows
+from ui_console.terminal.log_search import SEARCH_HELP, WrongSearch, read_search
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
@@ -106,6 +110,7 @@ class ConsoleApp(App[None]):
         self.speed_rad_s = SPEED_RAD_S
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
+        self._search = ""
         self._view: ConsoleView | None = None
 
     @property
@@ -166,7 +171,8 @@ class ConsoleApp(App[None]):
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)
-        turn.border_title = self._turn
+        is_searched = self._turn is PanelName.LOG and bool(self._search)
+        turn.border_title = Text(f"log: {self._search}" if is_searched else self._turn)
         self._show(self._turn, turn, view)
         keys = hints(view, self.profile, self._robot_meant())
         main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
@@ -212,6 +218,9 @@ class ConsoleApp(App[None]):
     def _show(self, name: PanelName, panel: Panel, view: ConsoleView) -> None:
         is_chosen = name is self.chosen
         panel.set_class(is_chosen, "-chosen")
+        if name is PanelName.LOG and self._search:
+            found = self._session.model.team.log(LOG_SHOWN, read_search(self._search))
+            view = msgspec.structs.replace(view, log=found)
         rows = table_rows(name, view, panel.content_size.width)
         panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
@@ -248,6 +257,11 @@ class ConsoleApp(App[None]):
 
         self._session.require_let_go()
         self.push_screen(dialog, closed)
+
+    @work
+    async def _begin(self, act: Callable[[], Awaitable[object]]) -> None:
+        """Do this while keys are heard."""
+        await act()
 
     # ------------------------------------------------------------------ keys that drive
     def on_key(self, _event: Key) -> None:
@@ -335,13 +349,13 @@ class ConsoleApp(App[None]):
             return
         self._session.touch()
         self._session.stop()
-        self.run_worker(self._stop_robot(robot), exclusive=False)
+        self._begin(partial(self._stop_robot, robot))
 
     def action_stop_all(self) -> None:
         """Stop all robots, whoever holds them."""
         self._session.touch()
         self._session.stop()
-        self.run_worker(self._stop_all(), exclusive=False)
+        self._begin(self._stop_all)
 
     def action_lift(self) -> None:
         """Show whose stop is meant and why it was set, and lift it if another key says so."""
@@ -353,9 +367,7 @@ class ConsoleApp(App[None]):
             told = "which one? move to the row of a stopped robot first" if stopped else "no robot is stopped"
             self.notify(told, severity="warning")
             return
-        self._open(
-            LiftQuestion(meant, stop), lambda number: self.run_worker(self._lift(meant, number), exclusive=False)
-        )
+        self._open(LiftQuestion(meant, stop), lambda number: self._begin(partial(self._lift, meant, number)))
 
     async def _lift(self, robot: str, number: int) -> None:
         if not await self._session.lift_stop(robot, number):
@@ -378,7 +390,7 @@ class ConsoleApp(App[None]):
         """Take the robot of this number in place of the one that is held."""
         robots = self._view.robots if self._view is not None else []
         if number <= len(robots):
-            self.run_worker(self._session.switch(robots[number - 1].robot), group="switch", exclusive=False)
+            self._begin(partial(self._session.switch, robots[number - 1].robot))
 
     def action_pick(self) -> None:
         """Pick a robot from the list."""
@@ -386,7 +398,7 @@ class ConsoleApp(App[None]):
             return
         self._open(
             RobotPicker(robot_rows(self._view.robots, self._view.now_s)),
-            lambda robot: self.run_worker(self._session.switch(robot), group="switch", exclusive=False),
+            lambda robot: self._begin(partial(self._session.switch, robot)),
         )
 
     # ------------------------------------------------------------------ tables
@@ -403,13 +415,15 @@ class ConsoleApp(App[None]):
         self._panel().move(steps)
 
     def action_why(self) -> None:
-        """Say why what the cursor is on is as it is."""
-        subject = self._subject()
-        if subject:
-            self.run_worker(self._why(subject), group="why", exclusive=True)
+        """Say why what the cursor is on is as it is; of an alarm, also where to look."""
+        row = self._panel().row
+        if row is not None and row.subject:
+            where = next((alarm.where for alarm in self._alarms() if alarm.key == row.key), "")
+            self._why(row.subject, [f"where: {where}"] if where else [])
 
-    async def _why(self, subject: str) -> None:
-        self._open(Reading(f"why {subject}?", await self._session.why(subject)))
+    @work(group="why", exclusive=True)
+    async def _why(self, subject: str, first: list[str]) -> None:
+        self._open(Reading(f"why {subject}?", [*first, *await self._session.why(subject)]))
 
     def action_acknowledge(self) -> None:
         """A robot that was lost is known to be; else the alarm the cursor is on was seen, or the first of the list."""
@@ -442,8 +456,9 @@ class ConsoleApp(App[None]):
         """Have the component the cursor is on tell its parameters."""
         subject = self._subject()
         if subject:
-            self.run_worker(self._ask_parameters(subject), group="parameters", exclusive=True)
+            self._ask_parameters(subject)
 
+    @work(group="parameters", exclusive=True)
     async def _ask_parameters(self, name: str) -> None:
         if await self._session.ask_parameters(name):
             self.chosen = self._turn = PanelName.PARAMETERS
@@ -461,12 +476,26 @@ class ConsoleApp(App[None]):
 
         self._open(
             Question(f"{parameter.component}.{parameter.name} =", parameter.value),
-            lambda text: self.run_worker(self._set(parameter.component, parameter.name, text), group="parameters"),
+            lambda text: self._begin(partial(self._set, parameter.component, parameter.name, text)),
         )
 
     async def _set(self, component: str, parameter: str, text: str) -> None:
         if not await self._session.set_parameter(component, parameter, read_value(text)):
             self.notify(f"{component} did not take {parameter} = {text}: see the alarms", severity="error")
+        self.redraw()
+
+    def action_search(self) -> None:
+        """Show only what fits in the log."""
+        self._open(Question("search the log", self._search, SEARCH_HELP), self._searched)
+
+    def _searched(self, line: str) -> None:
+        try:
+            read_search(line)
+        except WrongSearch as wrong:
+            self.notify(str(wrong), severity="warning", markup=False)
+            return
+        self._search = " ".join(line.split())
+        self.chosen = self._turn = PanelName.LOG
         self.redraw()
 
     def action_bare(self) -> None:

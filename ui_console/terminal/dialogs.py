@@ -111,11 +111,17 @@ class Reading(Dialog[None]):
 
 
 class Question(Dialog[str]):
-    """Ask for one line; answers what was typed."""
+    """Ask for one line; answers what was typed.
 
-    def __init__(self, title: str, value: str = "") -> None:
+    Args:
+        title: What is asked.
+        value: What stands there at first.
+        remark: What may be typed.
+    """
+
+    def __init__(self, title: str, value: str = "", remark: str = "") -> None:
         super().__init__()
-        self._title, self._value = title, value
+        self._title, self._value, self._remark = title, value, remark
 
     def compose(self) -> ComposeResult:
         """Lay out the field."""
@@ -124,7 +130,8 @@ class Question(Dialog[str]):
             field = Field(self._value, select_on_focus=True)
             field.cursor_blink = False
             yield field
-            yield Static(FIELD_REMARK, classes="remark")
+            remarks = [line for line in (self._remark, FIELD_REMARK) if line]
+            yield Static(Text("\n".join(remarks)), classes="remark")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Answer."""

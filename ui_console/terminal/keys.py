@@ -18,6 +18,8 @@ from ui_console.views import ConsoleView
 MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})
 """Keys of the emergency stop: no dialog and no field takes them for anything else."""
+ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x"})
+"""What they arrive as when escape was pressed a tenth of a second before, and from terminals that tell keys apart."""
 
 
 class Profile(StrEnum):
@@ -35,9 +37,8 @@ DRIVE_KEYS = [
     Binding("right,d", "drive('right')", "turn right on the spot while held"),
 ]
 KEYS = [
-    # Escape and x within a tenth of a second reach a program as alt+x.
     Binding("x,alt+x", "stop_robot", "EMERGENCY STOP of your robot, or of the row's", priority=True),
-    Binding("X,alt+shift+x", "stop_all", "EMERGENCY STOP of all robots", priority=True),
+    Binding("X,shift+x,alt+shift+x", "stop_all", "EMERGENCY STOP of all robots", priority=True),
     Binding("c", "lift", "lift a stop: says whose it is, and asks again"),
     *DRIVE_KEYS,
     Binding("space,escape", "stop", "stop the wheels now"),
@@ -62,6 +63,7 @@ KEYS = [
     Binding("K", "acknowledge_all", "all alarms were seen"),
     Binding("i", "ask_parameters", "show the row's parameters"),
     Binding("e", "edit", "change the parameter under the cursor"),
+    Binding("slash", "search", "search the log: words, a robot, a person, a level, since when"),
     Binding("v", "bare", "picture alone, and back"),
     Binding("question_mark,f1", "keys", "these keys"),
     Binding("q", "quit", "give the robot back and leave"),
@@ -108,7 +110,7 @@ def keys_help(profile: Profile, name_of: Callable[[Binding], str]) -> list[str]:
     """
     keys: dict[str, list[str]] = {}
     for binding in Binding.make_bindings(KEYS):
-        if has(profile, action_of(binding)) and not binding.key.startswith("alt+"):
+        if has(profile, action_of(binding)) and binding.key not in ARRIVES_AS:
             keys.setdefault(binding.description, []).append(name_of(binding))
     return [f"{_span(names):<14} {description}" for description, names in keys.items()]
 

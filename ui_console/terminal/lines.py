@@ -264,8 +264,9 @@ def _alarm(alarm: AlarmView, now_s: float) -> Text:
     age_s = max(0.0, now_s - (alarm.first_s if alarm.is_active else alarm.last_s))
     mark = "◆ " if alarm.while_away else "● " if not alarm.acknowledged_by else "○ "
     lines = Text.assemble((mark, style), (alarm.line, style), (f"{times}{since} {age_s:.0f} s ago", "dim"))
-    if alarm.remedy and not alarm.acknowledged_by:
-        lines.append(f"\n  {alarm.remedy}", style="dim")
+    below = [alarm.remedy, *(f"also: {one}" for one in alarm.also)] if not alarm.acknowledged_by else []
+    for line in filter(None, below):
+        lines.append(f"\n  {line}", style="dim")
     return lines
 
 

@@ -68,12 +68,20 @@ export class Tables {
 
   alarms(rows) {
     const all = this.button("Seen all", "acknowledge:", () => this.act("acknowledge", ""));
-    return table(["level", "what", "since", "times", all], rows.map((row) => [
+    return table(["level", "what", "where", "since", "times", all], rows.map((row) => [
       span(row.severity, row.is_active ? `${row.severity}, now` : row.severity),
-      `${row.line}${row.remedy ? ` — ${row.remedy}` : ""}${row.while_away ? " (while away)" : ""}`,
-      seconds(row.first_s), String(row.count),
-      row.acknowledged_by ? `seen by ${row.acknowledged_by}` : this.button("Seen", `acknowledge:${row.key}`, () => this.act("acknowledge", row.key)),
+      `${row.line}${row.remedy ? ` — ${row.remedy}` : ""}${row.while_away ? " (while away)" : ""}${follows(row.also)}`,
+      [row.robot === row.subject ? "" : row.robot, row.where].filter(Boolean).join(", "),
+      seconds(row.first_s), String(row.count), this.seenOrWhy(row),
     ]));
+  }
+
+  seenOrWhy(row) {
+    const both = document.createElement("span");
+    both.append(this.button("Why?", `why:${row.key}`, () => this.act("why", row.subject)), " ",
+      row.acknowledged_by ? `seen by ${row.acknowledged_by}`
+        : this.button("Seen", `acknowledge:${row.key}`, () => this.act("acknowledge", row.key)));
+    return both;
   }
 
   robots(rows) {
@@ -150,6 +158,10 @@ export class Tables {
     button.addEventListener("click", press);
     return button;
   }
+}
+
+function follows(lines) {
+  return lines.length ? ` (and what follows from it: ${lines.join("; ")})` : "";
 }
 
 /** Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still. */

@@ -1,0 +1,124 @@
+"""A console says which robot it lost, when it hears nothing any more, and what has to be let go first."""
+
+from __future__ import annotations
+
+import pytest
+from console_scenes import ASK, GRANT, SCHEDULE, STOP, held_model, model
+
+from resource_pool.arc_client import Stopper, StopState
+from ui_console.consent import Consent, Settled, Sought, Topic
+from ui_console.console_events import (
+    ConsentSettled,
+    ConsentSought,
+    GivenBack,
+    Granted,
+    LetGoNeeded,
+    LinkHeard,
+    Lost,
+    ScheduleHeard,
+    StopHeard,
+)
+from ui_console.views import AlarmKind, LostView
+
+AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
+
+
+# ---------------------------------------------------------------------- a robot that was lost
+def test_a_robot_given_back_unasked_is_said_to_be_lost_with_when_and_why_and_can_be_taken_again() -> None:
+    shown = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT, AWAY)
+    assert shown.own(21.0).lost == LostView("scout1", "anna is away", 20.0, may_retake=True)
+    assert shown.own(90.0).lost is not None, "until somebody has seen it"
+    shown.dismiss_lost()
+    assert shown.own(90.0).lost is None
+
+
+def test_taking_a_robot_again_ends_the_word_that_it_was_lost() -> None:
+    shown = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT, AWAY, ASK)
+    assert shown.own(21.0).lost is None
+
+
+def test_a_robot_given_back_on_purpose_is_not_lost() -> None:
+    assert model(ASK, GRANT, GivenBack(20.0, "released", True)).own(21.0).lost is None
+
+
+def test_a_robot_lost_with_its_link_is_said_to_be_lost_while_the_console_asks_for_it_again() -> None:
+    shown = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT, Lost(12.0, "lease", "", -1.0))
+    lost = shown.own(12.0).lost
+    assert lost is not None
+    assert (lost.robot, lost.at_s, lost.may_retake) == ("scout1", 12.0, False)
+    shown.apply(Granted(14.0, GRANT.rcs, {"scout1": 8}, 20.0, 9.95, True))
+    assert shown.own(14.0).lost is None
+
+
+def test_whose_turn_is_over_has_lost_nothing() -> None:
+    assert model(ASK, GRANT, Lost(12.0, "slice", "console-2", -1.0)).own(12.0).lost is None
+
+
+# ---------------------------------------------------------------------- a link that is down
+@pytest.mark.parametrize("word", [LinkHeard(12.5, False), None])
+def test_what_is_shown_is_never_older_than_a_second_without_saying_so(word: LinkHeard | None) -> None:
+    """The link says that it is down, or says nothing any more."""
+    shown = held_model()
+    shown.apply(LinkHeard(12.0, True, 0.002, until_s=13.0))
+    assert shown.own(13.0).is_held
+    assert shown.own(13.0).link_down_s < 0
+    if word is not None:
+        shown.apply(word)
+    shown.look(13.1)
+    own = shown.own(13.1)
+    assert (own.link_down_s, own.is_held) == (12.0, False)
+    assert "NO LINK" in own.status
+    assert "you hold" not in own.status
+    assert not any(robot.is_mine for robot in shown.robots(13.1))
+    assert [alarm.kind for alarm in shown.team.alarms.views() if alarm.is_active] == [AlarmKind.LINK]
+    shown.apply(LinkHeard(14.0, True, 0.002, until_s=15.0))
+    shown.look(14.0)
+    assert shown.own(14.0).link_down_s < 0
+    assert shown.own(14.0).is_held
+    assert not [alarm for alarm in shown.team.alarms.views() if alarm.is_active]
+
+
+# ---------------------------------------------------------------------- stops
+def test_what_has_to_be_let_go_is_said_only_while_a_robot_is_held() -> None:
+    shown = held_model()
+    shown.apply(LetGoNeeded(12.0, True))
+    assert shown.own(12.0).must_let_go
+    shown.apply(LetGoNeeded(12.5, False))
+    assert not shown.own(12.5).must_let_go
+    shown.apply(LetGoNeeded(13.0, True))
+    shown.apply(GivenBack(14.0, "released", True))
+    assert not shown.own(14.0).must_let_go
+
+
+def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_takes() -> None:
+    both = StopState(
+        "scout2", True, 3, "ben", "", 11.5, console="ui_console/ben", also=[Stopper("cleo", "ui_console/c")]
+    )
+    rows = model(ScheduleHeard(8.0, SCHEDULE), StopHeard(11.0, STOP), StopHeard(11.5, both)).robots(12.0)
+    mine, theirs = rows[0].stop, rows[1].stop
+    assert mine is not None
+    assert theirs is not None
+    assert (mine.by_user, mine.since_s, mine.is_mine, mine.lift_line) == ("anna", 11.0, True, "hold to lift")
+    assert (theirs.by_user, theirs.also, theirs.is_mine) == ("ben", ["cleo"], False)
+    assert theirs.lift_line == "asks ben and cleo first"
+
+
+def test_the_alarm_of_a_stop_goes_when_the_stop_is_lifted() -> None:
+    shown = model(StopHeard(11.0, STOP), StopHeard(12.0, StopState("scout1", False, 1, "ben", "", 12.0)))
+    assert shown.team.alarms.views() == []
+
+
+def test_a_question_whether_to_lift_a_stop_and_one_for_the_robot_are_told_apart() -> None:
+    shown = held_model()
+    lift = Sought("ui_console/ben", "ben", "scout1", "", 20.0, Topic.LIFT)
+    take = Sought("ui_console/ben", "ben", "scout1", "mine is stuck", 20.0)
+    shown.apply(ConsentSought(12.0, lift))
+    shown.apply(ConsentSought(12.0, take))
+    asked = shown.own(12.0).consent
+    assert asked is not None
+    assert (asked.topic, asked.others) == ("lift", 1)
+    assert asked.line == "ben asks whether scout1, which you stopped, may move again"
+    shown.apply(ConsentSettled(13.0, Settled(lift, Consent(True, "anna", ""))))
+    asked = shown.own(13.0).consent
+    assert asked is not None
+    assert (asked.topic, asked.line) == ("take", "ben asks for scout1: mine is stuck")

@@ -1,0 +1,33 @@
+"""Without what a component cannot be well: by this alarms find the one cause that they share. Pure."""
+
+from __future__ import annotations
+
+from backbone.component.messages import ComponentState
+from backbone.creator.messages import creator_name
+from backbone.naming import component_of
+from backbone.people import is_console
+from backbone.rc_manager.messages import Schedule
+
+
+class Needs:
+    """What each component needs, as far as it was heard of."""
+
+    def __init__(self) -> None:
+        self._of: dict[str, frozenset[str]] = {}
+
+    def heard(self, component: ComponentState) -> None:
+        """Take in on which machine a component runs, and for which console."""
+        name = component_of(component.address)
+        needs = {component_of(component.requester)} if is_console(component.requester) else set[str]()
+        if not is_console(component.address):  # consoles are nobody's children
+            needs.add(creator_name(component.host))
+        self._of[name] = frozenset(needs - {name})
+
+    def forget(self, name: str) -> None:
+        """Forget one that left for good."""
+        self._of.pop(name, None)
+
+    def of(self, name: str, schedule: Schedule | None) -> frozenset[str]:
+        """Return the names of its host's creator, its console, and of the RCs that it asks for."""
+        requests = schedule.requests if schedule is not None else []
+        return self._of.get(name, frozenset()).union(*(request.rcs for request in requests if request.arc == name))
