@@ -110,7 +110,9 @@ class Card {
     this.lift = make("button", "lift", "Hold to lift");
     this.lift.type = "button";
     this.needs = make("p", "needs");
-    this.dropLift = actWhenHeld(this.lift, () => { if (this.stop) this.act("lift", this.name, { number: this.stop.number }); });
+    this.dropLift = actWhenHeld(this.lift, () => {
+      if (this.stop) this.act("lift", this.name, { number: this.stop.number });
+    });
     this.standing.append(this.whose, this.lift, this.needs);
     return this.standing;
   }
@@ -139,7 +141,8 @@ class Card {
     this.root.classList.toggle("is-mine", robot.is_mine);
     this.fillStop(robot.stop);
     const isStopped = robot.stop !== null;
-    set(this.state, !robot.is_up ? "down" : isStopped ? "STOPPED" : robot.is_mine ? "yours" : robot.holder ? "held" : "free");
+    const whose = robot.is_mine ? "yours" : robot.holder ? "held" : "free";
+    set(this.state, !robot.is_up ? "down" : isStopped ? "STOPPED" : whose);
     const next = robot.waiting.length ? `; next: ${robot.waiting[0].who}` : "";
     const who = robot.is_mine ? "you" : robot.holder;
     set(this.holder, who ? `${who}: ${robot.feedback || robot.because}${next}` : robot.feedback + next);

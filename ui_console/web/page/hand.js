@@ -19,7 +19,10 @@ export class Hand {
     find("jump").addEventListener("click", () => act("jump"));
     find("consent-yes").addEventListener("click", () => act("consent", true));
     find("consent-no").addEventListener("click", () => act("consent", false));
-    find("retake").addEventListener("click", () => { this.memory.forget(); act("take", find("retake").dataset.robot); });
+    find("retake").addEventListener("click", () => {
+      this.memory.forget();
+      act("take", find("retake").dataset.robot);
+    });
     find("dismiss").addEventListener("click", () => { this.memory.forget(); act("dismiss"); this.showLost(); });
     find("speed").addEventListener("input", () => this.showSpeed());
     this.showSpeed();

@@ -30,10 +30,14 @@ const driving = new Driving({
 });
 const hand = new Hand({ act, driving });
 const blindness = new Blindness({
-  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("alarm-bar"), find("stage"), find("side")],
+  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"),
+  areas: [find("alarm-bar"), find("stage"), find("side")],
   stops: () => document.querySelectorAll("button.emergency"),
 });
-new Keys({ isHeld: () => hand.held !== "", does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")) });
+new Keys({
+  isHeld: () => hand.held !== "",
+  does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")),
+});
 followTheme(find("theme"));
 
 // ---------------------------------------------------------------- coming in
@@ -77,7 +81,7 @@ function heard(message) {
 function answered(answer) {
   if (answer.why !== undefined) read(`Why ${answer.why}?`, answer.lines);
   else if (answer.refused) notice(answer.refused);
-  else if (answer.told === false || answer.done === false) notice("It did not answer so; see the alarms for what it said.");
+  else if (answer.told === false || answer.done === false) notice("It did not answer so; the alarms say what it said.");
 }
 
 // ---------------------------------------------------------------- what is wanted
