@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from axe import serious_findings
 from web_browser import assert_no_sideways_scroll
-from web_page import card, page_at, stop_button, take, wait_stopped
+from web_page import ALL_SIZES, card, page_at, stop_button, take, wait_stopped
 from web_stage import LOW, Stage
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
@@ -27,6 +27,25 @@ async def test_the_robot_in_hand_is_large_and_the_others_are_small(stage: Stage,
         assert small["width"] <= large["width"] / 2
         assert large["y"] + large["height"] <= page.viewport_size["height"], "seen whole"
         await assert_no_sideways_scroll(page)
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_while_a_robot_is_driven_its_stop_and_that_of_all_are_in_sight_and_nothing_covers_them(
+    stage: Stage, size: str
+) -> None:
+    async with page_at(stage, size) as page:
+        await take(page)
+        for button in ("stop-mine", "stop-all"):
+            is_free = await page.evaluate(
+                """id => {
+                  const one = document.getElementById(id), box = one.getBoundingClientRect();
+                  return document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2) === one;
+                }""",
+                button,
+            )
+            assert is_free, button
+        await page.locator("#stop-mine").click()
+        await wait_stopped(page)
 
 
 async def test_without_a_robot_the_one_that_was_chosen_is_large(stage: Stage) -> None:
@@ -129,24 +148,26 @@ async def test_all_that_can_be_pressed_is_reached_by_tab_alone_and_seen_to_have_
         await stop_button(page, "scout2").click()
         await wait_stopped(page, "scout2")
         await page.evaluate("() => document.activeElement.blur()")
-        reached, unseen = set(), []
+        name_of = "const nameOf = (one) => one.dataset.key ?? one.ariaLabel ?? (one.id || one.textContent);"
+        reached, unseen = set(), set()
         for _ in range(80):
             await page.keyboard.press("Tab")
-            found = await page.evaluate("""() => {
+            name, is_seen = await page.evaluate(f"""() => {{
+              {name_of}
               const one = document.activeElement, style = getComputedStyle(one);
-              window.numbers ??= new Map();
-              if (!window.numbers.has(one)) window.numbers.set(one, window.numbers.size);
               const isSeen = style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2;
-              const name = one.ariaLabel ?? (one.id || one.textContent);
-              return [window.numbers.get(one), name, isSeen || one === document.body];
-            }""")
-            reached.add(found[0])
-            unseen += [] if found[2] else [found[1]]
-        assert unseen == []
-        missed = await page.evaluate("""() => [...document.querySelectorAll("button, input, select, [tabindex='0']")]
-          .filter((one) => one.checkVisibility() && !one.disabled && !window.numbers.has(one))
-          .map((one) => one.ariaLabel ?? (one.id || one.textContent))""")
-        assert missed == []
+              return [nameOf(one), isSeen || one === document.body];
+            }}""")
+            reached.add(name)
+            if not is_seen:
+                unseen.add(name)
+        assert unseen == set()
+        pressable = await page.evaluate(f"""() => {{
+          {name_of}
+          const all = [...document.querySelectorAll("button, input, select, [tabindex='0']")];
+          return all.filter((one) => one.checkVisibility() && !one.disabled).map(nameOf);
+        }}""")
+        assert set(pressable) - reached == set()
 
 
 async def test_by_keyboard_alone_a_robot_is_taken_stopped_lifted_and_released(stage: Stage) -> None:

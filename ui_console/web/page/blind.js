@@ -5,8 +5,8 @@ import { set } from "./text.js";
 const LOOK_EVERY_MS = 250;
 
 /**
- * Says that the page is cut off, since when, and what else stops robots; everything is gray meanwhile. A server that does
- * not hear the mission counts as well: its page is connected, and stops nothing.
+ * Says that the page is cut off, since when, and what else stops robots; everything is gray meanwhile. A server that
+ * does not hear the mission counts as well: its page is connected, and stops nothing.
  */
 export class Blindness {
   constructor({ link, root, title, why, areas, stops }) {

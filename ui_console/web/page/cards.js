@@ -8,10 +8,10 @@ const LOOK_EVERY_MS = 250;
 const HOLD = "hold to lift"; // what the model says of a stop that nobody else has a say in; the button says it
 const MOST_WATCHED = 16; // what the server takes
 
-/** Shows all robots; `act(what, robot, more)` does what a person wants. */
+/** Shows all robots, one of them on the stage; `act(what, robot, more)` does what a person wants. */
 export class Cards {
-  constructor({ root, say, act }) {
-    Object.assign(this, { root, say, act });
+  constructor({ stage, thumbs, say, act }) {
+    Object.assign(this, { stage, thumbs, say, act });
     this.cards = new Map();
     this.chosen = "";
     this.large = "";
@@ -38,22 +38,20 @@ export class Cards {
     };
     const card = new Card({ name, act, drawn: (number) => this.say({ do: "drawn", robot: name, number }) });
     this.cards.set(name, card);
-    this.root.append(card.root);
+    this.thumbs.append(card.root);
   }
 
-  /** Show this one large and first; who was about to press something in it still is. */
+  /** Show this one large; who was about to press something on a card still is. */
   enlarge(name) {
-    if (name === this.large && this.root.firstElementChild?.dataset.robot === name) return;
+    if (name === this.large && this.stage.firstElementChild?.dataset.robot === name) return;
     this.large = name;
-    const focus = this.root.contains(document.activeElement) ? document.activeElement : null;
-    const sorted = [...this.cards.keys()].sort();
-    for (const one of [name, ...sorted.filter((other) => other !== name)]) {
-      const card = this.cards.get(one);
-      if (!card) continue;
-      card.root.classList.toggle("is-large", one === name);
-      this.root.append(card.root);
+    const focus = document.activeElement;
+    for (const one of [...this.cards.keys()].sort()) {
+      const { root } = this.cards.get(one);
+      root.classList.toggle("is-large", one === name);
+      (one === name ? this.stage : this.thumbs).append(root);
     }
-    focus?.focus({ preventScroll: true });
+    if (focus?.closest(".robot")) focus.focus({ preventScroll: true });
   }
 
   watch() {
@@ -112,7 +110,9 @@ class Card {
     this.lift = make("button", "lift", "Hold to lift");
     this.lift.type = "button";
     this.needs = make("p", "needs");
-    this.dropLift = actWhenHeld(this.lift, () => { if (this.stop) this.act("lift", this.name, { number: this.stop.number }); });
+    this.dropLift = actWhenHeld(this.lift, () => {
+      if (this.stop) this.act("lift", this.name, { number: this.stop.number });
+    });
     this.standing.append(this.whose, this.lift, this.needs);
     return this.standing;
   }
@@ -141,7 +141,8 @@ class Card {
     this.root.classList.toggle("is-mine", robot.is_mine);
     this.fillStop(robot.stop);
     const isStopped = robot.stop !== null;
-    set(this.state, !robot.is_up ? "down" : isStopped ? "STOPPED" : robot.is_mine ? "yours" : robot.holder ? "held" : "free");
+    const whose = robot.is_mine ? "yours" : robot.holder ? "held" : "free";
+    set(this.state, !robot.is_up ? "down" : isStopped ? "STOPPED" : whose);
     const next = robot.waiting.length ? `; next: ${robot.waiting[0].who}` : "";
     const who = robot.is_mine ? "you" : robot.holder;
     set(this.holder, who ? `${who}: ${robot.feedback || robot.because}${next}` : robot.feedback + next);

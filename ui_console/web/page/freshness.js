@@ -1,8 +1,8 @@
 // How old what is shown can be at most. Pure: times are milliseconds of a clock that the caller has.
 
 /**
- * Each beat goes to the server and comes back with what it says next. What is shown is at most as old as the newest beat
- * that came back: that holds however long anything waited on its way, at the server, or in a page that slept.
+ * Each beat goes to the server and comes back with what it says next. What is shown is at most as old as the newest
+ * beat that came back: that holds however long anything waited on its way, at the server, or in a page that slept.
  */
 export class Freshness {
   constructor() {
@@ -35,8 +35,8 @@ export class Freshness {
 }
 
 /**
- * Returns a clock, in milliseconds, that a device cannot hold up: one of its own stops while it sleeps, the other may be
- * set back; this one goes as the faster of both.
+ * Returns a clock, in milliseconds, that a device cannot hold up: one of its own stops while it sleeps, the other may
+ * be set back; this one goes as the faster of both.
  */
 export function makeClock(steady = () => performance.now(), wall = () => Date.now()) {
   let [steadyAt, wallAt, total] = [steady(), wall(), 0];

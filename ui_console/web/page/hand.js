@@ -14,11 +14,15 @@ export class Hand {
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
     find("release").addEventListener("click", () => act("release"));
     find("may-i").addEventListener("click", () => act("may_i"));
+    find("stop-mine").addEventListener("click", () => act("stop_mine"));
     find("halt").addEventListener("click", () => act("halt"));
     find("jump").addEventListener("click", () => act("jump"));
     find("consent-yes").addEventListener("click", () => act("consent", true));
     find("consent-no").addEventListener("click", () => act("consent", false));
-    find("retake").addEventListener("click", () => { this.memory.forget(); act("take", find("retake").dataset.robot); });
+    find("retake").addEventListener("click", () => {
+      this.memory.forget();
+      act("take", find("retake").dataset.robot);
+    });
     find("dismiss").addEventListener("click", () => { this.memory.forget(); act("dismiss"); this.showLost(); });
     find("speed").addEventListener("input", () => this.showSpeed());
     this.showSpeed();
@@ -63,6 +67,8 @@ export class Hand {
     find("release").disabled = !own.is_asked;
     find("take").disabled = own.is_asked;
     find("halt").disabled = find("jump").disabled = !own.is_held;
+    find("stop-mine").hidden = !own.is_held;
+    set(find("stop-mine"), `Stop ${own.robot}`);
     document.body.dataset.held = this.held;
     document.body.classList.toggle("is-asking", own.is_asked);
   }

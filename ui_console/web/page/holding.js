@@ -2,7 +2,7 @@
 
 export const HOLD_MS = 1000; // chosen: longer than any double press, short enough for whoever means it
 
-/** Have `act` called once the button was held; whatever else happens meanwhile lets it go. Space never holds: it stops. */
+/** Have `act` called once the button was held; whatever else happens lets it go. Space never holds: it stops. */
 export function actWhenHeld(button, act) {
   let timer = 0;
   const drop = () => {

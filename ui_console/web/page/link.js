@@ -1,4 +1,4 @@
-// The connection to the server: says who is there, comes back by itself, hands on what is heard, and knows how old it is.
+// The connection to the server: says who is there, comes back by itself, hands on what is heard, knows how old it is.
 
 import { Freshness, makeClock } from "./freshness.js";
 
@@ -80,7 +80,7 @@ export class Link {
     if (this.isUp) this.say({ do: "beat", number: this.freshness.beat(this.now()) });
   }
 
-  /** Find out how old what is shown is; in a page that nobody sees that matters to nobody, and is not looked at in time. */
+  /** Find out how old what is shown is; in a page that nobody sees that matters to nobody. */
   look() {
     if (!this.isUp || document.hidden) return;
     const now = this.now(), ageMs = this.freshness.age(now);

@@ -19,7 +19,7 @@ const view = {};
 
 const link = new Link({ heard, saw: (picture) => cards.saw(picture), changed });
 const say = (message) => link.say(message);
-const cards = new Cards({ root: find("videos"), say, act });
+const cards = new Cards({ stage: find("stage"), thumbs: find("thumbs"), say, act });
 const tables = new Tables({ tabs: find("tabs"), panel: find("panel"), act });
 const stopping = new Stopping({ say, shown: find("unsure") });
 const driving = new Driving({
@@ -30,10 +30,14 @@ const driving = new Driving({
 });
 const hand = new Hand({ act, driving });
 const blindness = new Blindness({
-  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("alarm-bar"), find("videos"), find("hand")],
+  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"),
+  areas: [find("alarm-bar"), find("stage"), find("side")],
   stops: () => document.querySelectorAll("button.emergency"),
 });
-new Keys({ isHeld: () => hand.held !== "", does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")) });
+new Keys({
+  isHeld: () => hand.held !== "",
+  does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")),
+});
 followTheme(find("theme"));
 
 // ---------------------------------------------------------------- coming in
@@ -77,7 +81,7 @@ function heard(message) {
 function answered(answer) {
   if (answer.why !== undefined) read(`Why ${answer.why}?`, answer.lines);
   else if (answer.refused) notice(answer.refused);
-  else if (answer.told === false || answer.done === false) notice("It did not answer so; see the alarms for what it said.");
+  else if (answer.told === false || answer.done === false) notice("It did not answer so; the alarms say what it said.");
 }
 
 // ---------------------------------------------------------------- what is wanted

@@ -16,7 +16,8 @@ export function showAlarm(alarms, act) {
   if (!first) { bar.replaceChildren("no alarm"); return; } // its place is kept: nothing moves under a finger
   const line = document.createElement("span");
   line.textContent = `${first.severity}: ${first.line}${first.remedy ? ` — ${first.remedy}` : ""}`;
-  bar.replaceChildren(line, button("Why?", () => act("why", first.subject)), button("Seen", () => act("acknowledge", first.key)));
+  const why = button("Why?", () => act("why", first.subject));
+  bar.replaceChildren(line, why, button("Seen", () => act("acknowledge", first.key)));
 }
 
 export function showHealth(health) {
