@@ -8,6 +8,8 @@ import json
 import math
 import os
 import re
+import socket
+import stat
 import subprocess
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -53,30 +55,39 @@ class Served:
     process: subprocess.Popen[str]
 
 
+@contextlib.contextmanager
+def serving(mission: RunningMission, port: int = 0) -> Iterator[Served]:
+    """Serve the mission's console until the block ends."""
+    process = subprocess.Popen(
+        [str(BIN / "scout-console"), "serve", "--port", str(port), "--mission", mission.name],
+        env=mission.environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", process.stdout.readline())
+        assert found is not None
+        yield Served(mission, int(found[1]), found[2], process)
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait(10)
+        assert process.stdout is not None
+        process.stdout.close()
+
+
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     assert SECOND_WATCHER is not None
-    with mission_up(name="iros2001", change={SECOND_WATCHER.group(): ""}) as mission:
-        process = subprocess.Popen(
-            [str(BIN / "scout-console"), "serve", "--port", "0", "--mission", mission.name],
-            env=mission.environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        try:
-            assert process.stdout is not None
-            found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", process.stdout.readline())
-            assert found is not None
-            yield Served(mission, int(found[1]), found[2], process)
-            process.terminate()
-            assert process.wait(20) == 0
-        finally:
-            if process.poll() is None:
-                process.kill()
-            process.wait(10)
-            assert process.stdout is not None
-            process.stdout.close()
+    with (
+        mission_up(name="iros2001", change={SECOND_WATCHER.group(): ""}) as mission,
+        serving(mission) as made,
+    ):
+        yield made
+        made.process.terminate()
+        assert made.process.wait(20) == 0
 
 
 async def pose(bus: Bus, robot: str = "scout1") -> Pose:
@@ -365,7 +376,7 @@ async def test_an_emergency_stop_holds_against_the_hands_until_it_is_lifted(serv
         card = page.locator(".robot[data-robot=scout1]")
         await take(page)
         for _ in range(3):
-            await card.get_by_role("button", name="Stop").click()
+            await card.locator("button.emergency").click()
         await page.wait_for_selector(".robot[data-robot=scout1].is-stopped")
         before = await pose(bus)
         await page.keyboard.down("d")
@@ -397,3 +408,24 @@ async def test_a_stranger_is_asked_for_the_token_and_told_that_it_is_wrong(serve
         await other.locator("#login-token").fill(served.token)
         await other.locator("#login button").click()
         await other.wait_for_selector(".robot[data-robot=scout1]")
+
+
+async def test_when_the_server_was_killed_and_is_started_again_open_pages_come_back_by_themselves(
+    served: Served,
+) -> None:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    async with contextlib.AsyncExitStack() as open_page:
+        with serving(served.mission, port) as first:
+            kept = served.mission.directory / f"web-{port}.json"
+            assert stat.S_IMODE(kept.stat().st_mode) == 0o600
+            page = await open_page.enter_async_context(page_at("tablet", port, first.token))
+            await take(page)
+        await page.get_by_text("THIS PAGE CANNOT STOP A ROBOT").wait_for()
+        with serving(served.mission, port) as second:
+            assert second.token == first.token
+            await page.wait_for_selector("body:not(.is-blind)")
+            await page.get_by_role("button", name="Take scout1 again").tap()
+            await page.wait_for_selector("body[data-held=scout1]")
+            await page.context.close()

@@ -38,11 +38,13 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
         token: As printed where the server was started.
         user: Who it is, for the record; a token that was made for somebody has that name instead.
         priority: Asked for; the token's own is the most.
+        page: Tells a page that comes back from others; a connection that it had before is over.
     """
 
     token: Annotated[str, msgspec.Meta(max_length=256)]
     user: ShortText = ""
     priority: int | None = None
+    page: ShortText = ""
 
 
 class Beat(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="beat"):
@@ -88,10 +90,12 @@ class Welcome:
     Attributes:
         user: Who it is.
         priority: Of the robots this visitor takes over.
+        page: As said in ``Hello``.
     """
 
     user: str
     priority: int
+    page: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +225,7 @@ class Visitor(Generic[IntentT]):
             return self._out(Fault.TOKEN, "showed a wrong token", "Open the address that serve printed.")
         user = granted.user or " ".join(hello.user.split()) or "somebody"
         wished = granted.priority if hello.priority is None else hello.priority
-        self.welcome = Welcome(user, min(max(wished, 0), granted.priority))
+        self.welcome = Welcome(user, min(max(wished, 0), granted.priority), hello.page)
         return self.welcome
 
     def _has_room(self, now_s: float) -> bool:

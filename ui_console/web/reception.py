@@ -107,6 +107,7 @@ class Reception(Generic[GuestT, IntentT]):
         understand: Callable[[bytes | str], Hello | Beat | IntentT],
     ) -> None:
         self._house, self._doorkeeper, self._site, self._understand = house, doorkeeper, site, understand
+        self._pages: dict[tuple[str, str], ServerConnection] = {}
 
     @asynccontextmanager
     async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
@@ -190,6 +191,7 @@ class Reception(Generic[GuestT, IntentT]):
         return None
 
     async def _serve(self, connection: ServerConnection, visitor: Visitor[IntentT], welcome: Welcome) -> None:
+        self._end_earlier(connection, welcome)
         guest = self._house.enter(welcome)
         who = f"{welcome.user} at {_who(connection)}"
         writing = asyncio.create_task(self._write(connection, visitor, guest, who), name=f"web: to {who}")
@@ -200,8 +202,19 @@ class Reception(Generic[GuestT, IntentT]):
             writing.cancel()
             await self._house.leave(guest, reason)
             await asyncio.wait({writing})
+            if self._pages.get((welcome.user, welcome.page)) is connection:
+                del self._pages[welcome.user, welcome.page]
         if not writing.cancelled():
             writing.result()
+
+    def _end_earlier(self, connection: ServerConnection, welcome: Welcome) -> None:
+        """Cut off what the same page left behind when its link broke: it is not there, and may hold a robot."""
+        if not welcome.page:
+            return
+        earlier = self._pages.get((welcome.user, welcome.page))
+        self._pages[welcome.user, welcome.page] = connection
+        if earlier is not None:
+            earlier.transport.abort()
 
     async def _read(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> str:
         """Obey the browser until the connection ends; return why it did."""

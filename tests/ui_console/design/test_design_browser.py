@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 import web_browser
+from axe import serious_findings
 from design_keys import tutorial_draft
 from web_browser import assert_no_sideways_scroll
 
@@ -51,9 +52,9 @@ def served(file: Path) -> Iterator[str]:
 
 
 @asynccontextmanager
-async def page_at(size: str, address: str) -> AsyncIterator[Any]:
+async def page_at(size: str, address: str, theme: str = "dark") -> AsyncIterator[Any]:
     """Open the page in a browser of this size; it never scrolls sideways."""
-    async with web_browser.page_at(size, address, shows=".element", expects=()) as page:
+    async with web_browser.page_at(size, address, shows=".element", theme=theme, expects=()) as page:
         yield page
         await assert_no_sideways_scroll(page)
 
@@ -381,3 +382,77 @@ async def test_what_somebody_else_wrote_meanwhile_is_overwritten_only_when_told_
             await hands.is_state("saved, fine")
             mine = (ROOT / "mission.xml").read_bytes().replace(b'priority="10"', b'priority="11"', 1)
             assert file.read_bytes() == mine
+
+
+async def test_a_refused_value_stays_marked_where_it_was_written_and_escape_takes_it_back(tmp_path: Path) -> None:
+    file = tmp_path / "guard.xml"
+    file.write_bytes((ROOT / "mission.xml").read_bytes())
+    with served(file) as address:
+        async with page_at("desktop", address) as page:
+            await Mouse(page).choose("resource scout2 scout")
+            field = page.locator("#properties [data-key='name']")
+            await field.fill("scout1")
+            await field.press("Enter")
+            await page.wait_for_selector("#properties [data-key='name'][aria-invalid='true']")
+            why = await page.locator("#properties label:has([data-key='name']) .refused").inner_text()
+            assert "has the name 'scout1' already" in why
+            await page.locator("#properties [data-key='host']").focus()
+            assert await field.input_value() == "scout1"
+            assert await field.get_attribute("aria-invalid") == "true"
+            await field.press("Escape")
+            assert await field.input_value() == "scout2"
+            assert await field.get_attribute("aria-invalid") is None
+            await Hands(page).is_state("saved, fine")
+
+
+async def test_enter_sets_what_is_written_and_the_focus_stays(tmp_path: Path) -> None:
+    file = tmp_path / "guard.xml"
+    file.write_bytes((ROOT / "mission.xml").read_bytes())
+    with served(file) as address:
+        async with page_at("desktop", address) as page:
+            field = page.locator("#properties [data-key='priority']")
+            await field.fill("11")
+            await field.press("Enter")
+            await Hands(page).is_state("changed, fine")
+            assert await page.evaluate("() => document.activeElement.dataset.key") == "priority"
+            await page.locator("#undo").click()
+            await Hands(page).is_state("saved, fine")
+            assert await page.locator("#undo").is_disabled(), "it was one change"
+
+
+async def test_a_dialog_asks_for_what_is_required_and_keeps_answers_that_were_refused(tmp_path: Path) -> None:
+    file = tmp_path / "guard.xml"
+    with served(file) as address:
+        async with page_at("desktop", address) as page:
+            await page.locator(".element").first.focus()
+            await page.keyboard.press("a")
+            await page.locator("#choose-find").fill("behavior patrol")
+            await page.keyboard.press("Enter")
+            await page.locator("#ask [name=name]").fill("")
+            await page.keyboard.press("Enter")
+            assert await page.locator("#ask[open]").count() == 1, "a name is required"
+            await page.locator("#ask [name=name]").fill("rounds")
+            await page.locator("#ask [name=priority]").fill("high")
+            await page.keyboard.press("Enter")
+            await page.locator("#ask-refused").get_by_text("'high' is no priority").wait_for()
+            assert await page.locator("#ask [name=name]").input_value() == "rounds"
+            await page.locator("#ask [name=priority]").fill("7")
+            await page.keyboard.press("Enter")
+            await Hands(page).see("behavior rounds patrol priority 7")
+
+
+@pytest.mark.parametrize(("size", "theme"), [("desktop", "light"), ("phone", "dark")])
+async def test_axe_finds_nothing_serious_in_the_designer(tmp_path: Path, size: str, theme: str) -> None:
+    file = tmp_path / "guard.xml"
+    file.write_bytes((ROOT / "mission.xml").read_bytes())
+    with served(file) as address:
+        async with page_at(size, address, theme) as page:
+            found = {}
+            for pane in ("parts", "tree", "details", "problems", "minute"):
+                for tab in await page.locator(f"[role=tab][data-pane={pane}]").all():
+                    await tab.dispatch_event("click")
+                await page.wait_for_timeout(300)
+                found[pane] = await serious_findings(page)
+            await page.evaluate("() => document.getElementById('ask').showModal()")
+            found["dialog"] = await serious_findings(page)
+            assert {state: findings for state, findings in found.items() if findings} == {}

@@ -15,6 +15,7 @@ from ui_console.web.door import (
     LOGIN_WITHIN_S,
     MAX_MESSAGE_BYTES,
     RATE_HZ,
+    Beat,
     Doorkeeper,
     Fault,
     Offence,
@@ -26,7 +27,7 @@ from ui_console.web.door import (
     passes_for,
     read_operator,
 )
-from ui_console.web.protocol import Intent, LetGo, SetParameter, Steer, StopWheels, Watch, understand
+from ui_console.web.protocol import Intent, LetGo, LiftStop, SetParameter, Steer, StopWheels, Watch, understand
 
 TOKEN = "the-right-one"  # noqa: S105  opens nothing
 
@@ -108,6 +109,7 @@ def test_a_token_made_for_somebody_has_that_name() -> None:
     assert visitor(Pass("anna", 5)).heard(hello(user="eve"), 0.0) == Welcome("anna", 5)
     assert visitor().heard(hello(user="  a\n b "), 0.0) == Welcome("a b", 100)
     assert visitor().heard(hello(), 0.0) == Welcome("somebody", 100)
+    assert visitor().heard(hello(page="7f-01"), 0.0) == Welcome("somebody", 100, "7f-01")
 
 
 def test_who_shows_no_token_in_time_is_late() -> None:
@@ -149,6 +151,8 @@ def test_a_few_meaningless_messages_are_forgiven() -> None:
         b'{"do":"take","robot":"' + b"x" * 64 + b'"}',
         b'{"do":"watch","robots":[' + b",".join([b'"a"'] * 17) + b"]}",
         b'{"do":"drawn","robot":"scout1","number":-1}',
+        b'{"do":"beat","number":-1}',
+        b'{"do":"lift","robot":"scout1"}',
         b'{"do":"hello","token":"the-right-one"}',
         b"[" * 2000,
         b"\xff\xfe",
@@ -163,6 +167,8 @@ def test_what_is_out_of_range_means_nothing(said: bytes) -> None:
 
 def test_words_become_intents() -> None:
     one = welcomed()
+    assert one.heard(b'{"do":"beat","number":7}', 1.0) == Beat(7)
+    assert one.heard(b'{"do":"lift","robot":"scout1","number":3}', 1.0) == LiftStop("scout1", 3)
     said = b'{"do":"drive","forward":0.5,"right":-1,"speed_rad_s":4}'
     assert one.heard(said, 1.0) == Steer(0.5, -1.0, 4.0)
     assert one.heard('{"do":"release"}', 1.0) == LetGo()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from importlib import resources
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -60,6 +61,15 @@ def test_what_the_modules_look_for_is_on_the_page() -> None:
             assert set(re.findall(r'find\("([^"]+)"\)', texts()[name])) <= ids, name
             for module in re.findall(r'from "\./([^"]+)"', texts()[name]):
                 assert f"/{module}" in files, name
+
+
+@pytest.mark.parametrize("guide", ["operate-from-a-browser", "design-in-a-browser"])
+def test_what_the_guides_quote_from_the_screen_is_written_there(guide: str) -> None:
+    words = " ".join((Path(__file__).parents[3] / f"docs/how-to/{guide}.md").read_text().split())
+    quoted = set(re.findall(r"(?<![*\w])\*([^*`]+)\*(?!\*)", words))
+    screens = " ".join("".join(texts().values()).split())
+    assert len(quoted) > 8
+    assert [one for one in sorted(quoted) if one.replace("scout1", "${robot}") not in screens] == []
 
 
 @pytest.mark.parametrize("html", ["index.html", "design.html"])

@@ -8,10 +8,10 @@ const LOOK_EVERY_MS = 250;
 const HOLD = "hold to lift"; // what the model says of a stop that nobody else has a say in; the button says it
 const MOST_WATCHED = 16; // what the server takes
 
-/** Shows all robots; `act(what, robot, more)` does what a person wants. */
+/** Shows all robots, one of them on the stage; `act(what, robot, more)` does what a person wants. */
 export class Cards {
-  constructor({ root, say, act }) {
-    Object.assign(this, { root, say, act });
+  constructor({ stage, thumbs, say, act }) {
+    Object.assign(this, { stage, thumbs, say, act });
     this.cards = new Map();
     this.chosen = "";
     this.large = "";
@@ -38,22 +38,20 @@ export class Cards {
     };
     const card = new Card({ name, act, drawn: (number) => this.say({ do: "drawn", robot: name, number }) });
     this.cards.set(name, card);
-    this.root.append(card.root);
+    this.thumbs.append(card.root);
   }
 
-  /** Show this one large and first; who was about to press something in it still is. */
+  /** Show this one large; who was about to press something on a card still is. */
   enlarge(name) {
-    if (name === this.large && this.root.firstElementChild?.dataset.robot === name) return;
+    if (name === this.large && this.stage.firstElementChild?.dataset.robot === name) return;
     this.large = name;
-    const focus = this.root.contains(document.activeElement) ? document.activeElement : null;
-    const sorted = [...this.cards.keys()].sort();
-    for (const one of [name, ...sorted.filter((other) => other !== name)]) {
-      const card = this.cards.get(one);
-      if (!card) continue;
-      card.root.classList.toggle("is-large", one === name);
-      this.root.append(card.root);
+    const focus = document.activeElement;
+    for (const one of [...this.cards.keys()].sort()) {
+      const { root } = this.cards.get(one);
+      root.classList.toggle("is-large", one === name);
+      (one === name ? this.stage : this.thumbs).append(root);
     }
-    focus?.focus({ preventScroll: true });
+    if (focus?.closest(".robot")) focus.focus({ preventScroll: true });
   }
 
   watch() {
@@ -69,6 +67,15 @@ export class Cards {
 
   /** What is held down on a card counts no more. */
   letGo() { for (const card of this.cards.values()) card.dropLift(); }
+
+  /** The connection ended: who has which robot is not known here. */
+  cut() {
+    for (const card of this.cards.values()) {
+      card.root.classList.remove("is-mine");
+      set(card.state, "not known");
+      set(card.holder, "");
+    }
+  }
 }
 
 class Card {

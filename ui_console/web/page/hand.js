@@ -14,6 +14,7 @@ export class Hand {
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
     find("release").addEventListener("click", () => act("release"));
     find("may-i").addEventListener("click", () => act("may_i"));
+    find("stop-mine").addEventListener("click", () => act("stop_mine"));
     find("halt").addEventListener("click", () => act("halt"));
     find("jump").addEventListener("click", () => act("jump"));
     find("consent-yes").addEventListener("click", () => act("consent", true));
@@ -39,8 +40,11 @@ export class Hand {
   /** The connection ended: what was held may be somebody else's by now. */
   cut(why, ageMs) {
     if (this.held) this.memory.keep(this.held, why, Date.now() - ageMs);
+    set(find("own"), this.held ? `You held ${this.held} when the connection ended.` : "Not connected.");
     this.own = null;
     this.driving.turn(false);
+    document.body.dataset.held = "";
+    document.body.classList.remove("is-asking");
   }
 
   show(own, now_s) {
@@ -60,6 +64,8 @@ export class Hand {
     find("release").disabled = !own.is_asked;
     find("take").disabled = own.is_asked;
     find("halt").disabled = find("jump").disabled = !own.is_held;
+    find("stop-mine").hidden = !own.is_held;
+    set(find("stop-mine"), `Stop ${own.robot}`);
     document.body.dataset.held = this.held;
     document.body.classList.toggle("is-asking", own.is_asked);
   }

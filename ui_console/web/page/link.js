@@ -25,6 +25,7 @@ export class Link {
     this.now = makeClock();
     this.freshness = new Freshness();
     this.seenSince = 0;
+    this.page = [...crypto.getRandomValues(new Uint32Array(4))].map((one) => one.toString(16)).join("-");
     setInterval(() => this.beat(), BEAT_EVERY_MS);
     setInterval(() => this.look(), LOOK_EVERY_MS);
     document.addEventListener("visibilitychange", () => {
@@ -49,7 +50,7 @@ export class Link {
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
-    socket.onopen = () => socket.send(JSON.stringify({ do: "hello", ...this.hello }));
+    socket.onopen = () => socket.send(JSON.stringify({ do: "hello", page: this.page, ...this.hello }));
     socket.onmessage = (event) => {
       if (socket !== this.socket) return;
       if (typeof event.data !== "string") { this.saw(readPacket(event.data)); return; }

@@ -19,7 +19,7 @@ const view = {};
 
 const link = new Link({ heard, saw: (picture) => cards.saw(picture), changed });
 const say = (message) => link.say(message);
-const cards = new Cards({ root: find("videos"), say, act });
+const cards = new Cards({ stage: find("stage"), thumbs: find("thumbs"), say, act });
 const tables = new Tables({ tabs: find("tabs"), panel: find("panel"), act });
 const stopping = new Stopping({ say, shown: find("unsure") });
 const driving = new Driving({
@@ -30,7 +30,7 @@ const driving = new Driving({
 });
 const hand = new Hand({ act, driving });
 const blindness = new Blindness({
-  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("videos"), find("hand")],
+  link, root: find("blind"), title: find("blind-title"), why: find("blind-why"), areas: [find("alarm-bar"), find("stage"), find("side")],
   stops: () => document.querySelectorAll("button.emergency"),
 });
 new Keys({ isHeld: () => hand.held !== "", does: (what, code) => (what === "drive" ? driving.press(code) : act(what, "")) });
@@ -45,7 +45,7 @@ function changed({ is, why, ageMs }) {
   driving.letGo();
   cards.letGo();
   if (link.isUp) find("console").hidden = false;
-  else hand.cut(why, ageMs);
+  else { hand.cut(why, ageMs); cards.cut(); }
   if (is === "fresh") cards.watch();
   if (is === "refused") { find("console").hidden = true; login.ask(why); }
   blindness.look();
