@@ -42,7 +42,6 @@ from ui_console.consent_answers import ConsentAnswers
 from ui_console.consent_talk import Claim, ConsentTalk
 from ui_console.console_events import (
     Asked,
-    Attention,
     CommandRefused,
     ConsoleEvent,
     GivenBack,
@@ -58,6 +57,7 @@ from ui_console.feed import REPLY_TIME_S
 from ui_console.hand_over import AskHandOver, HandOver
 from ui_console.lifting import AskLift
 from ui_console.observer import Observer
+from ui_console.presence import Presence
 from ui_console.stop_ear import StopEar
 from ui_console.team_model import ROBOT_KIND
 
@@ -137,8 +137,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._hand_over = HandOver(self, self.give_back)
         self._ear = StopEar(self, self._heard_stop)
         self._asking_why: asyncio.Task[None] | None = None
-        self._touched = asyncio.Event()
-        self._is_attended = True
+        self._presence = Presence(self)
         self._holding = ""
         self._next_robot = ""
         self._switching = asyncio.Lock()
@@ -198,16 +197,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     def touch(self) -> None:
         """The operator is there; driving says so by itself."""
-        if not self._is_attended:
-            self._is_attended = True
-            self.show(Attention(self.clock.now_s(), True))
-        self._touched.set()
+        self._presence.touch()
 
     def leave(self) -> None:
         """The operator turned away, or the window is no longer in front: the wheels stop, and nothing held counts."""
-        if self._is_attended:
-            self._is_attended = False
-            self.show(Attention(self.clock.now_s(), False))
+        self._presence.leave()
         self.require_let_go()
 
     def require_let_go(self) -> None:
@@ -333,7 +327,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.take()
         self.start_task(self._controls.run(), "keys")
         if self.parameters.away_after_s > 0:
-            self.start_task(self._give_back_when_away(), "attention")
+            self.start_task(self._presence.run(self.parameters.away_after_s, self._go_away), "presence")
         if self._work is not None:
             self.start_task(self._work_and_end(self._work), "work")
         await self.watch()
@@ -479,18 +473,10 @@ class Teleoperation(Observer[TeleoperationParameters]):
             log.info("other screens: %s", error)
 
     # ------------------------------------------------------------------ hands
-    async def _give_back_when_away(self) -> None:
+    async def _go_away(self) -> None:
         """Let the robot go on with useful work when nobody drives it."""
-        away_after_s = self.parameters.away_after_s
-        while True:
-            self._touched.clear()
-            try:
-                async with asyncio.timeout(away_after_s):
-                    await self._touched.wait()
-            except TimeoutError:
-                self.leave()
-                await self.give_back(f"{self.user} is away", wanted=False)
-                await self._touched.wait()
+        self.leave()
+        await self.give_back(f"{self.user} is away", wanted=False)
 
     async def _jump(self) -> None:
         await self.do(Jump())

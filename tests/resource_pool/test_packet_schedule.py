@@ -285,3 +285,45 @@ def test_what_has_no_successor_gives_way_to_the_safe_packet() -> None:
     schedule.load(Packet("arc", 1, b"drive", b"safe", 7, until_s=0.05), 0.0)
     sent = [schedule.take(at_s / 10) for at_s in range(2)]
     assert [sending.packet.payload for sending in sent if sending] == [b"drive", b"safe"]
+
+
+# ---------------------------------------------------------------------- stops
+@given(st.lists(st.tuples(st.sampled_from(["load", "once", "take"]), st.booleans(), st.integers(0, 4)), max_size=30))
+def test_nothing_that_moves_a_robot_is_sent_once_a_packet_of_a_later_stop_was_loaded(
+    steps: list[tuple[str, bool, int]],
+) -> None:
+    schedule, newest, now_s = PacketSchedule(), 0, 0.0
+    schedule.connect("arc", [Usage(0.1, 0.002, kind="drive"), Usage(0.3, 0.002, kind="jump")], 0)
+    for number, (what, moves, stop) in enumerate(steps, 1):
+        now_s += 0.07
+        if what == "take":
+            sending = schedule.take(now_s)
+            assert sending is None or not (sending.packet.moves and sending.packet.robot_stop < newest)
+            assert sending is None or sending.packet.robot_stop >= newest, "the audit sees numbers that never go back"
+            continue
+        kind = "jump" if what == "once" else "drive"
+        packet = Packet("arc", 1, b"p", b"safe", 7, kind=kind, moves=moves, robot_stop=stop)
+        if schedule.is_overtaken(packet):
+            assert moves
+            assert stop < newest
+            continue
+        if stop < newest:
+            continue  # a robot's RC stamps what stands still with its newest number
+        schedule.hear_stop(packet)
+        newest = max(newest, stop)
+        if what == "once":
+            schedule.send_once(replace(packet, ticket=number), now_s)
+        else:
+            schedule.load(packet, now_s)
+
+
+def test_a_packet_that_waits_for_its_turn_is_dropped_and_what_stands_still_is_kept() -> None:
+    schedule = PacketSchedule()
+    schedule.connect("arc", [Usage(0.1, 0.002)], 0)
+    schedule.send_once(Packet("arc", 1, b"jump", b"safe", 7, ticket=1, moves=True), 0.0)
+    schedule.send_once(Packet("arc", 1, b"video on", b"safe", 7, ticket=2), 0.0)
+    halt = Packet("arc", 1, b"halt", b"safe", 7, robot_stop=1)
+    assert schedule.hear_stop(halt) == [1]
+    schedule.load(halt, 0.0)
+    sent = [schedule.take(at_s / 10) for at_s in range(2)]
+    assert [(one.packet.payload, one.packet.robot_stop) for one in sent if one] == [(b"video on", 1), (b"halt", 1)]

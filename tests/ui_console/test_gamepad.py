@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from ui_console.driving import STICK_LASTS_S, Drive
+from ui_console.driving import STICK_LASTS_S, DeadMan, Drive
 from ui_console.gamepad import (
     ABS_X,
     ABS_Y,
@@ -143,6 +143,32 @@ def test_what_is_held_is_said_again_until_it_is_let_go() -> None:
     assert said[-1] == "stop"
     assert set(said[:-1]) == {(Drive(4.0, 4.0), STICK_LASTS_S)}
     assert 9 <= len(said[:-1]) <= 13
+
+
+def test_a_shoulder_button_that_is_held_through_a_stop_drives_only_when_it_is_pressed_anew() -> None:
+    async def main() -> None:
+        loop, hand, driven_s = asyncio.get_running_loop(), DeadMan(), list[float]()
+        script = [(0.0, Said(EV_ABS, ABS_Y, -32768)), (0.0, Said(EV_KEY, BTN_TL, 1)), (2.0, Said(EV_KEY, BTN_TL, 0))]
+        device = PlayedGamepad([*script, (0.5, Said(EV_KEY, BTN_TL, 1))], unplugged=False)
+
+        def hold(drive: Drive, lasts_s: float) -> None:
+            if hand.press(drive, loop.time(), lasts_s):
+                driven_s.append(loop.time())
+
+        playing = asyncio.create_task(
+            play_gamepad(
+                device, Stick(RANGES), hold=hold, stop=hand.stop, wish=lambda wish: None, speed_rad_s=lambda: 4.0
+            )
+        )
+        await asyncio.sleep(1.0)
+        hand.require_let_go()
+        await asyncio.sleep(2.0)
+        playing.cancel()
+        await asyncio.gather(playing, return_exceptions=True)
+        assert not [at_s for at_s in driven_s if 1.0 < at_s < 2.5 - 1e-6]
+        assert [at_s for at_s in driven_s if at_s >= 2.5 - 1e-6]
+
+    run_virtual(main())
 
 
 def test_a_gamepad_that_is_gone_while_it_is_held_stops_the_wheels() -> None:

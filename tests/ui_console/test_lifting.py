@@ -10,17 +10,16 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from stoppable_robot import StoppableRobot
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
-from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.operators import OperatorActed, OperatorAction
-from backbone.wire import Envelope, Message
+from backbone.wire import Envelope
 from resource_pool.arc_client import Stopper, StopState
-from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch
 from ui_console.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
 from ui_console.console_model import ConsoleModel
@@ -87,25 +86,6 @@ def test_who_stopped_under_no_name_is_known_by_the_console() -> None:
 
 
 # ---------------------------------------------------------------------- three people at consoles that only watch
-class Robot(Component[Any]):
-    """Only stops and moves again."""
-
-    accepts = AskStop | EmergencyStop | LiftStop
-
-    def __init__(self, *given: Any) -> None:
-        super().__init__(*given)
-        self.latch = StopLatch(self.name)
-
-    async def answer(self, asked: Envelope[Any]) -> Message:
-        match asked.body:
-            case EmergencyStop(reason=reason, user=user):
-                self.latch.stop(user, reason, self.clock.now_s(), asked.source)
-            case LiftStop(number=number, user=user):
-                self.latch.lift(number, user, self.clock.now_s())
-        self.bus.publish(self.address, Conversation.EVENTS, self.latch.state)
-        return self.latch.state
-
-
 class Person:
     """Somebody at a console, and what its screens show."""
 
@@ -131,7 +111,7 @@ class Stage:
     def __init__(self, network: Any) -> None:
         self.network, self.clock = network, VirtualClock()
         launch = self.launch(Subsystem.RESOURCE_POOL, "scout1", "scout")
-        self.robot = Robot(launch, network.join(launch.address, self.clock), self.clock)
+        self.robot = StoppableRobot(launch, network.join(launch.address, self.clock), self.clock)
         self.people = {name: Person(name, self) for name in PEOPLE}
         self.acts: list[tuple[str, OperatorAction]] = []
         self.ear: Bus = network.join("mission_control/ear", self.clock)

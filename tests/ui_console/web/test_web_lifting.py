@@ -1,0 +1,113 @@
+"""Somebody at a page is asked whether a stop they set may be lifted, and one who closed the page is not."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from stoppable_robot import StoppableRobot
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import Bus
+from backbone.component.launch import Launch
+from backbone.naming import Subsystem
+from ui_console.console_model import ConsoleModel
+from ui_console.observer import Observer
+from ui_console.web.door import Welcome
+from ui_console.web.hub import WebHub
+from ui_console.web.operator import Operator
+from ui_console.web.protocol import Decide, LiftStop
+
+WITHIN_S = 5.0
+
+
+class Stage:
+    """A server of pages, a robot, and ben at a terminal."""
+
+    def __init__(self, network: Any) -> None:
+        self.network, self.clock = network, VirtualClock()
+        self.robot = StoppableRobot(*self._who(Subsystem.RESOURCE_POOL, "scout1"))
+        launch, bus, clock = self._who(Subsystem.UI_CONSOLE, "web-1")
+        self.hub = WebHub(launch, bus, clock, self._join)
+        self.ben = ConsoleModel("ben", "ben")
+        self.terminal: Observer[Any] = Observer(
+            *self._who(Subsystem.UI_CONSOLE, "ben"), show=self.ben.apply, user="ben"
+        )
+
+    def _who(self, subsystem: Subsystem, name: str) -> tuple[Launch, Bus, VirtualClock]:
+        kind = "scout" if subsystem is Subsystem.RESOURCE_POOL else "console"
+        launch = Launch(self.network.mission, subsystem, name, kind, "x:Y", "local", "", 0.0, 1.0)
+        return launch, self.network.join(launch.address, self.clock), self.clock
+
+    async def _join(self, launch: Launch) -> Bus:
+        joined: Bus = self.network.join(launch.address, self.clock)
+        return joined
+
+    async def until(self, condition: Callable[[], Any]) -> None:
+        async with asyncio.timeout(WITHIN_S):
+            while not condition():
+                await self.clock.sleep_s(0.01)
+
+    def question(self, page: Operator) -> Any:
+        return page.model.own(self.clock.now_s()).consent
+
+
+Scene = Callable[[Stage], Awaitable[None]]
+
+
+@pytest.fixture
+def stage(local_mission: Any, beside: Any) -> Callable[[Scene], None]:
+    def run(scene: Scene) -> None:
+        async def main() -> None:
+            async with local_mission("iros2001") as network:
+                on = Stage(network)
+                async with beside(on.robot), beside(on.hub.observer), beside(on.terminal):
+                    await scene(on)
+
+        run_virtual(main())
+
+    return run
+
+
+def test_the_person_at_the_page_who_stopped_the_robot_is_asked_and_nobody_else(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        anna, cleo = on.hub.enter(Welcome("anna", 100)), on.hub.enter(Welcome("cleo", 100))
+        await on.hub.observer.stop_robot("scout1", "", "anna")
+        lifting = asyncio.create_task(on.terminal.lift_stop("scout1", on.robot.latch.state.number))
+        await on.until(lambda: on.question(anna))
+        assert on.question(cleo) is None
+        cleo.obey(Decide(True))
+        assert on.robot.latch.state.is_stopped
+        anna.obey(Decide(True))
+        assert await lifting
+        assert on.question(anna) is None
+
+    stage(scene)
+
+
+def test_a_person_who_closed_the_page_keeps_no_robot_standing(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        anna = on.hub.enter(Welcome("anna", 100))
+        await on.hub.observer.stop_robot("scout1", "", "anna")
+        await on.hub.leave(anna, "closed the page")
+        assert await on.terminal.lift_stop("scout1", on.robot.latch.state.number)
+        assert on.ben.own(on.clock.now_s()).asked == "anna lets scout1 move: is not here any more"
+
+    stage(scene)
+
+
+def test_one_page_asks_another_of_the_same_server_and_reads_the_answer(stage: Callable[[Scene], None]) -> None:
+    async def scene(on: Stage) -> None:
+        anna, cleo = on.hub.enter(Welcome("anna", 100)), on.hub.enter(Welcome("cleo", 100))
+        await on.hub.observer.stop_robot("scout1", "", "anna")
+        cleo.obey(LiftStop("scout1", on.robot.latch.state.number))
+        await on.until(lambda: on.question(anna))
+        anna.obey(Decide(False))
+        await on.until(lambda: "anna keeps scout1 stopped" in cleo.model.own(on.clock.now_s()).asked)
+        assert anna.model.own(on.clock.now_s()).asked == ""
+        anna.obey(LiftStop("scout1", on.robot.latch.state.number))
+        await on.until(lambda: not on.robot.latch.state.is_stopped)
+
+    stage(scene)
