@@ -362,7 +362,7 @@ async def _drive_by_hand(where: _Where, wished: dict[str, Any], looks: _Looks) -
 async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
     from backbone.component.component import NoParameters
     from ui_console.console_events import for_scripts
-    from ui_console.observer import Observer
+    from ui_console.observer import Observer, nobody_here
 
     launch, clock, secret = await _launch(where, {})
     bus = await _open_bus(launch, clock, secret)
@@ -372,7 +372,7 @@ async def _watch(where: _Where, user: str, *, as_json: bool) -> int:
             for line in for_scripts(event):
                 _write_line(line)
 
-        console: Observer[NoParameters] = Observer(launch, bus, clock, show=show, user=user)
+        console: Observer[NoParameters] = Observer(launch, bus, clock, show=show, user=user, answers_of=nobody_here)
         interrupted = _end_on_signals(console)
         await console.run()
         return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE

@@ -15,6 +15,7 @@ from typing import Literal
 from ui_console.grip import Grip
 
 FIRST_HOLD_S = 0.5  # chosen: bridges the pause of usual keyboards before they repeat; a press moves 0.5 s at most
+KEYS_LET_GO_S = 0.7  # chosen: a longer pause than keyboards make before they repeat (X: 0.66 s), so a hand let go
 REPEATED_HOLD_S = (0.15, FIRST_HOLD_S)  # chosen: bounds of the hold once the rhythm of the repeats is known
 HOLD_INTERVALS = 3.0  # chosen: two lost repeats are bridged
 REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at the robot
@@ -151,7 +152,7 @@ class DeadMan:
             lasts_s: How long that counts, for what says so again and again while it is held and tells when it is let
                 go; None: for a key, whose rhythm is found out.
         """
-        grip, silence_s = (self._keys, FIRST_HOLD_S) if lasts_s is None else (self._stick, lasts_s)
+        grip, silence_s = (self._keys, KEYS_LET_GO_S) if lasts_s is None else (self._stick, lasts_s)
         if not grip.press(now_s, silence_s):
             return False
         if lasts_s is not None:
@@ -171,7 +172,7 @@ class DeadMan:
 
     def press_jump(self, now_s: float) -> bool:
         """The key or button for one jump is down, for the first time or again; return whether that counts."""
-        return self._jump.press(now_s, FIRST_HOLD_S)
+        return self._jump.press(now_s, KEYS_LET_GO_S)
 
     def stop(self) -> None:
         """Nothing is held any more: a halt is due at once, also if nothing was.

@@ -27,6 +27,11 @@ from ui_console.lifting import AskLift
 P = TypeVar("P", bound=msgspec.Struct)
 
 
+def nobody_here(_user: str) -> ConsentAnswers | None:
+    """Return where a person is asked at a console that only a program reads: nowhere."""
+    return None
+
+
 class Observer(Component[P], Generic[P]):
     """Tells a face what it hears, and lends it the verbs that need no grant.
 

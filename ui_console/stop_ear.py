@@ -30,19 +30,31 @@ class StopEar:
     def __init__(self, console: Observer[Any], heard: Callable[[StopState], None]) -> None:
         self._console, self._heard = console, heard
         self._listening: Subscription | None = None
+        self._robot, self._known = "", asyncio.Event()
 
     async def listen(self, robot: str) -> None:
-        """Hear of this robot from now on, and of no other; return when it is known how it is, or soon."""
-        self.close()
-        self._listening = watch_stops(self._console.bus, self._heard, robot)
-        try:
-            async with asyncio.timeout(LEARN_WITHIN_S):
-                self._heard(await ask_stop(self._console.bus, robot))
-        except (Refusal, LinkError, TimeoutError) as error:  # a robot of another make may know no such stop
-            log.info("%s did not say whether it is stopped: %s", robot, error)
+        """Hear of this robot from now on, and of no other; return when it is known how it is, or soon.
+
+        When: as early as it is known which robot it will be, so that nobody waits for the answer when it is granted.
+        """
+        if self._listening is None or robot != self._robot:
+            self.close()
+            self._robot, self._known = robot, asyncio.Event()
+            self._listening = watch_stops(self._console.bus, self._heard, robot)
+            await self._ask(robot, self._known)
+        await self._known.wait()
 
     def close(self) -> None:
         """Hear of none."""
         if self._listening is not None:
             self._listening.close()
             self._listening = None
+
+    async def _ask(self, robot: str, known: asyncio.Event) -> None:
+        try:
+            async with asyncio.timeout(LEARN_WITHIN_S):
+                self._heard(await ask_stop(self._console.bus, robot))
+        except (Refusal, LinkError, TimeoutError) as error:  # a robot of another make may know no such stop
+            log.info("%s did not say whether it is stopped: %s", robot, error)
+        finally:
+            known.set()

@@ -173,6 +173,9 @@ class Teleoperation(Observer[TeleoperationParameters]):
         arc, self._claimed, self._is_asking = self._arc, claim, True
         assert arc is not None  # noqa: S101  what rests is there
         self._controls.connect(arc)
+        self._ear.close()  # what it told the last ARC is news to this one
+        if wished.robot:
+            self.start_task(self._ear.listen(wished.robot), "stop")
         if self._see is not None:
             self._frames = arc.frames(self._saw)
         self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None

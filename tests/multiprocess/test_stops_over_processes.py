@@ -16,7 +16,7 @@ from backbone.bus.interface import Bus
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
 from resource_pool.messages import AskPose, Pose
 from ui_console.console_events import ConsentSought, Granted
-from ui_console.driving import FIRST_HOLD_S, Drive
+from ui_console.driving import KEYS_LET_GO_S, Drive
 from ui_console.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
@@ -54,7 +54,7 @@ async def let_go(key: asyncio.Task[None]) -> None:
     key.cancel()
     with suppress(asyncio.CancelledError):
         await key
-    await asyncio.sleep(FIRST_HOLD_S + 2 * REPEAT_S)
+    await asyncio.sleep(KEYS_LET_GO_S + 2 * REPEAT_S)
 
 
 def component(console: Console) -> Teleoperation:

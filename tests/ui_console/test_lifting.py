@@ -24,7 +24,7 @@ from resource_pool.stop_latch import StopLatch
 from ui_console.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
 from ui_console.console_model import ConsoleModel
 from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, decide_lift, is_agreed, lift_line
-from ui_console.observer import Observer
+from ui_console.observer import Observer, nobody_here
 
 PEOPLE = ["anna", "ben", "cleo"]
 
@@ -244,6 +244,26 @@ def test_an_author_who_sits_at_another_screen_by_now_is_asked_there(
             there.console.decide(False, "not yet")
             assert not await lifting
             assert on.people["ben"].asked() == "anna keeps scout1 stopped: not yet"
+
+    stage(scene)
+
+
+def test_a_program_that_watches_under_an_authors_name_is_not_that_author(
+    stage: Callable[[Scene], None], beside: Any
+) -> None:
+    async def scene(on: Stage) -> None:
+        anna = on.people["anna"]
+        await anna.console.stop_robot("scout1")
+        anna.console.end("goes home")
+        launch = on.launch(Subsystem.UI_CONSOLE, "logger", "console")
+        bus = on.network.join(launch.address, on.clock)
+        logger: Observer[Any] = Observer(
+            launch, bus, on.clock, show=lambda event: None, user="anna", answers_of=nobody_here
+        )
+        async with beside(logger):
+            began_s = on.clock.now_s()
+            assert await on.lift("ben")
+            assert on.clock.now_s() - began_s < 1.0
 
     stage(scene)
 
