@@ -190,7 +190,7 @@ class AlarmBook:
             self._forget_one()
 
     def _forget_one(self) -> None:
-        """Forget the oldest of those that matter least: seen, or over before anybody looked; then what is not so now."""
+        """Forget the oldest of those that matter least: seen, or over before anybody looked; then what is over."""
 
         def weight(key: str) -> tuple[bool, bool]:
             alarm = self._alarms[key]
