@@ -18,6 +18,7 @@ from backbone.health import HealthWord
 from backbone.mission_picture import MissionPicture
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.messages import RcView, RequestState, RequestView, Schedule
+from backbone.spoken import counted
 
 _STATE_STYLE = {
     RequestState.RUNNING: "bold green",
@@ -98,7 +99,7 @@ def _how_many(picture: MissionPicture) -> str:
     states = [component.state for component in picture.components.values()]
     ready = states.count(LifeState.READY)
     restarts = sum(picture.restarts(component) for component in picture.components.values())
-    return f"{ready} of {len(states)} components ready" + (f", {restarts} restarts" if restarts else "")
+    return f"{ready} of {len(states)} components ready" + (f", {counted(restarts, 'restart')}" if restarts else "")
 
 
 def _panel(title: str, lines: list[Text]) -> Panel:

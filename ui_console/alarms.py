@@ -190,13 +190,14 @@ class AlarmBook:
             self._forget_one()
 
     def _forget_one(self) -> None:
-        """Forget the oldest of those that matter least: no longer shown, then seen, then over."""
-        oldest_first = list(self._alarms.items())
-        victim, alarm = min(
-            oldest_first,
-            key=lambda item: (self._is_shown(item[1]), not item[1].acknowledged_by, item[1].is_active),
-        )
-        del self._alarms[victim]
+        """Forget the oldest of those that matter least: seen, or over before anybody looked; then what is over."""
+
+        def weight(key: str) -> tuple[bool, bool]:
+            alarm = self._alarms[key]
+            is_unseen = not alarm.acknowledged_by and (alarm.while_away or not alarm.is_over)
+            return is_unseen, alarm.is_active
+
+        alarm = self._alarms.pop(min(self._alarms, key=weight))  # of equals the first, which is the oldest
         if self._is_shown(alarm) and not alarm.acknowledged_by:
             self.forgotten += 1
 

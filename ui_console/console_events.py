@@ -98,12 +98,13 @@ class CommandApplied:
 
 @dataclass(frozen=True, slots=True)
 class CommandRefused:
-    """Somebody said no."""
+    """Somebody said no; with ``ends_claim`` to the claim itself, so that nothing is waited for any more."""
 
     at_s: float
     code: str
     detail: str
     remedy: str
+    ends_claim: bool = False
 
 
 @dataclass(frozen=True, slots=True)

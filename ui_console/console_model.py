@@ -113,6 +113,7 @@ class ConsoleModel:
         self._went: _Went | None = None
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
+        self._refused = ""  # why the last claim was refused, if it was
         self._blind = ""  # robot that is held without pictures to drive by
         self.alarms = alarms or AlarmBook(beside=self.team.alarms)
         """What concerns this console alone."""
@@ -282,6 +283,8 @@ class ConsoleModel:
             slice_end = _slice_end(self.held.until_s, now_s)
             return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
         if self.asked is None:
+            if self._refused:
+                return f"you hold no robot: {self._refused}"
             there = ", the one ".join(self.other_screens())
             return f"watching; you hold no robot{f' here; your other screen {there}' if there else ''}"
         wanted = self.robot or "a robot"
@@ -307,6 +310,7 @@ class ConsoleModel:
                 self._must_let_go = is_needed
             case Asked(robot=robot):
                 self._asked_whom = self._went = None
+                self._refused = ""
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
             case Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
@@ -324,7 +328,9 @@ class ConsoleModel:
             case CommandApplied():
                 self.applied = event
                 alarms.mended((AlarmKind.NO_ANSWER,))
-            case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy):
+            case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy, ends_claim=ends_claim):
+                if ends_claim:
+                    self.asked, self._refused = None, detail
                 if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
                         AlarmKind.REFUSED, self.robot, f"refused: {detail}", at_s, remedy, f"refused:{code}"

@@ -449,7 +449,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._decided.set()
 
     def _tell_refusal(self, refusal: Refusal) -> None:
-        self.show(CommandRefused(self.clock.now_s(), code_of(refusal), refusal.detail, refusal.remedy))
+        now_s, code = self.clock.now_s(), code_of(refusal)
+        self.show(CommandRefused(now_s, code, refusal.detail, refusal.remedy, ends_claim=True))
 
     def _saw(self, frame: Frame) -> None:
         if self._see is not None:

@@ -19,6 +19,7 @@ from backbone.dependency_database.messages import (
     Resource,
     Resources,
 )
+from backbone.spoken import counted
 from backbone.wire import Envelope, Message, UnknownMessage
 
 
@@ -73,5 +74,5 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
             self.story.note(asker, f"found no hardware: {refusal.detail}")
             raise
         self._found += 1
-        self.story.note(asker, f"found {len(sets)} sets of {', '.join(wanted.roles)}")
+        self.story.note(asker, f"found {counted(len(sets), 'set')} of {', '.join(wanted.roles)}")
         return sets

@@ -13,6 +13,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.keys import Conversation
+from backbone.spoken import counted
 from backbone.wire import Envelope
 from mission_control.behavior import Behavior, BehaviorParameters
 from mission_control.behavior_tree import Decision, walk
@@ -66,9 +67,10 @@ class Surveillance(Behavior[SurveillanceParameters]):
 
     def _say(self) -> None:
         by_robot = ", ".join(f"{robot} {count}" for robot, count in sorted(self._events.items()))
+        watchers = counted(len(self.parameters.children), "watcher")
         last = f", last at {self._last.at_s:.1f} s through {self._last.robot}" if self._last else ""
         self.report(
-            f"{len(self.parameters.children)} watchers, {self._events.total()} events{last} ({by_robot})"
+            f"{watchers}, {counted(self._events.total(), 'event')}{last} ({by_robot})"
             if by_robot
-            else f"{len(self.parameters.children)} watchers, no event yet"
+            else f"{watchers}, no event yet"
         )

@@ -17,6 +17,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.spoken import counted
 from mission_control.behavior import Behavior, BehaviorParameters, suspended_because
 from mission_control.behavior_tree import ArcNeed
 from mission_control.behaviors.run_times import RunTimes, useful_run_times
@@ -148,7 +149,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         return {"robot": self._robot, "events": self._events, "last_event_s": self._last_told_s}
 
     def _seen(self) -> str:
-        return f"{self._detector.frames} frames, {self._events} events"
+        return f"{counted(self._detector.frames, 'frame')}, {counted(self._events, 'event')}"
 
     def _say(self) -> None:
         self.report(f"watching through {self._robot or 'no robot yet'}: {self._seen()}")

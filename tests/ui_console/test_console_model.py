@@ -30,6 +30,7 @@ from backbone.rc_manager.messages import RequestState, Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.console_events import (
     ActHeard,
+    Asked,
     Attention,
     CommandApplied,
     CommandRefused,
@@ -435,3 +436,12 @@ def test_what_a_component_says_of_itself_counts_also_if_its_readiness_was_dated_
     shown.apply(ComponentHeard(7.0, draining))
     shown.apply(ComponentHeard(7.1, appeared))
     assert [row.state for row in shown.team.components()] == ["draining"]
+
+
+def test_a_claim_that_was_refused_waits_for_nothing_and_says_why_until_the_next() -> None:
+    detail = "no scout is named 'scuot1' (did you mean 'scout1'?)"
+    shown = model(Asked(1.0, "scuot1", "capture", 100), CommandRefused(1.5, "creator.start_failed", detail, "", True))
+    assert shown.status_line(100.0) == f"you hold no robot: {detail}"
+    assert not shown.own(100.0).is_asked
+    shown.apply(ASK)
+    assert shown.status_line(101.0) == "waiting for scout1"

@@ -16,6 +16,7 @@ from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
 from backbone.errors import Refusal
+from backbone.spoken import counted
 from ui_console.web.door import (
     MAX_MESSAGE_BYTES,
     Beat,
@@ -168,7 +169,7 @@ class Reception(Generic[GuestT, IntentT]):
         if welcome is None:
             return
         if len(self._house.guests) >= MOST_OPERATORS:
-            line = f"found {len(self._house.guests)} guests there, which is the most"
+            line = f"found {counted(len(self._house.guests), 'guest')} there, which is the most"
             await self._refuse(connection, welcome.user, Offence(Fault.CROWD, line, "Close some pages."))
             return
         porch.admit(connection)

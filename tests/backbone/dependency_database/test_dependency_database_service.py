@@ -50,7 +50,7 @@ def test_hardware_survives_the_way_through_a_launch_order(local_mission: Any, be
             assert (counted.values["searches_found"], counted.values["searches_refused"]) == (1.0, 1.0)
             story = await bus.ask(ADDRESS, AskStory("ui_console/asker"), Story, within_s=1)
             assert [event.what for event in story.events] == [
-                "found 1 sets of scout, command_radio",
+                "found 1 set of scout, command_radio",
                 "found no hardware: no 'framegrabber' exists",
             ]
 

@@ -85,7 +85,7 @@ def test_a_watcher_tells_motion_with_time_robot_and_region_and_nothing_else(plac
         assert seen[0].source == "mission_control/watch-scout1"
         assert seen[0].cause.startswith("resource_pool/watch-scout1-capture#")
         assert "motion seen through scout1" in told[0].body.what
-        assert watch.feedback.endswith("90 frames, 1 events")
+        assert watch.feedback.endswith("90 frames, 1 event")
 
     placer_world(scene)
 

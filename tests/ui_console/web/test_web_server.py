@@ -264,10 +264,10 @@ async def test_only_so_many_operators_are_served_and_the_next_is_told_so(
     async with stage.browser() as anna, stage.connection() as ben:
         monkeypatch.setattr(reception, "MOST_OPERATORS", 1)
         await ben.send(json.dumps({"do": "hello", "token": LOW}))
-        with pytest.raises(ConnectionClosed, match="found 1 guests there"):
+        with pytest.raises(ConnectionClosed, match="found 1 guest there"):
             async with asyncio.timeout(WITHIN_S):
                 await ben.recv()
-        await anna.wait(lambda: anna.has_alarm("ben found 1 guests there"), "alarm")
+        await anna.wait(lambda: anna.has_alarm("ben found 1 guest there"), "alarm")
 
 
 async def test_an_address_that_cannot_be_had_is_refused_with_a_remedy(stage: Stage) -> None:
