@@ -418,7 +418,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         """The robot that is held was stopped or may move again: whoever drives it has to know that first."""
         if self._arc is not None and self._arc.heard_stop(state):
             self.require_let_go()
-        if not self._watches:
+        if not self._watches and state.number > 0:  # 0: it never was stopped
             self.show(StopHeard(self.clock.now_s(), state))
 
     def _claim_parameters(self) -> dict[str, Any]:

@@ -193,12 +193,16 @@ async def test_a_neighbor_that_falls_and_rises_at_once_is_seen_to_do_both(pool: 
 
 
 async def test_a_name_that_moves_to_another_process_is_followed(pool: Pool) -> None:
-    heard = Heard()
+    """Once the hub knows of the end of the first: two links say it in no order to each other."""
+    heard, known_elsewhere = Heard(), Heard()
     token = pool.radio.declare_alive(RADIO)
     pool.scout.watch_alive(RADIO, heard)
+    pool.stranger.watch_alive(RADIO, known_elsewhere)
     await heard.until(lambda all_: len(all_) == 1)
+    await known_elsewhere.until(lambda all_: len(all_) == 1)
     token.close()
     await heard.until(lambda all_: len(all_) == 2)
+    await known_elsewhere.until(lambda all_: len(all_) == 2)
     elsewhere = pool.stranger.declare_alive(RADIO)
     await heard.until(lambda all_: len(all_) == 3)
     elsewhere.close()
