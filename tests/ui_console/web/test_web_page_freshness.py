@@ -91,6 +91,7 @@ async def test_a_server_that_does_not_hear_the_mission_has_its_pages_say_so(
         await page.wait_for_selector("body:not(.is-blind)")
 
 
+@pytest.mark.slow  # the browser takes a minute to put a page to sleep
 async def test_a_page_that_slept_drives_nothing_when_it_wakes_and_offers_the_lost_robot_with_one_touch(
     stage: Stage,
 ) -> None:
