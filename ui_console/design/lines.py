@@ -13,9 +13,10 @@ from backbone.dry_run import DryRun
 from backbone.dry_run_screen import KEYS, NO_KEY, bars
 from backbone.mission.edit import Node, Path
 from backbone.mission.reader import Fault
+from backbone.spoken import counted
 from ui_console.design.draft import Draft
 from ui_console.design.properties import Property
-from ui_console.terminal.lines import Row, plural
+from ui_console.terminal.lines import Row
 
 NAME_COLUMNS = 22
 TAG_STYLES = {"behavior": "bold green", "arc": "cyan", "wish": "cyan", "resource": "bold yellow", "type": "magenta"}
@@ -111,7 +112,7 @@ def rehearsal_rows(dry: DryRun) -> list[Row]:
             reason = one.refused or "nothing of what it needs is ever left over"
             rows.append(Row(f"never {one.arc}", one.arc, Text(f"{one.arc} never runs: {reason}", style="bold red")))
         else:
-            told = f"{plural(one.turns, 'turn')}, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
+            told = f"{counted(one.turns, 'turn')}, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
             rows.append(Row(f"turns {one.arc}", one.arc, Text(f"{one.arc}: {told}")))
     homeless = [placed for placed in dry.placed if not placed.host]
     rows += [

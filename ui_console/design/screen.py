@@ -21,6 +21,7 @@ from textual.widgets import Footer, Static
 
 from backbone.errors import Refusal
 from backbone.mission.edit import Node, Path
+from backbone.spoken import counted
 from ui_console.design.catalogue import ClassFacts, TypeEntry, description, entries, stock_classes
 from ui_console.design.commands import Command, Move, Remove, SetValue
 from ui_console.design.dialogs import CSS as DIALOG_CSS
@@ -33,7 +34,7 @@ from ui_console.design.offers import Asked, Offer, offers
 from ui_console.design.properties import Property, properties
 from ui_console.terminal.dialogs import Reading
 from ui_console.terminal.ending import EndingApp
-from ui_console.terminal.lines import Row, plural
+from ui_console.terminal.lines import Row
 from ui_console.terminal.widgets import Panel
 
 A = TypeVar("A")
@@ -186,7 +187,7 @@ class DesignApp(EndingApp):
         count = len(draft.problems)
         state = Text(f" {draft.source}", style="bold")
         state.append("  changed" if draft.is_changed else "  saved", "yellow" if draft.is_changed else "green")
-        state.append(f"  {plural(count, 'problem')}" if count else "  fine", "bold red" if count else "green")
+        state.append(f"  {counted(count, 'problem')}" if count else "  fine", "bold red" if count else "green")
         return state.append(f"  line {self.node.line}", "dim")
 
     # ------------------------------------------------------------------ moving about
@@ -428,7 +429,7 @@ class DesignApp(EndingApp):
             self.notify(str(refusal), title="not saved", severity="error", markup=False)
             return
         count = len(self.draft.problems)
-        told = f"saved, with {plural(count, 'problem')}" if count else "saved; check says that it is fine"
+        told = f"saved, with {counted(count, 'problem')}" if count else "saved; check says that it is fine"
         self.notify(told, severity="warning" if count else "information", markup=False)
         self.redraw()
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
+from backbone.spoken import counted
 from ui_console.terminal.keys import Profile, has
-from ui_console.terminal.lines import ALARM_STYLES, plural
+from ui_console.terminal.lines import ALARM_STYLES
 from ui_console.views import ConsoleView, HealthView, LostView, VideoView
 
 BETWEEN = " · "
@@ -82,7 +83,7 @@ def _facts(view: ConsoleView, profile: Profile, speed_rad_s: float) -> Iterator[
     unseen = [alarm for alarm in view.alarms if not alarm.acknowledged_by]
     if unseen:
         away = sum(alarm.while_away for alarm in unseen)
-        count = plural(len(unseen), "alarm")
+        count = counted(len(unseen), "alarm")
         told = f"{count}{f', {away} while you were away' if away else ''}"
         yield _Fact(7, *_texts(told, count, ALARM_STYLES[unseen[0].severity]))
     if own.taken_because and not own.is_held:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from rich.console import Console
 from rich.text import Text
 
+from backbone.spoken import counted
 from ui_console.views import (
     AlarmView,
     Certainty,
@@ -66,16 +67,6 @@ class Row:
     key: str
     subject: str
     text: Text = field(compare=False)
-
-
-def plural(count: int, word: str) -> str:
-    """Return how many of them there are.
-
-    Example:
-        >>> plural(1, "alarm"), plural(2, "alarm")
-        ('1 alarm', '2 alarms')
-    """
-    return f"{count} {word}{'' if count == 1 else 's'}"
 
 
 # ---------------------------------------------------------------------- rows on lines
@@ -281,8 +272,8 @@ def _host(host: HostView) -> Text:
     return Text.assemble(
         "host ",
         (host.host, "bold"),
-        (f" {host.cpu:.0%} of {plural(host.cores, 'core')}", style),
-        f", memory {host.memory:.0%}, {plural(host.components, 'component')}",
+        (f" {host.cpu:.0%} of {counted(host.cores, 'core')}", style),
+        f", memory {host.memory:.0%}, {counted(host.components, 'component')}",
         (f"  {host.age_s:.0f} s ago", "dim"),
     )
 

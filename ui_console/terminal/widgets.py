@@ -16,9 +16,10 @@ from textual.timer import Timer
 from textual.widget import Widget
 from textual.widgets import Static
 
+from backbone.spoken import counted
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.terminal.keys import Hint, key_lines
-from ui_console.terminal.lines import Row, laid_out, plural
+from ui_console.terminal.lines import Row, laid_out
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
 from ui_console.terminal.video import fit, row_segments, shrink
 
@@ -141,7 +142,7 @@ class Panel(Static):
                 offset = min(len(lines), max(0, len(lines) + len(its_lines) - room))
             lines += its_lines
         is_cut = len(lines) > room
-        self.border_subtitle = f"{plural(len(rows), 'row')}: pgup, pgdn" if is_cut else ""
+        self.border_subtitle = f"{counted(len(rows), 'row')}: pgup, pgdn" if is_cut else ""
         self._put(Text("\n").join(lines[offset:]) if rows else Text(self._nothing, style="dim"))
 
     def _put(self, drawn: Text) -> None:
