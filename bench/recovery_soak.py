@@ -1,8 +1,9 @@
 """Many faults, one after the other, in one mission: what it is like at the end, and what has grown.
 
 What a process uses is taken when each has been ended once and all have warmed up, and again at the end: a framegrabber
-fills its stores for three minutes, a nameserver its own for five, and a second life is not as the first: it is not forked from a fresh zygote, it
-watches what it found instead of what it started, and its link, once lost and regained, keeps three descriptors more.
+fills its stores for three minutes, a nameserver its own for five. A second life is not as the first: it is not forked
+from a fresh zygote, it watches what it found instead of what it started, and its link, once lost and regained, keeps
+three descriptors more.
 """
 
 from __future__ import annotations
