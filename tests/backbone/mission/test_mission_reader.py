@@ -1,5 +1,6 @@
 """A mission file is read whole or refused whole, with every fault at its place."""
 
+import json
 import math
 import re
 from pathlib import Path
@@ -8,6 +9,7 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from record_messages import MESSAGES, messages
 
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
@@ -79,6 +81,11 @@ def test_an_invalid_mission_tells_every_fault_one_a_line() -> None:
     lines = str(caught.value).splitlines()
     assert len(lines) == len(caught.value.faults) == 8
     assert lines[1] == f"{path}:19:28: no host is named 'bse' (did you mean 'base'?) (There is: base)"
+
+
+def test_every_message_is_one_that_was_read_and_found_good() -> None:
+    """A message that changes shows in ``messages.json``, once ``record_messages.py`` has run."""
+    assert messages() == json.loads(MESSAGES.read_text())
 
 
 # ---------------------------------------------------------------------- files that are no mission at all
@@ -158,7 +165,7 @@ def test_columns_count_characters_not_bytes(tmp_path: Path) -> None:
 
 
 def test_an_attribute_is_found_though_another_value_looks_like_it(tmp_path: Path) -> None:
-    text = changed(('<parameter name="threshold" value="12"/>', "<parameter value=' name=\"x\" ' name='no name'/>"))
+    text = changed(('<parameter name="view_s" value="12"/>', "<parameter value=' name=\"x\" ' name='no name'/>"))
     [fault] = faults_in(tmp_path, text)
     assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("name='no name'")
 
@@ -225,8 +232,8 @@ def test_a_simulated_resource_is_told_its_world_a_real_one_is_not(tmp_path: Path
     ],
 )
 def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(tmp_path: Path, written: str, value: object) -> None:
-    description = read_text(tmp_path, changed(('name="threshold" value="12"', f'name="threshold" value="{written}"')))
-    read = description.behaviors[0].parameters["threshold"]
+    description = read_text(tmp_path, changed(('name="view_s" value="12"', f'name="view_s" value="{written}"')))
+    read = description.behaviors[0].parameters["view_s"]
     assert (read, type(read)) == (value, type(value))
 
 
@@ -283,7 +290,7 @@ def test_classes_on_other_machines_are_not_looked_for_here(tmp_path: Path) -> No
         ('address="127.0.0.1"', 'address="192.0.2.1"'),
         ("  </hosts>", '    <host name="attic" address="192.0.2.7"/>\n  </hosts>'),
         ("<core>", '<core><service type="creator" host="attic"/>'),
-        ('name="watch" class="backbone.component.component:Component"', 'name="watch" class="only_there.watch:Watch"'),
+        ('class="mission_control.behaviors.watch_for_motion:WatchForMotion"', 'class="only_there.watch:Watch"'),
     )
     assert read_text(tmp_path, text).types[-1].class_path == "only_there.watch:Watch"
 
