@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
-from backbone.mission.class_paths import class_path_fault
-from backbone.mission.core_checks import check_service_parameters
+from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.model import is_loopback
+from backbone.mission.parameter_checks import check_class_parameters, check_service_parameters, check_type_class
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, told, told_names
 from backbone.mission.tables import (
@@ -43,9 +44,15 @@ FIRST_NETWORK_ID, LAST_NETWORK_ID = 1, 254  # as the radio's packets carry it: o
 SET_BY_RESOURCE = ("driver", "sharable", "capacity", "links")  # Resource.rc_parameters
 
 
-def check(root: Element, report: Report) -> None:
-    """Report everything that does not fit."""
-    tables = Tables.of(root)
+def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
+    """Report everything that does not fit.
+
+    Args:
+        root: The mission.
+        classes: Class path → what is known of the class; parameters of other classes are not judged.
+        report: Where faults go.
+    """
+    tables = Tables.of(root, classes)
     _check_hosts(tables, report)
     _check_core(tables, report)
     _check_types(tables, report)
@@ -158,8 +165,8 @@ def _check_types(tables: Tables, report: Report) -> None:
         _check_needs(component_type, tables, report)
         _check_type_tags(component_type, tables, report)
         class_path = component_type.text("class")
-        if only_here and re.fullmatch(r"\w+(\.\w+)*:\w+", class_path):
-            _check_class(component_type, class_path, report)
+        if only_here and CLASS_PATH.fullmatch(class_path):
+            _check_class(component_type, class_path, tables.classes.get(class_path), report)
 
 
 def _check_core_type(component_type: Element, report: Report) -> None:
@@ -226,9 +233,10 @@ def _check_type_tags(component_type: Element, tables: Tables, report: Report) ->
         )
 
 
-def _check_class(component_type: Element, class_path: str, report: Report) -> None:
+def _check_class(component_type: Element, class_path: str, facts: ClassFacts | None, report: Report) -> None:
     wrong = class_path_fault(class_path)
     if wrong is None:
+        check_type_class(component_type, facts, report)
         return
     message, there = wrong
     name = message.rpartition(" ")[2] if message.startswith("no module") else class_path.rpartition(":")[2]
@@ -264,6 +272,7 @@ def _check_resources(tables: Tables, report: Report) -> None:
             is_known(resource, "type", "type of resource", tables.resource_types(), report)
         check_host(resource, tables, report)
         check_parameters(resource, SET_BY_RESOURCE, report)
+        check_class_parameters(resource, SET_BY_RESOURCE, tables, report)
         _check_uses(resource, tables, report)
         _check_driver(resource, tables, report)
         _check_network_id(resource, ids, report)

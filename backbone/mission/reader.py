@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from backbone.component_database.messages import ComponentType, Multiplicity
 from backbone.dependency_database.messages import Resource
 from backbone.mission.checks import check
+from backbone.mission.class_facts import ClassFacts, shipped_classes
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault
+from backbone.mission.class_probe import ask_classes
 from backbone.mission.document import Element, parse, read_bytes
 from backbone.mission.model import HUB_PORT, ArcWish, Behavior, Component, CoreService, Host, MissionDescription
 from backbone.mission.report import Fault, MissionInvalid, Report
@@ -21,7 +25,9 @@ __all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes", "sch
 
 
 def read_mission(path: str | Path) -> MissionDescription:
-    """Return the mission the file describes. Nothing is started, nothing of what it names is imported.
+    """Return the mission the file describes. No component is started.
+
+    The classes of the file's own types are asked for their parameters in a process of its own, which imports them.
 
     Args:
         path: The mission file; faults name it as it is given here.
@@ -36,12 +42,13 @@ def read_mission(path: str | Path) -> MissionDescription:
     return read_mission_bytes(data, str(path))
 
 
-def read_mission_bytes(data: bytes, source: str) -> MissionDescription:
+def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFacts] | None = None) -> MissionDescription:
     """Return the mission these bytes describe, as ``read_mission`` does of a file that holds them.
 
     Args:
         data: What the file holds or would hold.
         source: Its path; faults name it, and files that the mission names are looked for beside it.
+        classes: What is known of classes besides the project's own; None: those that the mission names are asked.
 
     Raises:
         MissionInvalid: With every fault, in the order of the file.
@@ -49,11 +56,19 @@ def read_mission_bytes(data: bytes, source: str) -> MissionDescription:
     report = Report(source)
     root = parse(data, report)
     if root is not None and apply_schema(root, report):
-        check(root, report)
+        check(root, known_classes(root) if classes is None else {**shipped_classes(), **classes}, report)
     faults = report.faults()
     if faults or root is None:
         raise MissionInvalid(faults)
     return _describe(root, source)
+
+
+def known_classes(root: Element) -> dict[str, ClassFacts]:
+    """Return what the classes of a mission's types say of themselves; those of its own are imported elsewhere."""
+    known = shipped_classes()
+    paths = {one.text("class") for one in section(root, "types")}
+    asked = [path for path in sorted(paths - known.keys()) if CLASS_PATH.fullmatch(path) and not class_path_fault(path)]
+    return {**known, **ask_classes(asked)}
 
 
 def _describe(root: Element, source: str) -> MissionDescription:

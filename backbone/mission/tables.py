@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 
 import msgspec
 
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told, told_names
 from backbone.naming import Subsystem, is_legal
@@ -31,6 +32,7 @@ class Tables:
         by_type: Type → all resources of it, in the order of the file.
         world: The simulated world, if there is one.
         behaviors: Every node of the behavior tree, parents before their children.
+        classes: Class path → what is known of the class.
     """
 
     root: Element
@@ -40,9 +42,10 @@ class Tables:
     by_type: dict[str, list[Element]]
     world: Element | None
     behaviors: list[Element]
+    classes: Mapping[str, ClassFacts] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, root: Element) -> Tables:
+    def of(cls, root: Element, classes: Mapping[str, ClassFacts] | None = None) -> Tables:
         """Return the tables of a mission."""
         behaviors = root.first("behaviors")
         return cls(
@@ -53,7 +56,13 @@ class Tables:
             _by_type(section(root, "resources")),
             root.first("world"),
             [] if behaviors is None else [element for element in behaviors if element.tag == "behavior"],
+            classes or {},
         )
+
+    def facts_of(self, kind: str) -> ClassFacts | None:
+        """Return what is known of the class of this type; None: nothing."""
+        found = self.classes.get(self.types[kind].text("class")) if kind in self.types else None
+        return None if found is None or found.failure else found
 
     def needs(self, kind: str) -> list[str]:
         """Return the kinds of resource an ARC of this kind needs; none if it is no ARC."""

@@ -12,8 +12,7 @@ from enum import StrEnum
 from functools import lru_cache
 from importlib import resources
 
-import msgspec
-
+from backbone.mission.class_facts import ClassFacts as ClassFacts  # noqa: PLC0414  # the terminal's designer asks here
 from backbone.mission.edit import Node, outline
 from backbone.naming import Subsystem
 
@@ -27,44 +26,6 @@ class Role(StrEnum):
     WORLD = "world"
     SERVICE = "service"
     CONSOLE = "console"
-
-
-class ParameterFacts(msgspec.Struct, frozen=True):
-    """A parameter of a class.
-
-    Attributes:
-        name: Its name.
-        type: What it takes: number, integer, string, boolean, or JSON's word for it.
-        default: As JSON; empty: it must be given.
-        span: Its legal range, as ``above 0, at most 1``; empty: any.
-        doc: What it means.
-    """
-
-    name: str
-    type: str
-    default: str
-    span: str
-    doc: str
-
-    @property
-    def told(self) -> str:
-        """Type, default and range on one line."""
-        given = f"default {self.default}" if self.default else "required"
-        return ", ".join(part for part in (self.type, self.span, given) if part)
-
-
-class ClassFacts(msgspec.Struct, frozen=True):
-    """What a class says of itself.
-
-    Attributes:
-        doc: Its documentation.
-        parameters: What it can be given in a mission file.
-        failure: Why nothing can be said; empty: all is said.
-    """
-
-    doc: str = ""
-    parameters: tuple[ParameterFacts, ...] = ()
-    failure: str = ""
 
 
 @dataclass(frozen=True, slots=True)

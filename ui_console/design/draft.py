@@ -91,7 +91,7 @@ class Draft:
     @cached_property
     def _read(self) -> MissionDescription | tuple[Fault, ...]:
         try:
-            return read_mission_bytes(self.text, self.source)
+            return read_mission_bytes(self.text, self.source, {})  # to ask a class runs it: design only draws
         except MissionInvalid as invalid:
             return invalid.faults
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Node, Path
 from backbone.mission.schema import enumerations, vocabulary
-from ui_console.design.catalogue import ClassFacts, Role, entries
+from ui_console.design.catalogue import Role, entries
 from ui_console.design.commands import Command, Rename, SetParameter, SetValue
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")

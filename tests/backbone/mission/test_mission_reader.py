@@ -15,6 +15,7 @@ from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
 from backbone.mission.model import HUB_PORT, MissionDescription
 from backbone.mission.reader import Fault, MissionInvalid, read_mission
+from backbone.mission.tables import parameter_value
 from backbone.naming import MAX_NAME_LENGTH
 from scout_model.description import WorldDescription
 
@@ -231,9 +232,8 @@ def test_a_simulated_resource_is_told_its_world_a_real_one_is_not(tmp_path: Path
         ("", ""),
     ],
 )
-def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(tmp_path: Path, written: str, value: object) -> None:
-    description = read_text(tmp_path, changed(('name="view_s" value="12"', f'name="view_s" value="{written}"')))
-    read = description.behaviors[0].parameters["view_s"]
+def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(written: str, value: object) -> None:
+    read = parameter_value(written)
     assert (read, type(read)) == (value, type(value))
 
 

@@ -17,7 +17,7 @@ from msgspec import DecodeError
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from ui_console.design.catalogue import ClassFacts
+from backbone.mission.class_facts import ClassFacts
 from ui_console.design.draft import Draft
 from ui_console.design.keeping import path_of_draft
 from ui_console.web.design_protocol import DesignIntent, Select, understand_designer
