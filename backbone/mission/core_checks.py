@@ -13,7 +13,7 @@ import msgspec
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told, told_names
 from backbone.mission.tables import CORE_SERVICES, check_unique, parameter_value
-from backbone.rc_manager.rules import LONGEST_S, SchedulingRules, values_of
+from backbone.scheduling.rules import LONGEST_S, SchedulingRules, values_of
 
 RULES: dict[str, type[msgspec.Struct]] = {"rc_manager": SchedulingRules}
 """Core service → what the file may set of its parameters."""
