@@ -33,13 +33,12 @@ from backbone.rc_manager.messages import (
     Connected,
     Disconnect,
     Disconnected,
-    Holder,
-    Lease,
     Leases,
     RcState,
     StaleEpoch,
     most_epoch,
 )
+from backbone.scheduling.requests import Holder, Lease
 from backbone.wire import Envelope, Message
 from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver, options_of_drivers
 from resource_pool.holds import Hold, HoldTable

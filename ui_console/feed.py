@@ -46,8 +46,9 @@ from backbone.nameserver.messages import (
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Leases, Schedule
+from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.reasons import reasons_for
+from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.console_events import (

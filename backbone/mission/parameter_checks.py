@@ -13,7 +13,7 @@ from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told, told_names
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, Tables, check_unique, parameter_value
-from backbone.rc_manager.rules import SchedulingRules
+from backbone.scheduling.rules import SchedulingRules
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # other names are the schema's to refuse
 SERVICE_PARAMETERS = {"rc_manager": parameters_of(SchedulingRules)}

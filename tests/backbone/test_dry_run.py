@@ -21,7 +21,7 @@ from backbone.dry_run_screen import bars, screen
 from backbone.mission.model import ArcWish, Behavior, CoreService, Host, MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import RcUse, Usage
+from backbone.scheduling.requests import RcUse, Usage
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 

@@ -14,7 +14,7 @@ from backbone.dry_run import DryRun
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Node, Path
 from backbone.mission.schema import vocabulary
-from backbone.rc_manager.rehearsal import Run
+from backbone.scheduling.rehearsal import Run
 from ui_console.design.catalogue import Role, TypeEntry, description, entries
 from ui_console.design.draft import Draft
 from ui_console.design.lines import summary

@@ -14,8 +14,8 @@ from backbone.mission.class_facts import parameters_of
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
-from backbone.rc_manager.rules import SchedulingRules, values_of
 from backbone.rc_manager.service import RcManagerParameters
+from backbone.scheduling.rules import SchedulingRules, values_of
 
 HERE = Path(__file__).parent
 SMALL = HERE / "small.xml"
