@@ -14,7 +14,7 @@ from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
-from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.model import is_loopback
@@ -57,9 +57,8 @@ def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> N
     _check_core(tables, report)
     _check_types(tables, report)
     check_world(tables, report)
-    if tables.types:  # the schema asks for types; without any, every word about kinds would repeat that
-        _check_resources(tables, report)
-        check_behaviors(tables, report)
+    _check_resources(tables, report)
+    check_behaviors(tables, report)
     _check_component_names(tables, report)
     check_processes(tables, _reserved(tables), report)
 
@@ -107,15 +106,10 @@ def _is_ip(address: str) -> bool:
 
 
 def _check_core(tables: Tables, report: Report) -> None:
-    core = tables.root.first("core")
-    if core is None:
-        return
     first: dict[tuple[str, str], Element] = {}
-    for service in core.all("service"):
+    for service in section(tables.root, "core"):
         name, where = service.text("type"), service.text("host")
         if is_known(service, "type", "core service", CORE_SERVICES, report):
-            if tables.types:
-                is_known(service, "type", "component type", tables.types, report)
             before = first.setdefault((name, where if name == CREATOR else ""), service)
             if before is not service:
                 report.fault(
@@ -132,21 +126,6 @@ def _check_core(tables: Tables, report: Report) -> None:
                 service.place_of("host"),
                 f"{name} on host {where}: other hosts than the first run only their creator",
                 f"Put it on {main}",
-            )
-    there = {name for name, _host in first}
-    for name in CORE_SERVICES:
-        if name not in there and name != CREATOR:
-            report.fault(
-                core.place,
-                f"core service {name} is missing",
-                f'Add <service type="{name}" host="{_main_host(tables)}"/>',
-            )
-    for host in tables.hosts.values():
-        if (CREATOR, host.text("name")) not in first:
-            report.fault(
-                host.place,
-                f"host {host.text('name')} has no creator",
-                f'Add <service type="{CREATOR}" host="{host.text("name")}"/> to <core>',
             )
 
 
@@ -165,7 +144,7 @@ def _check_types(tables: Tables, report: Report) -> None:
         _check_needs(component_type, tables, report)
         _check_type_tags(component_type, tables, report)
         class_path = component_type.text("class")
-        if only_here and CLASS_PATH.fullmatch(class_path):
+        if only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path):
             _check_class(component_type, class_path, tables.classes.get(class_path), report)
 
 

@@ -13,11 +13,12 @@ from backbone.mission.checks import check
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.class_probe import ask_classes
+from backbone.mission.completion import complete
 from backbone.mission.document import Element, parse, read_bytes
 from backbone.mission.model import HUB_PORT, ArcWish, Behavior, Component, CoreService, Host, MissionDescription
 from backbone.mission.report import Fault, MissionInvalid, Report
 from backbone.mission.room_files import room_text
-from backbone.mission.schema import apply_schema, schema_text, vocabulary
+from backbone.mission.schema import apply_schema, fill_defaults, schema_text, vocabulary
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, Tables, parameters, section
 from backbone.naming import Subsystem
 
@@ -56,6 +57,8 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     report = Report(source)
     root = parse(data, report)
     if root is not None and apply_schema(root, report):
+        complete(root)
+        fill_defaults(root)
         check(root, known_classes(root) if classes is None else {**shipped_classes(), **classes}, report)
     faults = report.faults()
     if faults or root is None:

@@ -104,7 +104,7 @@ def enumerations() -> dict[str, list[str]]:
 def apply_schema(root: Element, report: Report) -> bool:
     """Report all that breaks the schema; afterwards the tree holds known elements and attributes only.
 
-    What is left out and has a default is filled in. Values may still be missing or illegal.
+    Values may still be missing or illegal.
 
     Returns:
         False if this is no mission file at all, so that nothing further can be said.
@@ -120,8 +120,15 @@ def apply_schema(root: Element, report: Report) -> bool:
         root.attributes.pop(name, None)
     _repair(root, report)
     _validate(root, report)
-    _fill_defaults(root)
     return True
+
+
+def fill_defaults(root: Element) -> None:
+    """Give every attribute that is left out its default, if it has one."""
+    for element in root:
+        for name, rule in vocabulary()[element.tag].attributes.items():
+            if rule.default is not None and name not in element.attributes:
+                element.attributes[name] = Attribute(rule.default, element.place)
 
 
 # ---------------------------------------------------------------------- reading the schema
@@ -272,10 +279,3 @@ def _report_content(element: Element, text: str, report: Report) -> None:
         report.fault(element.place, f"<{element.tag}> {lacks} <{tag}>", f"<{tag}>: {documentation}")
     if not lacking:
         report.fault(element.place, text, "See docs/reference/mission-file.md.")
-
-
-def _fill_defaults(root: Element) -> None:
-    for element in root:
-        for name, rule in vocabulary()[element.tag].attributes.items():
-            if rule.default is not None and name not in element.attributes:
-                element.attributes[name] = Attribute(rule.default, element.place)

@@ -16,6 +16,7 @@ CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "depen
 """In their order of start. Source: RAM 2002, "Backbone"."""
 
 SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
+SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
 WORLD = "world"  # the parameter that tells it, and the world's own
 NETWORK_ID = "network_id"  # the parameter by which the radio tells robots apart
 
@@ -81,7 +82,7 @@ class Tables:
         return (
             self.belongs_to(name, Subsystem.RESOURCE_POOL)
             and not self.needs(name)
-            and (self.world is None or name != self.world.text("type"))
+            and name != (SIMULATED_WORLD if self.world is None else self.world.text("type"))
         )
 
     def resource_types(self) -> list[str]:

@@ -68,7 +68,7 @@ def check_world(tables: Tables, report: Report) -> None:
 
 def _check_type(world: Element, tables: Tables, report: Report) -> None:
     name = world.text("type")
-    if not tables.types or not is_known(world, "type", "component type", tables.types, report):
+    if not is_known(world, "type", "component type", tables.types, report):
         return
     if not tables.belongs_to(name, Subsystem.RESOURCE_POOL) or tables.needs(name):
         report.fault(

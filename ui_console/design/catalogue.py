@@ -14,6 +14,7 @@ from importlib import resources
 
 from backbone.mission.class_facts import ClassFacts as ClassFacts  # noqa: PLC0414  # the terminal's designer asks here
 from backbone.mission.edit import Node, outline
+from backbone.mission.shipped_types import shipped_text
 from backbone.naming import Subsystem
 
 
@@ -52,27 +53,27 @@ class TypeEntry:
 
 
 def stock() -> Node:
-    """Return the project's own list, as a mission without services and behaviors."""
-    return outline(_stock_text())
+    """Return the project's own types, as a mission that has nothing else."""
+    return outline(shipped_text())
 
 
 def new_text() -> bytes:
-    """Return the text a new mission begins with: one host, the core services and their types."""
+    """Return the text a new mission begins with: one host."""
     return resources.files("ui_console.design").joinpath("new.xml").read_bytes()
 
 
 def stock_type(name: str) -> Node | None:
     """Return the type of this name from the project's own list."""
-    return _by_name("types").get(name)
+    return _types().get(name)
 
 
 def stock_resource(kind: str) -> Node | None:
     """Return the first shape of a resource of this type."""
-    return next((one for one in _by_name("resources").values() if one.text("type") == kind), None)
+    return next((one for one in _shapes() if one.text("type") == kind), None)
 
 
 def entries(mission: Node) -> list[TypeEntry]:
-    """Return every type that is at hand: the file's own in its order, then those it could take from the project.
+    """Return every type that is at hand: the file's own in its order, then those of the project.
 
     Args:
         mission: The designed file.
@@ -82,7 +83,7 @@ def entries(mission: Node) -> list[TypeEntry]:
     names = {one.text("name") for one in declared}
     world = mission.first("world")
     world_type = (world.text("type") if world is not None else "") or "simulated_world"
-    known = _by_name("types")
+    known = _types()
     own = [_entry(one, world_type, is_stock=one.text("name") in known, is_declared=True) for one in declared]
     rest = [
         _entry(one, world_type, is_stock=True, is_declared=False) for name, one in known.items() if name not in names
@@ -92,7 +93,7 @@ def entries(mission: Node) -> list[TypeEntry]:
 
 def stock_classes() -> list[str]:
     """Return the class paths of the project's own types."""
-    return [one.text("class") for one in _by_name("types").values()]
+    return [one.text("class") for one in _types().values()]
 
 
 def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
@@ -123,14 +124,16 @@ def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
 
 
 @lru_cache(maxsize=1)
-def _stock_text() -> bytes:
-    return resources.files("ui_console.design").joinpath("stock.xml").read_bytes()
-
-
-@lru_cache(maxsize=2)
-def _by_name(section: str) -> dict[str, Node]:
-    found = stock().first(section)
+def _types() -> dict[str, Node]:
+    found = stock().first("types")
     return {} if found is None else {one.text("name"): one for one in found.children}
+
+
+@lru_cache(maxsize=1)
+def _shapes() -> tuple[Node, ...]:
+    shapes = outline(resources.files("ui_console.design").joinpath("stock.xml").read_bytes())
+    found = shapes.first("resources")
+    return () if found is None else found.children
 
 
 def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool) -> TypeEntry:

@@ -135,7 +135,9 @@ def _offers(mission: Node, node: Node) -> list[Offer]:
     match node.tag:
         case "mission":
             missing = [] if mission.first("world") is not None else [_world()]
-            return [*_behaviors(mission, node), *_resources(mission), *missing]
+            sections = [tag for tag in ("types", "core", "hosts") if mission.first(tag) is None]
+            bare = [offer for tag in sections for offer in _generic(mission, node, tag)]
+            return [*_behaviors(mission, node), *_resources(mission), *missing, *bare]
         case "behaviors":
             return _behaviors(mission, node)
         case "behavior":

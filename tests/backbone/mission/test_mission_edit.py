@@ -14,7 +14,7 @@ from backbone.mission.edit import EditRefused, NewElement, Node, add, move, outl
 from backbone.mission.reader import MissionInvalid
 from backbone.mission.schema import vocabulary
 
-MISSION = (FilePath(__file__).parents[3] / "mission.xml").read_bytes()
+MISSION = (FilePath(__file__).parent / "everything_declared.xml").read_bytes()
 SMALL = b"""<?xml version="1.0"?>
 <!-- before -->
 <mission name="m" priority="1">

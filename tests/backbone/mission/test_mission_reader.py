@@ -15,7 +15,8 @@ from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
 from backbone.mission.model import HUB_PORT, MissionDescription
 from backbone.mission.reader import Fault, MissionInvalid, read_mission
-from backbone.mission.tables import parameter_value
+from backbone.mission.shipped_types import shipped_text, shipped_types
+from backbone.mission.tables import CORE_SERVICES, parameter_value
 from backbone.naming import MAX_NAME_LENGTH
 from scout_model.description import WorldDescription
 
@@ -23,6 +24,7 @@ HERE = Path(__file__).parent
 SMALL = HERE / "small.xml"
 BROKEN = sorted((HERE / "broken").glob("*.xml"))
 MISSION_XML = HERE.parents[2] / "mission.xml"
+SMALLEST = HERE.parents[2] / "docs" / "examples" / "smallest.xml"
 
 
 def faults_of(path: Path | str) -> list[Fault]:
@@ -292,13 +294,58 @@ def test_classes_on_other_machines_are_not_looked_for_here(tmp_path: Path) -> No
         ("<core>", '<core><service type="creator" host="attic"/>'),
         ('class="mission_control.behaviors.watch_for_motion:WatchForMotion"', 'class="only_there.watch:Watch"'),
     )
-    assert read_text(tmp_path, text).types[-1].class_path == "only_there.watch:Watch"
+    assert "only_there.watch:Watch" in {kind.class_path for kind in read_text(tmp_path, text).types}
 
 
 def test_an_arc_whose_name_would_be_too_long_is_refused(tmp_path: Path) -> None:
     long = "w" * (MAX_NAME_LENGTH - len("-drive") + 1)
     [fault] = faults_in(tmp_path, changed(('name="watch2"', f'name="{long}"')))
     assert "too long" in fault.message
+
+
+# ---------------------------------------------------------------------- what need not be written
+MINIMAL = '<mission name="m" priority="1"/>'
+
+
+def test_a_mission_of_one_element_has_a_host_the_core_services_and_the_shipped_types(tmp_path: Path) -> None:
+    mission = read_text(tmp_path, MINIMAL)
+    assert [(host.name, host.address) for host in mission.hosts] == [("base", "127.0.0.1")]
+    assert [(service.type, service.host) for service in mission.core] == [(name, "base") for name in CORE_SERVICES]
+    assert [kind.name for kind in mission.types] == [kind.text("name") for kind in shipped_types()]
+    assert (mission.resources, mission.components, mission.behaviors) == ((), (), ())
+
+
+def test_old_files_that_declare_everything_say_the_same(tmp_path: Path) -> None:
+    services = "".join(f'<service type="{name}" host="base"/>' for name in CORE_SERVICES)
+    types = shipped_text().decode().partition("<types>")[2].partition("</types>")[0]
+    old = f'<mission name="m" priority="1"><core>{services}</core><types>{types}</types></mission>'
+    assert read_text(tmp_path, old) == read_text(tmp_path, MINIMAL)
+    declared, short = read_mission(HERE / "everything_declared.xml"), read_mission(MISSION_XML)
+    assert declared.model_copy(update={"source": short.source}) == short
+
+
+def test_a_type_takes_the_place_of_the_shipped_one_of_its_name(tmp_path: Path) -> None:
+    own = '<type name="drive" class="backbone.component.component:Component" subsystem="resource_pool"/>'
+    mission = read_text(tmp_path, f'<mission name="m" priority="1"><types>{own}</types></mission>')
+    [drive] = [kind for kind in mission.types if kind.name == "drive"]
+    assert (drive.class_path, drive.needs, drive.restart) == ("backbone.component.component:Component", [], True)
+
+
+def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Path) -> None:
+    hosts = '<host name="one" address="192.0.2.1"/><host name="two" address="192.0.2.2"/>'
+    rules = '<service type="rc_manager"><parameter name="grid_s" value="4"/></service>'
+    text = f'<mission name="m" priority="1"><core>{rules}</core><hosts>{hosts}</hosts></mission>'
+    mission = read_text(tmp_path, text)
+    assert [service.host for service in mission.core if service.type == "creator"] == ["one", "two"]
+    assert {service.host for service in mission.core if service.type != "creator"} == {"one"}
+    assert mission.core_parameters("rc_manager") == {"grid_s": 4}
+
+
+def test_the_shipped_missions_say_only_what_is_their_own() -> None:
+    assert len(MISSION_XML.read_text().splitlines()) <= 75
+    assert len(SMALLEST.read_text().splitlines()) <= 15
+    for file in (MISSION_XML, *SMALLEST.parent.glob("*.xml")):
+        assert not re.search("<core>|<types>", file.read_text()), file
 
 
 # ---------------------------------------------------------------------- the mission at the top of the project

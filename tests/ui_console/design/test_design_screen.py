@@ -24,7 +24,7 @@ def app_of(draft: Draft) -> DesignApp:
 
 
 def shipped() -> Draft:
-    return Draft.opened(str(ROOT / "mission.xml"))
+    return Draft.opened(str(ROOT / "tests" / "backbone" / "mission" / "everything_declared.xml"))
 
 
 def two_hosts() -> Draft:
