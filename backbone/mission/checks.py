@@ -16,8 +16,8 @@ from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
+from backbone.mission.declaration.elements import is_loopback
 from backbone.mission.document import Element
-from backbone.mission.model import is_loopback
 from backbone.mission.parameter_checks import check_class_parameters, check_service_parameters, check_type_class
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, told, told_names
@@ -82,7 +82,7 @@ def _check_hosts(tables: Tables, report: Report) -> None:
 def _check_door(hosts: list[Element], report: Report) -> None:
     """Report a first host that other machines cannot reach, and ports of hosts that run no hub."""
     for host in hosts[1:]:
-        if host.text("port"):
+        if host.has("port"):
             report.fault(
                 host.place_of("port"),
                 f"host {host.text('name')} has a port, but runs no hub",

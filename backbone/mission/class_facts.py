@@ -59,6 +59,11 @@ class ParameterFacts(msgspec.Struct, frozen=True):
         return ", ".join([_PEOPLE.get(self.type, self.type), *self._span])
 
     @property
+    def meaning(self) -> str:
+        """What it means, and the values it takes."""
+        return "; ".join(part for part in (self.doc.rstrip("."), self.legal_values) if part)
+
+    @property
     def told(self) -> str:
         """Type, range and default on one line."""
         return ", ".join([self.type, *self._span, f"default {self.default}" if self.default else "required"])
@@ -127,7 +132,7 @@ def _simple(one: Mapping[str, Any], definitions: Mapping[str, Any]) -> dict[str,
 
 def _type_text(schema: Mapping[str, Any]) -> str:
     if "enum" in schema:
-        return "one of " + " ".join(map(str, schema["enum"]))
+        return "one of " + ", ".join(map(str, schema["enum"]))
     if "anyOf" in schema:
         return " or ".join(_type_text(each) for each in schema["anyOf"])
     return str(schema.get("type", "any"))

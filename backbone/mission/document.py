@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
+from backbone.mission.declaration.values import decimal, flag
 from backbone.mission.report import Place, Report, told
 
 MAX_BYTES = 1024 * 1024  # chosen: a robot with its behavior is 600 bytes, so this is more than a thousand robots
@@ -29,15 +30,21 @@ BEGINNING = Place(1, 1)
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _ATTRIBUTE = re.compile(rb"""\s([^\s=<>"'/]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
-_DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
 @dataclass(slots=True)
 class Attribute:
-    """A value and where its name stands."""
+    """A value and where its name stands.
+
+    Attributes:
+        value: The value.
+        place: Where its name stands.
+        is_written: False if the file leaves it out, and this is its default.
+    """
 
     value: str
     place: Place
+    is_written: bool = True
 
 
 @dataclass(slots=True)
@@ -72,6 +79,11 @@ class Element:
         found = self.attributes.get(attribute)
         return self.place if found is None else found.place
 
+    def has(self, attribute: str) -> bool:
+        """Say whether the file gives this attribute."""
+        found = self.attributes.get(attribute)
+        return found is not None and found.is_written
+
     def text(self, attribute: str) -> str:
         """Return the value as it stands, empty if there is none."""
         found = self.attributes.get(attribute)
@@ -83,12 +95,11 @@ class Element:
 
     def number(self, attribute: str) -> float | None:
         """Return the value as a number; None if it is none."""
-        value = self.text(attribute).strip()
-        return float(value) if _DECIMAL.fullmatch(value) else None
+        return decimal(self.text(attribute))
 
     def flag(self, attribute: str) -> bool | None:
         """Return the value as true or false; None if it is neither."""
-        return {"true": True, "1": True, "false": False, "0": False}.get(self.text(attribute).strip())
+        return flag(self.text(attribute))
 
 
 def read_bytes(path: Path, report: Report) -> bytes | None:

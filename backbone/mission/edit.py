@@ -18,21 +18,15 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from backbone.errors import Refusal
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.document import MAX_BYTES, parse
 from backbone.mission.report import MissionInvalid, Report, told, told_names
-from backbone.mission.schema import vocabulary
 
 Path = tuple[int, ...]
 """Where an element stands: its number among its parent's children, from 0, from the root down; the root's is empty."""
 
 LINE_LENGTH = 120  # chosen: as mission.xml; longer tags get a second line of attributes
 STEP = "  "  # the indentation of what has no neighbor to copy it from
-
-_ORDER = {
-    "behavior": ("parameter", "arc", "behavior"),
-    "world": ("parameter", "room", "air", "furniture", "ramp", "landmark", "dark", "scout", "target"),
-}
-"""What a person writes first, where the schema allows any order and does not say it."""
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
@@ -213,7 +207,7 @@ def place_for(parent: Node, tag: str, at: int | None = None) -> int:
     """
     if at is not None:
         return min(max(at, 0), len(parent.children))
-    order = list(_ORDER.get(parent.tag, vocabulary()[parent.tag].children))
+    order = list(vocabulary()[parent.tag].children)
     same = [number for number, child in enumerate(parent.children) if child.tag == tag]
     if same:
         return same[-1] + 1

@@ -11,14 +11,21 @@ import msgspec
 
 from backbone.mission.class_facts import SHIPPED
 from backbone.mission.class_probe import ask_classes
+from backbone.mission.declaration.reference import reference_text
+from backbone.mission.declaration.xsd import XSD, xsd_text
 from backbone.mission.shipped_types import shipped_types
 
 HERE = Path(__file__).parent
+REFERENCE = HERE.parents[1] / "docs" / "reference" / "mission-file.md"
 
 
 def generated() -> dict[Path, str]:
     """Return the text of every generated file."""
-    return {HERE / SHIPPED: shipped_classes_text()}
+    return {
+        HERE / SHIPPED: shipped_classes_text(),
+        HERE / XSD: xsd_text(),
+        REFERENCE: reference_text(REFERENCE.read_text("utf-8")),
+    }
 
 
 def shipped_classes_text() -> str:

@@ -55,7 +55,7 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
             report.fault(
                 element.place,
                 f"{kind} {element.text('name')} lacks parameter {one.name}",
-                f'Add <parameter name="{one.name}" value="…"/>: {_meaning(one)}',
+                f'Add <parameter name="{one.name}" value="…"/>: {one.meaning}',
             )
 
 
@@ -96,12 +96,6 @@ def _check_values(element: Element, known: dict[str, ParameterFacts], report: Re
             continue
         if not one.accepts(parameter_value(text)):
             hint = report.hint(text, one.words) if one.words else ""
-            report.fault(parameter.place_of("value"), f"{one.name}={told(text)} is illegal{hint}", _remedy(one))
-
-
-def _remedy(one: ParameterFacts) -> str:
-    return f"{one.name}: {_meaning(one)}"
-
-
-def _meaning(one: ParameterFacts) -> str:
-    return "; ".join(part for part in (one.doc.rstrip("."), one.legal_values) if part)
+            report.fault(
+                parameter.place_of("value"), f"{one.name}={told(text)} is illegal{hint}", f"{one.name}: {one.meaning}"
+            )

@@ -43,12 +43,6 @@ def check_world(tables: Tables, report: Report) -> None:
     check_unique(bodies, "name", "body", report)
     _check_robots(world, tables, report)
     _check_classes(world, report)
-    for again in world.all("air")[1:]:
-        report.fault(
-            again.place,
-            f"a second <air> in <world>; the first is in line {world.all('air')[0].place.line}",
-            "Join them.",
-        )
     room = world.first("room")
     if room is not None:
         check_room_file(room, report)

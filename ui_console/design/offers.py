@@ -9,9 +9,9 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import NewElement, Node, Path
 from backbone.mission.report import told, told_names
-from backbone.mission.schema import vocabulary
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
 from ui_console.design.commands import (
     Add,
@@ -261,7 +261,7 @@ def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
             name,
             rule.attributes[name].documentation,
             free_name(mission, tag) if name == "name" and tag not in ("uses", "parameter") else "",
-            choices(mission, new, name, rule.attributes[name].type),
+            choices(mission, new, name, rule.attributes[name].words),
         )
         for name in required
     ]

@@ -12,8 +12,8 @@ import msgspec
 
 from backbone.dry_run import DryRun
 from backbone.mission.class_facts import ClassFacts
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
-from backbone.mission.schema import vocabulary
 from backbone.scheduling.rehearsal import Run
 from ui_console.design.catalogue import Role, TypeEntry, description, entries
 from ui_console.design.draft import Draft

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from record_messages import MESSAGES, messages
 
 from backbone.mission.behavior_orders import behavior_orders
+from backbone.mission.declaration.elements import HUB_PORT
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
-from backbone.mission.model import HUB_PORT, MissionDescription
+from backbone.mission.model import MissionDescription
 from backbone.mission.reader import Fault, MissionInvalid, read_mission
 from backbone.mission.shipped_types import shipped_text, shipped_types
 from backbone.mission.tables import CORE_SERVICES, parameter_value

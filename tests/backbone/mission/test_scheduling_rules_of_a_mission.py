@@ -80,4 +80,5 @@ def test_the_reference_tells_every_rule_with_its_default_and_meaning() -> None:
     meanings = {one.name: one.doc for one in parameters_of(SchedulingRules)}
     for rule in msgspec.structs.fields(SchedulingRules):
         assert meanings[rule.name]
-        assert f"| `{rule.name}` | `{rule.default}` | {meanings[rule.name]} |" in told
+        default = f"{rule.default:g}" if isinstance(rule.default, float) else rule.default
+        assert f"| `{rule.name}` | `{default}` | {meanings[rule.name]}; " in told
