@@ -1,6 +1,6 @@
 """What the class of a component says of itself: its documentation, and the parameters a mission file may give it.
 
-Pure data and its judgement. ``class_probe`` gets the data from classes, in another process.
+Pure data and its judgement. ``class_asking`` gets the data from classes.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import msgspec
 
+from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import SHIPPED
-from backbone.mission.class_probe import ask_classes
 from backbone.mission.declaration.reference import reference_text
 from backbone.mission.declaration.xsd import XSD, xsd_text
 from backbone.mission.shipped_types import shipped_types

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from backbone.mission.checks import check
+from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
-from backbone.mission.class_probe import ask_classes
 from backbone.mission.completion import complete
 from backbone.mission.describe import describe
 from backbone.mission.document import Element, parse, read_bytes

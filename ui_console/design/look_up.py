@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 
+from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts
-from backbone.mission.class_probe import ask_classes
 
 
 async def look_up(class_paths: Sequence[str]) -> dict[str, ClassFacts]:

@@ -8,9 +8,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from backbone.mission import class_probe
+from backbone.mission import class_asking
+from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
-from backbone.mission.class_probe import ask_classes
 from backbone.mission.generate import generated
 from backbone.mission.reader import Fault, MissionInvalid, read_mission, read_mission_bytes
 from backbone.mission.tables import parameter_value
@@ -102,7 +102,7 @@ def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
 def test_a_module_that_hangs_is_a_fault_and_holds_up_nothing_else(
     modules: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(class_probe, "WITHIN_S", 5.0)
+    monkeypatch.setattr(class_asking, "WITHIN_S", 5.0)
     (modules / "own_hanging.py").write_text("import time\ntime.sleep(60)\nclass Own: ...")
     (modules / "own_after.py").write_text(GOOD)
     found = ask_classes(["own_hanging:Own", "own_after:Own"])
