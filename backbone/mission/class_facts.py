@@ -51,7 +51,9 @@ class ParameterFacts(msgspec.Struct, frozen=True):
     @property
     def words(self) -> tuple[str, ...]:
         """The words it can be; none if it takes other values."""
-        return tuple(str(word) for word in self.schema.get("enum", ()))
+        if self.schema.get("type") == "boolean":
+            return ("true", "false")
+        return tuple(map(str, self.schema.get("enum", ())))
 
     @property
     def legal_values(self) -> str:

@@ -44,7 +44,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
     Args:
         data: What the file holds or would hold.
         source: Its path; faults name it, and files that the mission names are looked for beside it.
-        classes: What is known of classes besides the project's own; None: those that the mission names are asked.
+        classes: What is known of classes besides the shipped ones; None: those that the mission names are asked.
 
     Raises:
         MissionInvalid: With every fault, in the order of the file.
@@ -55,7 +55,7 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
         complete(root)
         mission = validated(root, report)
         fill_defaults(root)
-        check(root, known_classes(root) if classes is None else {**shipped_classes(), **classes}, report)
+        check(root, known_classes(root) if classes is None else {**classes, **shipped_classes()}, report)
     faults = report.faults()
     if faults or mission is None:
         raise MissionInvalid(faults)

@@ -166,9 +166,10 @@ def _of(mission: Node, role: Role) -> list[TypeEntry]:
 
 def _behaviors(mission: Node, node: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
+        rules = vocabulary()["behavior"].attributes
         asks = (
-            Asked("name", "Name of the behavior.", free_name(mission, entry.name.replace("_", "-"))),
-            Asked("priority", "Its priority among its siblings, a whole number; larger is higher.", "1"),
+            Asked("name", rules["name"].documentation, free_name(mission, entry.name.replace("_", "-"))),
+            Asked("priority", rules["priority"].documentation, "1"),
         )
         return Offer(f"behavior {entry.name}", entry.class_path, asks, lambda given: build(entry, given))
 
@@ -213,7 +214,7 @@ def _resources(mission: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         shape = stock_resource(entry.name)
         name = shape.text("name") if shape is not None else entry.name
-        asks = (Asked("name", "Name of the resource and of its controller.", free_name(mission, name)),)
+        asks = (Asked("name", vocabulary()["resource"].attributes["name"].documentation, free_name(mission, name)),)
         return Offer(f"resource {entry.name}", entry.class_path, asks, lambda given: AddResource(entry.name, given[0]))
 
     return [offer(entry) for entry in _of(mission, Role.RESOURCE)]

@@ -123,7 +123,7 @@ def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> l
             not one.default,
             is_parameter=True,
             doc=" ".join(part for part in (one.doc, f"({one.told})") if part),
-            choices=("true", "false") if one.type == "boolean" else (),
+            choices=one.words,
         )
         for one in known
     ]

@@ -251,6 +251,7 @@ class DesignRoom:
 
     async def _known(self, facts: dict[str, ClassFacts]) -> None:
         self._facts = {**self._facts, **facts}
+        self.draft = self.draft.knowing(self._facts)
         self._told = await asyncio.to_thread(sections, self.draft, self._facts)
         for guest in self.guests:
             self._tell(guest)

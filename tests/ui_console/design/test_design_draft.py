@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from backbone.errors import Refusal
+from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
@@ -403,3 +404,19 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
         property_rows(properties(draft.mission, node, {}))
         offers(draft.mission, node.path)
     assert draft.problems or draft.rehearsal is not None
+
+
+def test_parameters_of_shipped_classes_are_judged_and_of_others_once_they_were_looked_up() -> None:
+    draft = watchers()
+    wrong = draft.do(SetParameter(only(draft, "behavior", "watch-scout1").path, "veiw_s", "6"))
+    assert [fault.message for fault in wrong.problems] == [
+        "watch_for_motion has no parameter 'veiw_s' (did you mean 'view_s'?)"
+    ]
+    own = {"name": "own", "class": "backbone.naming:Subsystem", "subsystem": "mission_control"}
+    draft = draft.do(Add((), NewElement("types", {}, [NewElement("type", own)])))
+    draft = draft.do(AddBehavior((), "own", "mine")).do(SetParameter((4, 1), "depth_m", "deep"))
+    assert draft.problems == ()
+    depth = ParameterFacts("depth_m", {"type": "number", "default": 1.0})
+    known = draft.knowing({"backbone.naming:Subsystem": ClassFacts(parameters=(depth,))})
+    assert [fault.message for fault in known.problems] == ["depth_m='deep' is illegal"]
+    assert known.undo().redo().problems == known.problems
