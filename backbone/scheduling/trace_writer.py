@@ -12,7 +12,8 @@ from collections.abc import Callable, Collection
 from backbone.scheduling import trace
 from backbone.scheduling.entries import ArcEntry, RcEntry
 from backbone.scheduling.events import Record
-from backbone.scheduling.priority import CONSOLE, Path, carried
+from backbone.scheduling.priority import CONSOLE, Path
+from backbone.scheduling.priority_tree import carried
 
 STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken promise
 

@@ -5,6 +5,7 @@ from random import Random
 import pytest
 from simulated_switches import REPAIR_S, Bench, ask, load, manager, sharable, unit
 
+from backbone.scheduling.arc_events import RETRY_S
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -37,7 +38,6 @@ from backbone.scheduling.requests import (
     Usage,
 )
 from backbone.scheduling.rules import SchedulingRules
-from backbone.scheduling.schedule_manager import RETRY_S
 
 
 def told(bench: Bench, kind: type) -> list:
