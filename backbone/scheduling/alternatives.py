@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from backbone.ranges import A_DAY_S
+from backbone.ranges import A_DAY_S, MOST_STREAMS
 from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.requests import (
     CapacityExceeded,
@@ -74,10 +74,9 @@ def _reluctance(state: ScheduleState, arc: str, wish: Wish) -> tuple[bool, int, 
 def _overloaded_alone(state: ScheduleState, wish: Wish) -> str | None:
     """Return an RC that could not serve the wish even if nobody else were there; None: all could."""
     for name, use in wish.items():
+        rc, admission = state.rcs[name], state.compatibility.admission
         streams = sorted((stream(usage) for usage in use.streams), key=lambda one: one.period_us)
-        if state.rcs[name].sharable and not admissible(
-            streams, state.rcs[name].capacity, state.compatibility.admission
-        ):
+        if not admissible(streams, rc.capacity, admission):
             return name
     return None
 
@@ -116,6 +115,12 @@ def _check_form(request: SchedulingRequest) -> None:
         raise SchedulingRefusal(f"{request.arc} asks for no RC", arc=request.arc)
     for wish in request.alternatives:
         for rc, use in wish.items():
+            if len(use.streams) > MOST_STREAMS:
+                raise SchedulingRefusal(
+                    f"{request.arc} asks {rc} for {len(use.streams)} streams",
+                    remedy=f"Ask for at most {MOST_STREAMS} streams on one RC.",
+                    rc=rc,
+                )
             if not all(_makes_sense(usage) for usage in use.streams):
                 raise SchedulingRefusal(
                     f"{request.arc} asks {rc} for a stream without a period and packet time of at least 1 µs",

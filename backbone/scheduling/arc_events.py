@@ -152,7 +152,7 @@ class ArcEvents:
         arc = self._state.arcs.get(name)
         if arc is None or arc.state is not RequestState.RUNNING:
             return
-        until_s = min(until_s, arc.granted_s + arc.maximum_s)
+        until_s = min(until_s, arc.slice_s + arc.maximum_s)
         if until_s > arc.end_s:
             self._do.extend(arc, until_s)
 

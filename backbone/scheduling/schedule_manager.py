@@ -117,6 +117,7 @@ class ScheduleManager:
         while turn := self._schedule.due(self._do.now_s):
             self._switch(turn)
             self._priorities.age()
+        self._do.renew_slices()
         self._do.expect()
         self._set_alarm(rang=isinstance(event, Woken))
         return self._do.instructions
@@ -172,7 +173,10 @@ class ScheduleManager:
             forced = overridden and not holder.served(self._do.now_s)
             if (forced or not self._schedule.planner_of(turn.arc).reserves) and turn.arc.reservation is None:
                 self._state.reserve(turn.arc)
-            self._do.revoke(holder, "higher" if overridden else "slice", turn.arc.name)
+            if overridden:
+                self._do.revoke(holder, "higher", turn.arc.name)
+            else:
+                self._do.end_slice(holder, turn.arc)
 
     def _set_alarm(self, *, rang: bool) -> None:
         """Ask to be woken when the next decision can be due without an event."""

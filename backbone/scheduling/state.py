@@ -4,7 +4,7 @@ The life of an ARC:
 
 * ``queue``: IDLE → WAITING, with a new stamp
 * ``connect``: WAITING → CONNECTING, with new epochs
-* ``grant``: CONNECTING → RUNNING; its slice counts from here
+* ``grant``: CONNECTING → RUNNING; its slice counts from here; ``begin_slice``: it stays for one more
 * ``revoke``: CONNECTING, RUNNING → REVOKING
 * ``free``: REVOKING → WAITING or IDLE
 * ``rest``: WAITING → IDLE
@@ -226,7 +226,7 @@ class ScheduleState:
 
     def grant(self, arc: ArcEntry, now_s: float, end_s: float) -> dict[str, int]:
         """Begin its slice; return those of its epochs that are the newest grants of their RCs."""
-        arc.granted_s = now_s
+        arc.granted_s = arc.slice_s = now_s
         arc.turns += 1
         self._enter(arc, RequestState.RUNNING, now_s)
         self.end_at(arc, end_s)
@@ -243,9 +243,16 @@ class ScheduleState:
             entry.epoch = max(entry.epoch, epoch)
             entry.granted_epoch = max(entry.granted_epoch, epoch)
         arc.turns = 1
-        arc.began_s, arc.granted_s = now_s, granted_s
+        arc.began_s, arc.granted_s, arc.slice_s = now_s, granted_s, granted_s
         self._enter(arc, RequestState.RUNNING, now_s)
         self.end_at(arc, granted_s + arc.minimum_s)
+
+    def begin_slice(self, arc: ArcEntry, now_s: float, end_s: float) -> None:
+        """Let an ARC that was served stay connected for one more slice; its next place is behind its equals."""
+        arc.stamp = self._stamp(now_s)
+        arc.slice_s = now_s
+        arc.turns += 1
+        self.end_at(arc, end_s)
 
     def end_at(self, arc: ArcEntry, end_s: float) -> None:
         """Let the slice of a running ARC end then."""

@@ -115,7 +115,10 @@ class Table:
     def in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float
     ) -> list[ArcEntry]:
-        """Return the holders that must go so that the ARC can start, no more than necessary, last in order first.
+        """Return the holders that must go so that the ARC can start, no more than necessary.
+
+        Lower ones go first, the last in order first; then equals whose slices are over, the one granted first first
+        (rule 5): so each of several equals on a sharable RC stays for the same number of slices.
 
         Those who only wait for RCs that are being freed (``pending``) count as if they had started:
         else the room made here is theirs in a moment and both would displace each other again and again.
@@ -125,12 +128,19 @@ class Table:
         staying = [holder for holder in holders if holder not in movable] + [
             p for p in pending if p.touches & arc.touches
         ]
-        return self.left_over(arc, staying, movable)
+        equals = [holder for holder in movable if not rank(holder.path, arc.path)]
+        latest = by_precedence(equals, lambda holder: holder.path, lambda holder: (-holder.granted_s, *_later(holder)))
+        lower = self.in_order([holder for holder in movable if holder not in equals])
+        return self._without(arc, staying, [*latest, *lower])
 
     def left_over(self, arc: ArcEntry, staying: Sequence[ArcEntry], movable: Sequence[ArcEntry]) -> list[ArcEntry]:
         """Return those of the movable holders that do not fit beside the ARC, last in order first."""
+        return self._without(arc, staying, self.in_order(movable))
+
+    def _without(self, arc: ArcEntry, staying: Sequence[ArcEntry], movable: Sequence[ArcEntry]) -> list[ArcEntry]:
+        """Return who does not fit beside the ARC if those first in this order stay; last in order first."""
         kept, left = list(staying), []
-        for holder in self.in_order(movable):
+        for holder in movable:
             if self.fits(arc, [*kept, holder]):
                 kept.append(holder)
             else:
@@ -145,3 +155,8 @@ class Table:
         for holder in self.in_order(holders):
             (kept if self.state.compatibility.can_share(rc, [*kept, holder]) else left).append(holder)
         return left[::-1]
+
+
+def _later(arc: ArcEntry) -> tuple[float, int]:
+    """Return a key by which the ARC with the younger stamp comes first."""
+    return -arc.stamp[0], -arc.stamp[1]

@@ -14,6 +14,7 @@ from backbone.scheduling.entries import ArcEntry, RcEntry
 from backbone.scheduling.events import Record
 from backbone.scheduling.priority import CONSOLE, Path
 from backbone.scheduling.priority_tree import carried
+from backbone.scheduling.requests import RcUse
 
 STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken promise
 
@@ -109,7 +110,7 @@ class TraceWriter:
             owner,
             minimum_s=arc.minimum_s,
             maximum_s=arc.maximum_s,
-            uses=arc.uses,
+            uses={rc: use if rc in arc.shares else RcUse() for rc, use in arc.uses.items()},
             idle=arc.request.idle,
         )
         self.record(line, f"asked by {arc.request.owner}")

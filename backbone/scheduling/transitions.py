@@ -13,7 +13,7 @@ from backbone.scheduling import trace
 from backbone.scheduling.entries import CONNECTED, Afterwards, ArcEntry
 from backbone.scheduling.events import ConnectArc, Instruction, RenewLeases, RevokeArc, WakeAt
 from backbone.scheduling.master_schedule import MasterSchedule
-from backbone.scheduling.priority import higher
+from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.trace_writer import TraceWriter
@@ -56,6 +56,7 @@ class Transitions:
         self.state = schedule.state
         self.now_s = 0.0
         self.instructions: list[Instruction] = []
+        self._ended: list[tuple[ArcEntry, str]] = []
         self.trace = TraceWriter(self.instruct, goes_on=goes_on)
         self._schedule = schedule
         self._rules = rules
@@ -66,6 +67,7 @@ class Transitions:
         """Begin a decision; time never goes back."""
         self.now_s = max(now_s, self.now_s)
         self.instructions = []
+        self._ended = []
 
     def instruct(self, instruction: Instruction) -> None:
         """Have this carried out after all before."""
@@ -99,11 +101,9 @@ class Transitions:
 
     def grant(self, arc: ArcEntry) -> None:
         """Let the slice of an ARC begin whose RCs have settled."""
-        newest = self.state.grant(arc, self.now_s, self._rules.slice_end_s(self.now_s, arc.minimum_s))
+        newest = self.state.grant(arc, self.now_s, self._slice_end_s(arc))
         self.trace.record(trace.grant(self.now_s, arc.name, newest), "its RCs have settled")
-        if self._rules.grid_s:
-            cause = "slices end on a common grid (rule 15)"
-            self.trace.record(trace.extend(self.now_s, arc.name, arc.end_s), cause)
+        self._record_grid(arc)
 
     def adopt(self, arc: ArcEntry, epochs: Mapping[str, int], granted_s: float) -> None:
         """Let an ARC run on in the slice an earlier RC manager began; the trace shows it at its true times."""
@@ -131,6 +131,29 @@ class Transitions:
     def free(self, arc: ArcEntry, state: RequestState) -> None:
         """Let an ARC whose RCs are in their safe states wait or be idle."""
         self.state.free(arc, self.now_s, state)
+
+    def end_slice(self, arc: ArcEntry, by: ArcEntry) -> None:
+        """Take all its RCs from an ARC that was served, for an equal."""
+        self._ended += [(arc, rc) for rc in arc.shares if rc in by.shares]
+        self.revoke(arc, "slice", by.name)
+
+    def renew_slices(self) -> None:
+        """Let served equals that stay on a sharable RC begin a new slice where another's was ended for it (rule 5)."""
+        for ended, rc in self._ended:
+            for arc in [*self.state.rcs[rc].holders]:
+                if rc in arc.shares and arc.served(self.now_s) and not rank(arc.path, ended.path):
+                    self.state.begin_slice(arc, self.now_s, self._slice_end_s(arc))
+                    cause = "it stays where an equal's slice ended (rule 5)"
+                    self.trace.record(trace.about("slice", self.now_s, arc.name), cause)
+                    self._record_grid(arc)
+
+    def _slice_end_s(self, arc: ArcEntry) -> float:
+        return self._rules.slice_end_s(self.now_s, arc.minimum_s)
+
+    def _record_grid(self, arc: ArcEntry) -> None:
+        if self._rules.grid_s:
+            cause = "slices end on a common grid (rule 15)"
+            self.trace.record(trace.extend(self.now_s, arc.name, arc.end_s), cause)
 
     def queue(self, arc: ArcEntry) -> None:
         """Let it wait as one that just came; the trace shows it if its group is too large to be planned whole."""
