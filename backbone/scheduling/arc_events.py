@@ -17,6 +17,7 @@ import msgspec
 
 from backbone.scheduling import trace
 from backbone.scheduling.alternatives import can_be_planned
+from backbone.scheduling.damping import Damping
 from backbone.scheduling.entries import Afterwards, ArcEntry
 from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
 from backbone.scheduling.master_schedule import MasterSchedule
@@ -48,6 +49,7 @@ class ArcEvents:
         self._grid_s = rules.grid_s
         self._successors: dict[str, Requested] = {}
         self._retrying: dict[str, ArcEntry] = {}
+        self._damping = Damping()
 
     # What ARCs want.
 
@@ -96,8 +98,27 @@ class ArcEvents:
         if arc.state is RequestState.REVOKING and arc.afterwards is Afterwards.IDLE:
             self._state.set_afterwards(arc, Afterwards.WANT)
         elif arc.state is RequestState.IDLE:
-            self._do.trace.record(trace.about("want", self._do.now_s, name), "it wants time again")
-            self._do.queue(arc)
+            self._want(arc)
+
+    def _want(self, arc: ArcEntry) -> None:
+        """Queue an idle ARC, or have it wait for that if its owner asked and left too often."""
+        wait_s = self._damping.wait_s(arc.request.owner, self._do.now_s)
+        if wait_s:
+            self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
+        else:
+            self._queue(arc)
+
+    def _queue(self, arc: ArcEntry) -> None:
+        self._do.trace.record(trace.about("want", self._do.now_s, arc.name), "it wants time again")
+        self._do.queue(arc)
+
+    def _wait_to_ask(self, arc: ArcEntry, wait_s: float, why: str) -> None:
+        self._state.retry_at(arc, self._do.now_s + wait_s, why)
+        self._retrying[arc.name] = arc
+
+    def _leaves(self, arc: ArcEntry) -> None:
+        if arc.has_forced and arc.state in (RequestState.WAITING, RequestState.CONNECTING):
+            self._damping.left_in_vain(arc.request.owner, self._do.now_s)
 
     def idled(self, name: str) -> None:
         """An ARC wants no time now; it keeps its request and gives its RCs back."""
@@ -105,6 +126,7 @@ class ArcEvents:
         if arc is None:
             return
         self._successor_idles(name, idle=True)
+        self._leaves(arc)
         self._state.retry_at(arc, None)
         if arc.state is RequestState.REVOKING:
             if arc.afterwards is Afterwards.WAIT:
@@ -127,6 +149,7 @@ class ArcEvents:
         arc = self._state.arcs.get(name)
         if arc is None or (arc.holds and arc.afterwards is Afterwards.GONE):
             return
+        self._leaves(arc)
         self._do.trace.record(trace.about("depart", self._do.now_s, name), because(why, ""))
         if not arc.holds:
             self._forget(arc)
@@ -174,8 +197,7 @@ class ArcEvents:
         else:
             self._record_idle(name, f"it could not open its gate; again in {RETRY_S:g} s")
             self._do.lose(arc, "failed", "", Afterwards.IDLE)
-            self._state.retry_at(arc, self._do.now_s + RETRY_S)
-            self._retrying[name] = arc
+            self._wait_to_ask(arc, RETRY_S, "it could not open its gate")
         self.freed(name)
 
     def freed(self, name: str) -> None:
@@ -201,7 +223,7 @@ class ArcEvents:
                 del self._retrying[arc.name]
             elif arc.state is RequestState.IDLE and arc.retry_s <= self._do.now_s:
                 del self._retrying[arc.name]
-                self.wanted(arc.name)
+                self._queue(arc)
 
     def next_retry_s(self) -> float | None:
         """Return when the next ARC asks again; None if none does."""
@@ -217,8 +239,11 @@ class ArcEvents:
         uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
         longest_s = self._longest_s(request.minimum_runtime_s)
         arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, self._do.now_s)
-        self._do.trace.record_request(arc, self._do.now_s)
-        if not request.idle:
+        wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, self._do.now_s)
+        self._do.trace.record_request(arc, self._do.now_s, idle=request.idle or wait_s > 0)
+        if wait_s:
+            self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
+        elif not request.idle:
             self._do.queue(arc)
         return arc
 

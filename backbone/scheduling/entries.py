@@ -92,7 +92,9 @@ class ArcEntry:
         epochs: RC → epoch, while it holds them.
         awaited: Somebody waited for the end of its slice when last looked.
         afterwards: What becomes of it once free, while it is being revoked.
-        retry_s: When it asks again after it could not open; None: only when told.
+        has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
+        retry_s: When it counts again, after it could not open or left too often; None: when it wants time.
+        retry_why: Why not sooner.
         turns: Slices so far.
         had_s: Time it had, as the discipline ``time`` counts it; without the run that goes on.
         raised: Levels by which it rose because it waited long (aging).
@@ -124,7 +126,9 @@ class ArcEntry:
     epochs: dict[str, int] = field(default_factory=dict)
     awaited: bool = False
     afterwards: Afterwards = Afterwards.WAIT
+    has_forced: bool = False
     retry_s: float | None = None
+    retry_why: str = ""
     turns: int = 0
     had_s: float = 0.0
     raised: int = 0

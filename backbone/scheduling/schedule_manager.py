@@ -171,8 +171,8 @@ class ScheduleManager:
         for holder in sorted(turn.in_the_way, key=lambda holder: higher(turn.arc.path, holder.path)):
             overridden = higher(turn.arc.path, holder.path)
             forced = overridden and not holder.served(self._do.now_s)
-            if (forced or not self._schedule.planner_of(turn.arc).reserves) and turn.arc.reservation is None:
-                self._state.reserve(turn.arc)
+            if forced or not self._schedule.planner_of(turn.arc).reserves:
+                self._state.reserve(turn.arc, forced=forced)
             if overridden:
                 self._do.revoke(holder, "higher", turn.arc.name)
             else:

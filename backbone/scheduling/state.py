@@ -208,12 +208,15 @@ class ScheduleState:
         """Let it wait, behind all equals that are there."""
         arc.stamp = self._stamp(now_s)
         arc.reservation = arc.retry_s = None
+        arc.has_forced = False
         self._enter(arc, RequestState.WAITING, now_s)
 
-    def reserve(self, arc: ArcEntry) -> None:
-        """Let an ARC that waits come before all equals until it is connected."""
-        arc.reservation = next(self._stamps)
-        self._concerns(arc.uses)
+    def reserve(self, arc: ArcEntry, *, forced: bool) -> None:
+        """Let an ARC that waits come before all equals until it is connected; note if others were forced to go."""
+        arc.has_forced |= forced
+        if arc.reservation is None:
+            arc.reservation = next(self._stamps)
+            self._concerns(arc.uses)
 
     def connect(self, arc: ArcEntry, now_s: float) -> None:
         """Give it its RCs, each under a new epoch; they begin to settle."""
@@ -285,9 +288,9 @@ class ScheduleState:
         arc.reservation = None
         self._enter(arc, RequestState.IDLE, now_s)
 
-    def retry_at(self, arc: ArcEntry, time_s: float | None) -> None:
-        """Have an ARC that could not open ask again then; None: only when it says so."""
-        arc.retry_s = time_s
+    def retry_at(self, arc: ArcEntry, time_s: float | None, why: str = "") -> None:
+        """Let an idle ARC want time again then; None: when it says so."""
+        arc.retry_s, arc.retry_why = time_s, why
 
     def _enter(self, arc: ArcEntry, state: RequestState, now_s: float) -> None:
         self.now_s = now_s

@@ -234,8 +234,7 @@ class Explanation:
                 what = f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"
                 return _Told([what], "6", "its RCs are free")
             case RequestState.IDLE if arc.retry_s is not None:
-                what = f"it could not open its gate and is asked again at {_at(arc.retry_s)}"
-                return _Told([what], "6", "its gate opens")
+                return _Told([f"{arc.retry_why}; again at {_at(arc.retry_s)}"], "6", "that time comes")
             case RequestState.IDLE:
                 return _Told([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
 

@@ -82,7 +82,7 @@ FAULTS = [
         "key=lambda holder: higher(turn.arc.path, holder.path))",
         "key=lambda holder: not higher(turn.arc.path, holder.path))",
     ),
-    Planted("nothing is reserved for an ARC that overrides", "schedule_manager.py", "(forced or not", "(not"),
+    Planted("nothing is reserved for an ARC that overrides", "schedule_manager.py", "if forced or not", "if not"),
     Planted("an ARC that could not open is not asked again", "schedule_manager.py", "        self._arcs.retry()\n", ""),
     Planted("slack eats a short slice", "plan.py", "min(self._slack_s, arc.minimum_s / 2)", "self._slack_s"),
     Planted(

@@ -491,7 +491,7 @@ def test_why_has_an_answer_in_every_state():
     bench.tell(ask("f", "v"))
     assert bench.manager.why("a", 7.0).state == "revoking"
     bench.run(9.0)
-    assert "asked again" in bench.manager.why("f", 9.0).lines[0]
+    assert "again at" in bench.manager.why("f", 9.0).lines[0]
 
 
 def test_the_schedule_shows_holders_and_who_is_next():
