@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from backbone.ranges import A_DAY_S
+from backbone.ranges import A_DAY_S, MOST_STREAMS
 from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.requests import (
     CapacityExceeded,
@@ -22,14 +22,14 @@ from backbone.scheduling.requests import (
     Usage,
 )
 from backbone.scheduling.response_time import admissible, remedy, stream, utilization
-from backbone.scheduling.table import Table
+from backbone.scheduling.state import ScheduleState
 
 Wish = Mapping[str, RcUse]
 
 SHORTEST_RUNTIME_S = 0.001  # chosen: less than any context switch takes; shorter slices only keep RCs from everybody
 
 
-def choose(table: Table, request: SchedulingRequest) -> tuple[str, ...]:
+def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
     """Return the set of RCs this request should wait for.
 
     What it already waits for or holds stays. Otherwise RCs that did not fail come first, then those
@@ -43,47 +43,48 @@ def choose(table: Table, request: SchedulingRequest) -> tuple[str, ...]:
         SchedulingRefusal: It asks for nothing, or for streams that make no sense.
     """
     _check_form(request)
-    known = [wish for wish in request.alternatives if wish.keys() <= table.rcs.keys()]
+    known = [wish for wish in request.alternatives if wish.keys() <= state.rcs.keys()]
     if not known:
-        missing = sorted({rc for wish in request.alternatives for rc in wish} - table.rcs.keys())
+        missing = sorted({rc for wish in request.alternatives for rc in wish} - state.rcs.keys())
         raise UnknownRc(f"{request.arc} asks for {', '.join(missing)}, which this mission has not", rc=missing[0])
-    overloads = [_overloaded_alone(table, wish) for wish in known]
+    overloads = [_overloaded_alone(state, wish) for wish in known]
     possible = [wish for wish, overloaded in zip(known, overloads, strict=True) if overloaded is None]
     if possible:
-        best = min(possible, key=lambda wish: _reluctance(table, request.arc, wish))
+        best = min(possible, key=lambda wish: _reluctance(state, request.arc, wish))
         return tuple(best)
-    raise _overload(table, request.arc, known[0], overloads[0] or "")
+    raise _overload(state, request.arc, known[0], overloads[0] or "")
 
 
-def _reluctance(table: Table, arc: str, wish: Wish) -> tuple[bool, int, int, int]:
+def _reluctance(state: ScheduleState, arc: str, wish: Wish) -> tuple[bool, int, int, int]:
     """Return the key of a choice: smaller is better; equal ones are taken in the request's order."""
-    present = table.arcs.get(arc)
-    rcs = [table.rcs[rc] for rc in wish]
+    present = state.arcs.get(arc)
+    rcs = [state.rcs[rc] for rc in wish]
     return (
         present is None or present.uses.keys() != wish.keys(),
         sum(rc.failed for rc in rcs),
         sum(
             rc in other.uses and other.name != arc and not (use.streams and other.uses[rc].streams)
             for rc, use in wish.items()
-            for other in table.arcs.values()
+            for other in state.arcs.values()
         ),
         sum(not rc.up for rc in rcs),
     )
 
 
-def _overloaded_alone(table: Table, wish: Wish) -> str | None:
+def _overloaded_alone(state: ScheduleState, wish: Wish) -> str | None:
     """Return an RC that could not serve the wish even if nobody else were there; None: all could."""
     for name, use in wish.items():
+        rc, admission = state.rcs[name], state.compatibility.admission
         streams = sorted((stream(usage) for usage in use.streams), key=lambda one: one.period_us)
-        if table.rcs[name].sharable and not admissible(streams, table.rcs[name].capacity, table.admission):
+        if not admissible(streams, rc.capacity, admission):
             return name
     return None
 
 
-def _overload(table: Table, arc: str, wish: Wish, rc: str) -> CapacityExceeded:
+def _overload(state: ScheduleState, arc: str, wish: Wish, rc: str) -> CapacityExceeded:
     demanded = _share(wish[rc].streams)
-    capacity = table.rcs[rc].capacity
-    used = sum(_share(other.uses[rc].streams) for other in table.rcs[rc].holders if other.state in CONNECTED)
+    capacity = state.rcs[rc].capacity
+    used = sum(_share(other.uses[rc].streams) for other in state.rcs[rc].holders if other.state in CONNECTED)
     streams = sorted(wish[rc].streams, key=lambda usage: usage.period_s)
     advice = remedy([(usage.kind, stream(usage)) for usage in streams], capacity)
     reason = "more than it can ever give" if demanded > capacity else "and not every packet can be in time"
@@ -114,6 +115,12 @@ def _check_form(request: SchedulingRequest) -> None:
         raise SchedulingRefusal(f"{request.arc} asks for no RC", arc=request.arc)
     for wish in request.alternatives:
         for rc, use in wish.items():
+            if len(use.streams) > MOST_STREAMS:
+                raise SchedulingRefusal(
+                    f"{request.arc} asks {rc} for {len(use.streams)} streams",
+                    remedy=f"Ask for at most {MOST_STREAMS} streams on one RC.",
+                    rc=rc,
+                )
             if not all(_makes_sense(usage) for usage in use.streams):
                 raise SchedulingRefusal(
                     f"{request.arc} asks {rc} for a stream without a period and packet time of at least 1 µs",

@@ -88,11 +88,14 @@ class ArcEntry:
         began_s: When its RCs began to settle, while it holds them.
         end_s: End of its slice, while it runs.
         granted_s: When it was granted, while it runs.
+        slice_s: When its present slice began, while it runs: at the grant, or later where it stayed connected.
         epochs: RC → epoch, while it holds them.
         awaited: Somebody waited for the end of its slice when last looked.
         afterwards: What becomes of it once free, while it is being revoked.
-        retry_s: When it asks again after it could not open; None: only when told.
-        turns: Grants so far.
+        has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
+        retry_s: When it counts again, after it could not open or left too often; None: when it wants time.
+        retry_why: Why not sooner.
+        turns: Slices so far.
         had_s: Time it had, as the discipline ``time`` counts it; without the run that goes on.
         raised: Levels by which it rose because it waited long (aging).
         swapped_out: Why it lost its RCs last; empty: never.
@@ -119,10 +122,13 @@ class ArcEntry:
     began_s: float = 0.0
     end_s: float = 0.0
     granted_s: float = 0.0
+    slice_s: float = 0.0
     epochs: dict[str, int] = field(default_factory=dict)
     awaited: bool = False
     afterwards: Afterwards = Afterwards.WAIT
+    has_forced: bool = False
     retry_s: float | None = None
+    retry_why: str = ""
     turns: int = 0
     had_s: float = 0.0
     raised: int = 0

@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
-from backbone.scheduling.plan import Hold, Slot
+from backbone.scheduling.planner import Hold, Slot
 from backbone.scheduling.prefix_maximum import PrefixMaximum
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
@@ -59,13 +59,13 @@ def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot
 def _share(table: Table, arc: ArcEntry, rc: str) -> float:
     """Return the part of what the RC can give that the ARC asks for, 0 to 1."""
     demanded = sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams)
-    return min(1.0, demanded / table.rcs[rc].capacity)
+    return min(1.0, demanded / table.state.rcs[rc].capacity)
 
 
 def _standing(table: Table, arc: ArcEntry, now_s: float) -> list[Hold]:
     """Return the holders that the ARC cannot run beside."""
     return [
         (holder, -math.inf, table.stands_until_s(holder, arc, now_s))
-        for holder in table.holders(arc)
+        for holder in table.state.holders(arc)
         if table.clash(arc, holder)
     ]

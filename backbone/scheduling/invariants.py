@@ -1,4 +1,4 @@
-"""Promises: what holds after every decision, whatever happened; looked at by tests and simulations.
+"""Invariants: what holds after every decision, whatever happened; looked at by tests and simulations.
 
 Rule of this file: it reads the schedule and changes nothing.
 """
@@ -16,15 +16,15 @@ Broken = tuple[str, Sequence[ArcEntry]]
 
 
 def broken(schedule: MasterSchedule, now_s: float) -> Iterator[Broken]:
-    """Yield each promise that the schedule does not keep after a decision at this time."""
-    arcs = [*schedule.arcs.values()]
+    """Yield each invariant that does not hold after a decision at this time."""
+    arcs = [*schedule.state.arcs.values()]
     for arc in arcs:
         whole = arc.epochs.keys() == arc.uses.keys() if arc.holds else not arc.epochs
         if not whole:
             yield f"{arc.name} holds all its RCs or none", [arc]
         if arc.reservation is not None and arc.state is not RequestState.WAITING:
             yield "only who waits is reserved", [arc]
-    for rc in schedule.rcs.values():
+    for rc in schedule.state.rcs.values():
         yield from _broken_of(schedule, rc, [arc for arc in arcs if rc.name in arc.epochs])
     forgotten = schedule.forgotten(now_s)
     if forgotten is not None:
@@ -32,7 +32,7 @@ def broken(schedule: MasterSchedule, now_s: float) -> Iterator[Broken]:
 
 
 def _broken_of(schedule: MasterSchedule, rc: RcEntry, holders: Sequence[ArcEntry]) -> Iterator[Broken]:
-    """Yield the promises about one RC that are not kept."""
+    """Yield the invariants of one RC that do not hold."""
     alone = [arc for arc in holders if not rc.sharable or not arc.uses[rc.name].streams]
     if alone and len(holders) > 1:
         yield f"{rc.name} has one holder", holders
@@ -45,5 +45,5 @@ def _broken_of(schedule: MasterSchedule, rc: RcEntry, holders: Sequence[ArcEntry
     if connected and not rc.up:
         yield f"{rc.name} is down and holds nobody", connected
     for arc in connected:
-        if not schedule.fits(arc, [other for other in connected if other is not arc]):
+        if not schedule.table.fits(arc, [other for other in connected if other is not arc]):
             yield f"{rc.name} serves all its holders in time", connected

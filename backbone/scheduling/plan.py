@@ -10,43 +10,14 @@ from __future__ import annotations
 import math
 from bisect import insort
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
+from backbone.scheduling.planner import Hold, Slot
 from backbone.scheduling.priority import higher, rank
 from backbone.scheduling.table import Table
 
-Hold = tuple[ArcEntry, float, float]
-"""Who stands in the way as one other ARC sees it, from when (minus infinity: it holds its RCs) and until when."""
-
 _Reservation = tuple[float, int, float, ArcEntry]
 """From when, whose place in the order, until when, and for whom."""
-
-
-class Slot(NamedTuple):
-    """The place the plan found for an ARC.
-
-    Attributes:
-        arc: The ARC.
-        start_s: When its RCs begin to settle; infinite: never, as things are.
-        against: Who shares an RC with it and stands in its way for a time.
-    """
-
-    arc: ArcEntry
-    start_s: float
-    against: Sequence[Hold]
-
-    @property
-    def end_s(self) -> float:
-        """End of its minimum run time."""
-        return self.start_s + self.arc.length_s
-
-
-class Turn(NamedTuple):
-    """An ARC whose time has come, and the holders that must go first (none: it connects)."""
-
-    arc: ArcEntry
-    in_the_way: Sequence[ArcEntry]
 
 
 class Plan:

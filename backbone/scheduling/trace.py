@@ -121,7 +121,7 @@ def revoke(now_s: float, arc: str, why: str, by: str) -> Line:
 
 
 def about(event: str, now_s: float, arc: str) -> Line:
-    """Return a line that names only its ARC: ``want``, ``idle``, ``depart``, ``free``."""
+    """Return a line that names only its ARC: ``want``, ``idle``, ``depart``, ``free``, ``slice``."""
     return {"ev": event, "t": now_s, "arc": arc}
 
 

@@ -12,7 +12,9 @@ from collections.abc import Callable, Collection
 from backbone.scheduling import trace
 from backbone.scheduling.entries import ArcEntry, RcEntry
 from backbone.scheduling.events import Record
-from backbone.scheduling.priority import CONSOLE, Path, carried
+from backbone.scheduling.priority import CONSOLE, Path
+from backbone.scheduling.priority_tree import carried
+from backbone.scheduling.requests import RcUse
 
 STORY_LINES = 400  # chosen: some minutes of a busy mission, for the report of a broken promise
 
@@ -94,8 +96,8 @@ class TraceWriter:
         self._ids = {carried(way, old, new): self._id(way) for way in self._nodes}
         self._nodes = {carried(way, old, new): told for way, told in self._nodes.items()}
 
-    def record_request(self, arc: ArcEntry, now_s: float) -> None:
-        """Write what the ARC asks for; its owner's node was introduced."""
+    def record_request(self, arc: ArcEntry, now_s: float, *, idle: bool) -> None:
+        """Write what the ARC asks for, and if it wants no time yet; its owner's node was introduced."""
         name, number = arc.path[-1]
         owner = (
             trace.console_owner(name.removeprefix(CONSOLE), number)
@@ -108,8 +110,8 @@ class TraceWriter:
             owner,
             minimum_s=arc.minimum_s,
             maximum_s=arc.maximum_s,
-            uses=arc.uses,
-            idle=arc.request.idle,
+            uses={rc: use if rc in arc.shares else RcUse() for rc, use in arc.uses.items()},
+            idle=idle,
         )
         self.record(line, f"asked by {arc.request.owner}")
 

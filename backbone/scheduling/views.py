@@ -52,7 +52,7 @@ class RequestView(Message, frozen=True):
         blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
         minimum_runtime_s: As asked for.
         priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
-        turns: Grants so far.
+        turns: Slices so far.
         rule: Rule of SCHEDULING.md that decides it.
         would_change: What would end this, for people.
         raised: Levels by which it rose because it waits long.

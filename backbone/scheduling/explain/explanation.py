@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from backbone.naming import component_of
 from backbone.scheduling.entries import INSTANT_S, ArcEntry, RcEntry
-from backbone.scheduling.explain.blockers import altogether, direct
+from backbone.scheduling.explain.blockers import Blockers
 from backbone.scheduling.explain.start_prediction import StartPrediction
 from backbone.scheduling.master_schedule import MasterSchedule
-from backbone.scheduling.plan import Slot
+from backbone.scheduling.planner import Slot
 from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import LEASE_S, Holder, RequestState, Scheduled, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
@@ -45,16 +45,19 @@ class _Told(NamedTuple):
 class Explanation:
     """Answers about one master schedule."""
 
-    def __init__(self, table: MasterSchedule, rules: SchedulingRules) -> None:
+    def __init__(self, schedule: MasterSchedule, rules: SchedulingRules) -> None:
         """Explain this schedule.
 
         Args:
-            table: The master schedule; nothing in it changes.
+            schedule: Nothing in it changes.
             rules: With which it is decided.
         """
-        self._table = table
+        self._schedule = schedule
+        self._table = schedule.table
+        self._state = schedule.state
         self._rules = rules
-        self._prediction = StartPrediction(table, rules)
+        self._blockers = Blockers(schedule)
+        self._prediction = StartPrediction(schedule, rules)
 
     # Views.
 
@@ -64,30 +67,30 @@ class Explanation:
         return Scheduled(
             rcs=list(arc.uses),
             state=arc.state,
-            position=len(self._table.before(arc)) + 1 if slot is not None else 0,
-            blockers=[other.name for other in direct(self._table, slot, now_s)] if slot is not None else [],
+            position=len(self._schedule.planner_of(arc).before(arc)) + 1 if slot is not None else 0,
+            blockers=[other.name for other in self._blockers.direct(slot, now_s)] if slot is not None else [],
             expected_start_s=_expected_s(arc, granted_s),
         )
 
     def schedule(self, now_s: float) -> Schedule:
         """Return the whole schedule."""
-        groups = self._table.groups()
+        groups = self._state.in_groups()
         slot_of: dict[ArcEntry, Slot] = {}
         grants_s: dict[ArcEntry, float] = {}
         for group in groups:
-            slots = self._table.slots(group, now_s)
+            slots = self._schedule.slots(group, now_s)
             slot_of.update((slot.arc, slot) for slot in slots)
             grants_s.update(self._prediction.grants_s(slots, now_s))
-        coming: dict[str, list[tuple[ArcEntry, float]]] = {rc: [] for rc in self._table.rcs}
+        coming: dict[str, list[tuple[ArcEntry, float]]] = {rc: [] for rc in self._state.rcs}
         for arc, granted_s in sorted(grants_s.items(), key=lambda item: item[1]):
             for rc in arc.uses if granted_s < math.inf else ():
                 coming[rc].append((arc, granted_s))
         return Schedule(
             at_s=now_s,
-            rcs=[self._rc_view(rc, coming[rc.name], now_s) for rc in self._table.rcs.values()],
+            rcs=[self._rc_view(rc, coming[rc.name], now_s) for rc in self._state.rcs.values()],
             requests=[
                 self._request_view(arc, slot_of.get(arc), grants_s.get(arc, math.inf), now_s)
-                for arc in self._table.arcs.values()
+                for arc in self._state.arcs.values()
             ],
             groups=[[arc.name for arc in group] for group in groups],
         )
@@ -108,7 +111,7 @@ class Explanation:
         )
 
     def _request_view(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> RequestView:
-        blockers = direct(self._table, slot, now_s) if slot is not None else []
+        blockers = self._blockers.direct(slot, now_s) if slot is not None else []
         told = self._told(arc, slot, blockers, granted_s, now_s)
         return RequestView(
             arc=arc.name,
@@ -136,16 +139,16 @@ class Explanation:
         Raises:
             UnknownRequest: There is none of this name.
         """
-        if name in self._table.arcs:
-            arc = self._table.arcs[name]
+        if name in self._state.arcs:
+            arc = self._state.arcs[name]
             return self._why_arc(arc, now_s)
         owned = [
-            arc for arc in self._table.arcs.values() if name in (arc.request.owner, component_of(arc.request.owner))
+            arc for arc in self._state.arcs.values() if name in (arc.request.owner, component_of(arc.request.owner))
         ]
         if owned:
             return self._why_owner(name, owned, now_s)
-        if name in self._table.rcs:
-            return self._why_rc(self._table.rcs[name], now_s)
+        if name in self._state.rcs:
+            return self._why_rc(self._state.rcs[name], now_s)
         raise UnknownRequest(f"nothing named {name!r} asks for run time, and no RC is named so", name=name)
 
     def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
@@ -163,7 +166,7 @@ class Explanation:
         )
 
     def _why_rc(self, rc: RcEntry, now_s: float) -> Why:
-        users = [arc for arc in self._table.arcs.values() if rc.name in arc.uses]
+        users = [arc for arc in self._state.arcs.values() if rc.name in arc.uses]
         holders = [arc for arc in users if arc.holds]
         waiting = [(arc, self._place(arc, now_s)[1]) for arc in users if arc.queued]
         coming = sorted(waiting, key=lambda item: item[1])
@@ -194,12 +197,12 @@ class Explanation:
 
     def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
         slot, granted_s = self._place(arc, now_s)
-        blockers = direct(self._table, slot, now_s) if slot is not None else []
+        blockers = self._blockers.direct(slot, now_s) if slot is not None else []
         told = self._told(arc, slot, blockers, granted_s, now_s)
         lines, would_change = [*told.lines], told.would_change
         lines += [self._stands(other, arc, now_s) for other in blockers]
         if arc.state is RequestState.WAITING:
-            blockers = altogether(self._table, arc, now_s, grace_s=self._rules.grace_s)
+            blockers = self._blockers.altogether(arc, now_s, grace_s=self._rules.grace_s)
             would_change = self._would_let_it_start(arc, blockers, told.would_change)
         if arc.swapped_out and arc.state is RequestState.WAITING:
             lines.append(f"it lost its RCs last because {_reason(arc)}")
@@ -231,8 +234,7 @@ class Explanation:
                 what = f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"
                 return _Told([what], "6", "its RCs are free")
             case RequestState.IDLE if arc.retry_s is not None:
-                what = f"it could not open its gate and is asked again at {_at(arc.retry_s)}"
-                return _Told([what], "6", "its gate opens")
+                return _Told([f"{arc.retry_why}; again at {_at(arc.retry_s)}"], "6", "that time comes")
             case RequestState.IDLE:
                 return _Told([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
 
@@ -240,13 +242,13 @@ class Explanation:
         self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
     ) -> _Told:
         age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
-        down = [rc for rc in arc.uses if not self._table.rcs[rc].up]
+        down = [rc for rc in arc.uses if not self._state.rcs[rc].up]
         if down:
-            faults = [f"{rc} is put aside: {self._table.rcs[rc].fault}" for rc in down if self._table.rcs[rc].fault]
+            faults = [f"{rc} is put aside: {self._state.rcs[rc].fault}" for rc in down if self._state.rcs[rc].fault]
             reason = "; ".join([f"{age} for {', '.join(down)}, not up", *faults])
             return _Told([reason], "11", f"{', '.join(down)} answers")
         if slot is None or not self._table.usable(arc):
-            crowded = ", ".join(rc for rc in arc.uses if self._table.rcs[rc].sharable)
+            crowded = ", ".join(rc for rc in arc.uses if self._state.rcs[rc].sharable)
             return _Told([f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows")
         if not blockers:
             return _Told([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
@@ -259,7 +261,7 @@ class Explanation:
             what = f"{age} for {whom}, without a predicted start: no gap is long enough for it"
             remedy = f"{_release(blockers)}, or a shorter minimum run time"
             return _Told([what], "9", remedy)
-        if not self._table.planned_whole(arc) and all(other.queued for other in blockers):
+        if not self._schedule.planner_of(arc).is_exact and all(other.queued for other in blockers):
             what = f"{age}; first in line before it: {whom}; granted at about {_at(granted_s)}"
             return _Told([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
         what = f"{age} for {whom}, granted at about {_at(granted_s)}"
@@ -267,7 +269,7 @@ class Explanation:
 
     def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
         """Return with what the ARC would start after one hand-over."""
-        needs = [f"{rc} answers" for rc in arc.uses if not self._table.rcs[rc].up]
+        needs = [f"{rc} answers" for rc in arc.uses if not self._state.rcs[rc].up]
         if not needs and not self._table.usable(arc):
             needs = [otherwise]
         if blockers:
@@ -310,12 +312,9 @@ class Explanation:
         """Return the place of the ARC in the plan, if it is queued, and its foreseen grant."""
         if not arc.queued:
             return None, math.inf
-        if not self._table.planned_whole(arc):
-            slots = [self._table.slot_of(arc, now_s)]
-        else:
-            slots = [*self._table.slots(self._table.group_of(arc), now_s)]
-        own = next(slot for slot in slots if slot is not None and slot.arc is arc)
-        return own, self._prediction.grants_s([slot for slot in slots if slot is not None], now_s)[arc]
+        slots = self._schedule.planner_of(arc).slots_around(arc, now_s)
+        own = next(slot for slot in slots if slot.arc is arc)
+        return own, self._prediction.grants_s(slots, now_s)[arc]
 
     def _until_s(self, arc: ArcEntry) -> float:
         match arc.state:

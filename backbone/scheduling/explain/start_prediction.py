@@ -3,7 +3,7 @@
 The plan is made of slices only: it decides what may start, and a hand-over must not cost anybody a gap.
 Here the time is added that it takes until what was held before is free.
 
-Rule of this file: it foretells and decides nothing.
+Rule of this file: it predicts and decides nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
 from backbone.scheduling.master_schedule import MasterSchedule
-from backbone.scheduling.plan import Slot
+from backbone.scheduling.planner import Slot
 from backbone.scheduling.prefix_maximum import PrefixMaximum
 from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import RequestState
@@ -21,16 +21,17 @@ from backbone.scheduling.rules import SchedulingRules
 
 
 class StartPrediction:
-    """Foretells grants from one master schedule."""
+    """Predicts grants from one master schedule."""
 
-    def __init__(self, table: MasterSchedule, rules: SchedulingRules) -> None:
-        """Foretell for this schedule.
+    def __init__(self, schedule: MasterSchedule, rules: SchedulingRules) -> None:
+        """Predict for this schedule.
 
         Args:
-            table: The master schedule; nothing in it changes.
+            schedule: Nothing in it changes.
             rules: With which it is decided; of the time to stop cleanly half is expected to be taken.
         """
-        self._table = table
+        self._schedule = schedule
+        self._table = schedule.table
         self._pause_s = rules.grace_s / 2
         self._rules = rules
 
@@ -44,7 +45,7 @@ class StartPrediction:
         starts_s: dict[ArcEntry, float] = {}
         for slot in sorted(slots, key=lambda slot: slot.start_s):  # whom one waits for starts earlier
             start_s = slot.start_s
-            if start_s < math.inf and self._table.planned_whole(slot.arc):
+            if start_s < math.inf and self._schedule.planner_of(slot.arc).is_exact:
                 start_s = max([start_s, *self._frees_s(slot, starts_s, now_s)])
             starts_s[slot.arc] = start_s
         if self._table.strict:
@@ -66,7 +67,7 @@ class StartPrediction:
                 over_s = end_s
             if abs(end_s - slot.start_s) <= INSTANT_S or not self._table.fits(arc, [other]):
                 times_s.append(over_s + self._release_s(other, arc))
-        for holder in dict.fromkeys(holder for rc in arc.uses for holder in self._table.rcs[rc].holders):
+        for holder in dict.fromkeys(holder for rc in arc.uses for holder in self._table.state.rcs[rc].holders):
             displaced = slot.start_s <= now_s + INSTANT_S and holder is not arc
             if displaced and holder.state is not RequestState.REVOKING and not self._table.fits(arc, [holder]):
                 times_s.append(now_s + self._release_s(holder, arc))

@@ -27,10 +27,10 @@ from backbone.scheduling.events import (
     WakeAt,
     Woken,
 )
+from backbone.scheduling.master_schedule import EXACT_UP_TO
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
-from backbone.scheduling.table import EXACT_UP_TO
 
 MISSION = "watch"
 TOLERANCE_S = 1e-6

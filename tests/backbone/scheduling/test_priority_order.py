@@ -5,7 +5,8 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.scheduling.priority import PriorityTree, by_precedence, higher
+from backbone.scheduling.priority import by_precedence, higher
+from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import PathNode
 
 Tree = dict[str, tuple[str | None, int]]  # node → (parent, number)

@@ -5,6 +5,7 @@ from random import Random
 import pytest
 from simulated_switches import REPAIR_S, Bench, ask, load, manager, sharable, unit
 
+from backbone.scheduling.arc_events import RETRY_S
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -37,7 +38,6 @@ from backbone.scheduling.requests import (
     Usage,
 )
 from backbone.scheduling.rules import SchedulingRules
-from backbone.scheduling.schedule_manager import RETRY_S
 
 
 def told(bench: Bench, kind: type) -> list:
@@ -372,7 +372,19 @@ def test_a_demand_that_can_never_be_served_is_refused_with_the_numbers():
     assert refused.value.facts == {"rc": "r", "demanded": 0.6, "used": 0.2, "free": 0.3}
 
 
-@pytest.mark.parametrize(("least_s", "most_s"), [(0.0, 0.0), (-1.0, 0.0), (5.0, 4.0), (float("nan"), 0.0)])
+@pytest.mark.parametrize(
+    ("least_s", "most_s"),
+    [
+        (0.0, 0.0),
+        (-1.0, 0.0),
+        (5.0, 4.0),
+        (1e-12, 0.0),
+        (1e308, 0.0),
+        (5.0, 1e308),
+        (float("nan"), 0.0),
+        (5.0, float("nan")),
+    ],
+)
 def test_a_request_without_a_usable_minimum_run_time_is_refused(least_s, most_s):
     bench = Bench(manager(), unit("v"))
     with pytest.raises(MissingRuntime):
@@ -384,6 +396,31 @@ def test_a_stream_that_makes_no_sense_is_refused(usage):
     bench = Bench(manager(), sharable("r"))
     with pytest.raises(SchedulingRefusal):
         bench.manager.choose(ask("a", {"r": RcUse([usage])}).request)
+
+
+def test_more_streams_than_a_message_may_have_are_refused():
+    bench = Bench(manager(), sharable("r"))
+    with pytest.raises(SchedulingRefusal, match="995 streams"):
+        bench.manager.choose(ask("a", {"r": RcUse([Usage(100.0, 1e-5)] * 995)}).request)
+
+
+def test_streams_on_an_rc_that_is_not_sharable_are_held_to_what_it_can_serve_and_use_it_alone():
+    bench = Bench(manager(), unit("u"))
+    with pytest.raises(CapacityExceeded):
+        bench.manager.choose(ask("a", {"u": load(1.2)}).request)
+    for arc in "ab":
+        bench.tell(ask(arc, {"u": load(0.2)}))
+    assert [line["use"] for line in bench.trace if line["ev"] == "request"] == [{"u": "x"}] * 2
+    assert [bench.run(1.0).runs(arc) for arc in "ab"] == [[(0.0, None)], []]
+
+
+@pytest.mark.parametrize("capacity", [float("nan"), -0.1, 1.1, float("inf")])
+def test_a_capacity_that_cannot_be_changes_nothing(capacity):
+    bench = Bench(manager(), sharable("r"))
+    bench.tell(ask("a", {"r": load(0.4)}))
+    bench.tell(CapacityChanged("r", capacity))
+    assert bench.run(1.0).runs("a") == [(0.0, None)]
+    assert bench.manager.schedule(1.0).rcs[0].capacity == 1.0
 
 
 def test_a_request_for_nothing_is_refused():
@@ -454,7 +491,7 @@ def test_why_has_an_answer_in_every_state():
     bench.tell(ask("f", "v"))
     assert bench.manager.why("a", 7.0).state == "revoking"
     bench.run(9.0)
-    assert "asked again" in bench.manager.why("f", 9.0).lines[0]
+    assert "again at" in bench.manager.why("f", 9.0).lines[0]
 
 
 def test_the_schedule_shows_holders_and_who_is_next():

@@ -32,7 +32,7 @@ def test_a_the_order_of_one_group_does_not_leak_into_another():
 
 
 def test_b_what_was_freed_by_force_goes_to_the_one_it_was_freed_for():
-    """``e`` is equal to both and older than ``x``: without the reservation it would take what ``x`` forced ``h`` to free."""
+    """``e`` is equal to both and older than ``x``: but for the reservation it would take what ``x`` made free."""
     bench = Bench(manager(), unit("v", disconnect_s=0.25))
     bench.tell(ask("h", "v", path=P1_H))
     bench.at(1.0, ask("e", "v", path=P2_E))

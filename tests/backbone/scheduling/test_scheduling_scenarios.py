@@ -116,3 +116,16 @@ def test_s10_under_strict_a_lower_one_never_runs_while_a_higher_one_waits():
     bench = mission(H1, H2, ask("l", "r2"), policy="strict")
     assert bench.runs("l") == []
     assert bench.verdict() == []
+
+
+@pytest.mark.parametrize(("count", "share", "fit"), [(3, 0.4, 2), (4, 0.4, 2), (5, 0.3, 3), (4, 0.3, 3)])
+def test_of_equals_on_a_radio_each_stays_for_as_many_slices_as_fit_at_once(count, share, fit):
+    """Rule 5, last sentence: with one switch for each slice that ends, and none that undoes itself."""
+    bench = mission(
+        *(ask(f"a{n}", {"r": load(share)}) for n in range(count)), rcs=[sharable("r")], until_s=5.0 * 12 * count
+    )
+    had_s = [sum((end_s or bench.now_s) - start_s for start_s, end_s in bench.runs(f"a{n}")) for n in range(count)]
+    assert had_s == pytest.approx([bench.now_s * fit / count] * count, abs=10.0)
+    lost = {(line["arc"], line["t"]) for line in bench.trace if line["ev"] == "revoke"}
+    assert not [line for line in bench.trace if line["ev"] == "connect" and (line["arc"], line["t"]) in lost]
+    assert bench.verdict() == []

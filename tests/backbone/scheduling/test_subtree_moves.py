@@ -13,7 +13,8 @@ from random_missions import play, random_mission
 from simulated_switches import MISSION, Bench, ask, manager, unit
 
 from backbone.scheduling.events import NodeMoved, PriorityChanged
-from backbone.scheduling.priority import PriorityTree, higher
+from backbone.scheduling.priority import higher
+from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.requests import NotMovable, PathNode, UnknownRequest
 
 seeds = st.integers(0, 2**32)

@@ -1,8 +1,8 @@
-"""First in line: whose time has come in a group that is too big to be planned whole.
+"""Large group: in a group too large to be planned whole, each RC is reserved for the first in line at it only.
 
-Each RC is reserved for the first in line at it only: an ARC starts if it is done before those would
-start, and may overtake who stands further back. That takes a look at the ARC's own RCs instead of at
-the whole group.
+This is backfilling with a reservation for the first in line (see ``planner``), here at each RC: an ARC starts if it is
+done before those would start, and may overtake ARCs that stand further back. That takes a look at the ARC's own RCs
+instead of at the whole group.
 
 Source: decision 0011.
 """
@@ -10,55 +10,56 @@ Source: decision 0011.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from backbone.scheduling.entries import INSTANT_S, ArcEntry
-from backbone.scheduling.plan import Turn
+from backbone.scheduling.estimate import estimate
+from backbone.scheduling.planner import Slot, Turn
+from backbone.scheduling.priority import higher
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
 
 LOOK_AHEAD = 3  # chosen: how many first ones may wait for each other before the present holders alone tell
 
 
-class FirstInLine:
+class LargeGroupPlanner:
     """Looks at one ARC after the other, each beside those that want the same RCs."""
 
+    is_exact = False
+    reserves = False
+
     def __init__(self, table: Table, *, slack_s: float) -> None:
-        """Begin with nobody to look at.
+        """Begin with no ARC to look at.
 
         Args:
-            table: Who is there, and what fits together.
+            table: What is asked.
             slack_s: By how much two reservations may overlap.
         """
         self._table = table
+        self._state = table.state
         self._slack_s = slack_s
         self._candidates: dict[ArcEntry, None] = {}
         self._reserved: dict[ArcEntry, float] = {}
-        self._firsts: dict[str, ArcEntry | None] = {}
-
-    def forget(self, rcs: Iterable[str]) -> None:
-        """Look again for who is first in line at these RCs."""
-        for rc in rcs:
-            self._firsts.pop(rc, None)
+        self._firsts: dict[str, tuple[int, ArcEntry | None]] = {}
 
     def look_near(self, rc: str) -> None:
         """Look at those for whom it matters what happened to this RC.
 
         That is who uses it, and who may have let one of those go first at another RC.
         """
-        table = self._table
-        users = table.users(rc)
+        state = self._state
+        users = state.users(rc)
         elsewhere = {other: None for arc in users if arc.queued for other in arc.uses if self._may_hold_up(arc, other)}
         near = dict.fromkeys(users)
         for other in elsewhere:
-            near.update((user, None) for user in table.users(other) if not table.is_kept_out(user))
+            near.update((user, None) for user in state.users(other) if not state.is_kept_out(user))
         self._candidates.update((arc, None) for arc in near if arc.state is RequestState.WAITING)
 
     def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:
         """Say whether somebody may have let the ARC go first at the RC, which would be free."""
-        if self._table.is_held(rc):
+        if self._state.is_held_alone(rc):
             return False
-        first = self.at(rc)
+        first = self._first_at(rc)
         return first is None or first is arc or first.level is not arc.level
 
     def due(self, now_s: float) -> Turn | None:
@@ -67,7 +68,7 @@ class FirstInLine:
         self._reserved.clear()  # nothing changes while they are looked at
         while self._candidates:
             arc, _ = self._candidates.popitem()
-            holders = table.holders(arc)
+            holders = self._state.holders(arc)
             if not (arc.state is RequestState.WAITING and table.could_start(arc, holders, now_s) and table.usable(arc)):
                 continue
             if self._takes_from_others(arc, now_s) or table.must_let_higher_go_first(arc):
@@ -89,11 +90,11 @@ class FirstInLine:
             competes = other is not arc and not self._table.fits(arc, [other, *crowd]) and self._table.usable(other)
             return competes and self._reserved_s(other, now_s, (arc,)) < end_s
 
-        firsts = [first for first in dict.fromkeys(self.at(rc) for rc in arc.uses) if first is not None]
+        firsts = [first for first in dict.fromkeys(self._first_at(rc) for rc in arc.uses) if first is not None]
         firsts.sort(key=self._reserved.__contains__, reverse=True)  # one that is known may tell enough
         if any(from_one(first) for first in firsts):
             return True
-        return any(from_one(one) for one in self._table.beside(arc) if one.goes_before(arc) and one.queued)
+        return any(from_one(one) for one in self._state.beside(arc) if one.goes_before(arc) and one.queued)
 
     def _must_be_done_s(self, arc: ArcEntry, start_s: float) -> float:
         """Return from when on others may need the RCs of an ARC that starts then: hand-overs may eat the slack."""
@@ -102,15 +103,17 @@ class FirstInLine:
     def _crowd(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return those that hold a sharable RC of the ARC."""
         return [
-            *dict.fromkeys(holder for rc in arc.shares for holder in self._table.rcs[rc].holders if holder is not arc)
+            *dict.fromkeys(holder for rc in arc.shares for holder in self._state.rcs[rc].holders if holder is not arc)
         ]
 
-    def at(self, rc: str) -> ArcEntry | None:
-        """Return the first in order of those queued for the RC; None if nobody is."""
-        if rc not in self._firsts:
-            queued = [user for user in self._table.users(rc) if user.queued and self._table.usable(user)]
-            self._firsts[rc] = self._table.first_in_order(queued) if queued else None
-        return self._firsts[rc]
+    def _first_at(self, rc: str) -> ArcEntry | None:
+        """Return the first in order of those queued for the RC; None if there is none."""
+        version = self._state.version_of(rc)
+        known = self._firsts.get(rc)
+        if known is None or known[0] != version:
+            queued = [user for user in self._state.users(rc) if user.queued and self._table.usable(user)]
+            known = self._firsts[rc] = version, self._table.first_in_order(queued) if queued else None
+        return known[1]
 
     def _reserved_s(self, arc: ArcEntry, now_s: float, behind: tuple[ArcEntry, ...]) -> float:
         """Return from when its RCs are reserved for the ARC: when its holders go and others first in line have run.
@@ -124,12 +127,12 @@ class FirstInLine:
         if known_s is not None:
             return known_s
         table = self._table
-        in_the_way = [holder for holder in table.holders(arc) if table.clash(arc, holder)]
+        in_the_way = [holder for holder in self._state.holders(arc) if table.clash(arc, holder)]
         start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
         if len(behind) > LOOK_AHEAD or arc.reservation is not None:  # what is freed for it by force is nobody else's
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
-            first = self.at(rc)
+            first = self._first_at(rc)
             if first is None or first is arc or first in behind or not table.clash(arc, first):
                 continue
             first_s = self._reserved_s(first, now_s, (*behind, arc))
@@ -137,3 +140,41 @@ class FirstInLine:
                 start_s = math.inf if first.goes_before(arc) else max(start_s, first_s + first.length_s)
         self._reserved[arc] = start_s
         return start_s
+
+    def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
+        """Return None: to look for a forgotten turn here would take a plan of the whole group."""
+        del group, now_s
+        return None
+
+    # Views: which ARCs wait before which, and when an ARC will start.
+
+    def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+        """Return an estimate of the place of every queued ARC of the group, in order."""
+        return estimate(self._table, self._table.in_order([arc for arc in group if arc.queued]), now_s)
+
+    def slots_around(self, arc: ArcEntry, now_s: float) -> list[Slot]:
+        """Return an estimate of the place of a queued ARC."""
+        return estimate(self._table, [*self.before(arc), arc], now_s)[-1:]
+
+    def start_s(self, arc: ArcEntry, now_s: float) -> float:
+        """Return an estimate of when the RCs of a queued ARC will begin to settle."""
+        return self.slots_around(arc, now_s)[0].start_s
+
+    def before(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the queued ARCs that come before a queued one at one of its RCs, in order.
+
+        Under ``strict`` also higher ones anywhere in its group.
+        """
+        before: dict[ArcEntry, None] = {}
+        for rc in arc.uses:
+            order = self._table.in_order([user for user in self._state.users(rc) if user.queued])
+            before.update(dict.fromkeys(order[: order.index(arc)]))
+        if self._table.strict:
+            group = self._state.group_of(arc)
+            before.update((other, None) for other in group if other.queued and higher(other.path, arc.path))
+        return self._table.in_order([*before])
+
+    def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return who is first in line at an RC of the ARC and is not the ARC itself."""
+        firsts = dict.fromkeys(self._first_at(rc) for rc in arc.uses)
+        return [first for first in firsts if first is not None and first is not arc]
