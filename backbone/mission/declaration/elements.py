@@ -12,6 +12,7 @@ from backbone.mission.declaration.values import (
     Address,
     Capacity,
     ClassPath,
+    Driver,
     Duration,
     Flag,
     Multiplicity,
@@ -154,9 +155,12 @@ class ResourceElement(Declared):
     disconnect_s: Seconds = Field(
         default=0.0, description="Time it takes to let go, seconds, 0 or more, at most a day."
     )
-    driver: Name = Field(
+    driver: Driver = Field(
         default="simulated",
-        description="Name of the driver its controller uses; 'simulated' is played by the mission's world.",
+        description=(
+            "Name of the driver its controller uses, or its class, written package.module:Class; 'simulated' is played "
+            "by the mission's world."
+        ),
     )
     features: Names = Field(default=(), description="What it has, as names separated by blanks, for wishes (camera).")
     process: Name = Field(

@@ -22,6 +22,8 @@ T = TypeVar("T")
 
 LEAST_WHOLE, MOST_WHOLE = -(2**31), 2**31 - 1  # those of xs:int
 
+_NAME = r"[a-z][a-z0-9_\-]{0,62}"
+_CLASS_PATH = r"[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*"
 _BLANKS = " \t\r\n"  # those of XML; Python knows more
 _DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
@@ -73,7 +75,7 @@ _WHOLE_TEXT = BeforeValidator(_read_whole)
 Name = Annotated[
     str,
     Field(
-        pattern=r"^[a-z][a-z0-9_\-]{0,62}$",
+        pattern=rf"^{_NAME}$",
         json_schema_extra=_kind(
             "name", "A lower-case letter, then lower-case letters, digits, '_' or '-'; at most 63 characters."
         ),
@@ -92,8 +94,15 @@ ParameterName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,62}$", json_sch
 ClassPath = Annotated[
     str,
     Field(
-        pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$",
+        pattern=rf"^{_CLASS_PATH}$",
         json_schema_extra=_kind("class-path"),
+    ),
+]
+Driver = Annotated[
+    str,
+    Field(
+        pattern=rf"^({_NAME}|{_CLASS_PATH})$",
+        json_schema_extra=_kind("driver"),
     ),
 ]
 Address = Annotated[

@@ -74,7 +74,7 @@ def test_every_fault_has_a_remedy_and_the_faults_are_told_in_order(path: Path) -
 
 
 def test_there_are_enough_broken_files_and_each_announces_a_fault() -> None:
-    assert len(BROKEN) >= 25
+    assert len(BROKEN) >= 60
     assert all(announced(path) for path in BROKEN)
 
 
@@ -272,6 +272,19 @@ def test_a_new_kind_of_hardware_needs_no_other_schema(tmp_path: Path) -> None:
     assert next(kind.needs for kind in description.types if kind.name == "drive") == ["scout", "lidar", "command_radio"]
     assert description.behaviors[1].arc is not None
     assert description.behaviors[1].arc.features == {"lidar": ("long-range",)}
+
+
+def test_a_driver_is_named_or_given_by_its_class(tmp_path: Path) -> None:
+    lamp = '<type name="lamp" class="resource_pool.rcs.skeleton:Lamp" subsystem="resource_pool"/>\n  </types>'
+    driver = "resource_pool.rcs.skeleton:PaintedLamp"
+    resource = (
+        f'<resource type="lamp" name="lamp1" driver="{driver}"><parameter name="color" value="green"/></resource>'
+    )
+    text = changed(("  </types>", lamp), ("  </resources>", f"{resource}</resources>"))
+    lamp1 = read_text(tmp_path, text).resources[-1]
+    assert (lamp1.driver, lamp1.parameters) == (driver, {"color": "green"})
+    [fault] = faults_in(tmp_path, text.replace(driver, "Painted Lamp"))
+    assert "driver='Painted Lamp' in <resource> is illegal" in fault.message
 
 
 def test_a_creator_on_another_host_is_fine(tmp_path: Path) -> None:
