@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
 from backbone.mission.generate import generated
 from backbone.mission.reader import Fault, MissionInvalid, read_mission, read_mission_bytes
+from backbone.mission.shipped_types import shipped_types
 from backbone.mission.tables import parameter_value
 
 HERE = Path(__file__).parent
@@ -170,3 +172,20 @@ def test_facts_of_a_type_name_what_it_takes_for_people() -> None:
     assert [one.legal_values for one in parameters_of(Kinds)] == ["integer or null", "array", "true or false"]
     assert [one.told for one in parameters_of(Kinds)][2] == "boolean, default true"
     assert [one.accepts(None) for one in parameters_of(Kinds)] == [True, False, False]
+
+
+def test_the_reference_of_behaviors_has_the_parameters_of_their_classes_with_their_defaults() -> None:
+    sections = (ROOT / "docs" / "reference" / "behaviors.md").read_text().split("\n## ")[1:]
+    classes = {kind.text("name"): kind.text("class") for kind in shipped_types()}
+    for section in sections:
+        heading, _, text = section.partition("\n")
+        kinds = re.findall(r"`(\w+)`", heading)
+        known = {one.name: one for kind in kinds for one in shipped_classes()[classes[kind]].parameters}
+        rows = re.findall(r"^\| (`[^|]*`) \|([^|]*)\|", text, re.MULTILINE)
+        named = [name for names, _defaults in rows for name in re.findall(r"`(\w+)`", names)]
+        assert set(named) == set(known), kinds
+        for names, defaults in rows:
+            written = [default.strip("` ") for default in defaults.split(",") if default.strip()]
+            for name, default in zip(re.findall(r"`(\w+)`", names), written, strict=False):
+                one = known[name]
+                assert default == ("required" if one.is_required else f"{one.schema['default']:g}"), name
