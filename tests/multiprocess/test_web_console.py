@@ -144,7 +144,8 @@ class Program:
     async def drive(self) -> None:
         with contextlib.suppress(ConnectionClosed):
             while True:
-                await self.say(do="drive", forward=0, right=1, speed_rad_s=6)
+                moment = self.view["own"]["moment"]
+                await self.say(do="drive", moment=moment, forward=0, right=1, speed_rad_s=6)
                 await asyncio.sleep(0.05)
 
     async def wait(self, is_so: Callable[[], Any], what: str, within_s: float = WITHIN_S) -> None:

@@ -107,14 +107,13 @@ class Operator:
     def obey(self, intent: Intent) -> None:
         """Do what the browser asks; what takes time goes on beside."""
         match intent:
-            case Steer(forward, right, speed_rad_s):
-                self._with_robot(
-                    lambda console: console.hold(drive_by_stick(forward, right, speed_rad_s), STICK_LASTS_S)
-                )
+            case Steer(moment, forward, right, speed_rad_s):
+                drive = drive_by_stick(forward, right, speed_rad_s)
+                self._by_press(moment, lambda console: console.hold(drive, STICK_LASTS_S))
             case StopWheels():
                 self.stop()
-            case JumpOnce():
-                self._with_robot(Teleoperation.jump)
+            case JumpOnce(moment):
+                self._by_press(moment, Teleoperation.jump)
             case Drawn(robot, number):
                 self._drawn(robot, number)
             case Watch(robots):
@@ -198,6 +197,11 @@ class Operator:
     def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
         if self._console is not None and self._console.is_ready:
             act(self._console)
+
+    def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
+        """Do what moves the robot unless the press is from an earlier moment, however late the page's word came."""
+        if moment == self.model.moment:
+            self._with_robot(act)
 
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)

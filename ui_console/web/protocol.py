@@ -16,12 +16,18 @@ from ui_console.web.door import Beat, Hello, ShortText
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
 
+Moment = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
 class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="drive"):
-    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be said again meanwhile."""
+    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be said again meanwhile.
 
+    Attributes:
+        moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
+    """
+
+    moment: Moment
     forward: Share
     right: Share
     speed_rad_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_RAD_S)]
@@ -32,7 +38,13 @@ class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fi
 
 
 class JumpOnce(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="jump"):
-    """Jump."""
+    """Jump.
+
+    Attributes:
+        moment: As in ``Steer``.
+    """
+
+    moment: Moment
 
 
 class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):

@@ -64,6 +64,10 @@ class Browser:
     async def say(self, **message: Any) -> None:
         await self.socket.send(json.dumps(message))
 
+    async def drive(self, **stick: float) -> None:
+        """Say that the stick is held since now."""
+        await self.say(do="drive", moment=self.view["own"]["moment"], **stick)
+
     async def wait(self, holds: Callable[[], Any], what: str) -> None:
         """Return when this holds of what was heard so far."""
         try:

@@ -15,8 +15,9 @@ const DEAD_ZONE = 0.12; // chosen: worn sticks rest within it
  * down, the gamepad's shoulder button pressed again.
  */
 export class Driving {
-  constructor({ pad, knob, hint, say, isClogged, speed, does }) {
-    Object.assign(this, { pad, knob, hint, say, isClogged, speed });
+  constructor({ pad, knob, hint, say, isClogged, speed, moment, does }) {
+    Object.assign(this, { pad, knob, hint, say, isClogged, speed, moment });
+    this.pressedAt = 0; // the moment at which what is held was pressed
     this.isOn = false;
     this.keys = new Set();
     this.pointer = null;
@@ -120,6 +121,7 @@ export class Driving {
       if (this.timer !== 0) { clearInterval(this.timer); this.timer = 0; this.say({ do: "stop" }); }
     } else if (this.timer === 0) {
       this.hint.hidden = true;
+      this.pressedAt = this.moment();
       this.timer = setInterval(() => this.tell(), SAY_EVERY_MS);
       this.tell();
     }
@@ -128,7 +130,8 @@ export class Driving {
   tell() {
     const wanted = this.wanted();
     if (wanted === null || this.isClogged()) return; // what cannot leave now must not arrive late
-    this.say({ do: "drive", forward: wanted[0], right: wanted[1], speed_rad_s: this.speed() });
+    const [forward, right] = wanted;
+    this.say({ do: "drive", moment: this.pressedAt, forward, right, speed_rad_s: this.speed() });
   }
 }
 

@@ -31,6 +31,9 @@ export class Hand {
 
   get held() { return this.own?.is_held ? this.own.robot : ""; }
 
+  /** The newest moment that is shown: a press from an earlier one moves nothing. */
+  get moment() { return this.own?.moment ?? 0; }
+
   get speed() { return Number(find("speed").value); }
 
   change(step) {
@@ -55,6 +58,7 @@ export class Hand {
     this.own = own;
     this.now_s = now_s;
     if (isOther(before, own)) this.driving.letGo(own.is_held); // what is held down was meant for another moment
+    else if (own.moment !== before.moment) this.driving.letGo();
     this.driving.turn(own.is_held);
     if (own.is_asked) this.memory.forget();
     set(find("own"), own.status);
@@ -96,11 +100,11 @@ export class Hand {
   }
 }
 
-/** Is this another moment than that, so that whatever is held down has to be let go first? */
+/** Is this another robot, hold or stop than that, so that whatever is held down has to be let go first? */
 export function isOther(before, own) {
   if (before === null) return true;
   return before.is_held !== own.is_held || before.robot !== own.robot || before.epoch !== own.epoch
-    || before.stop?.number !== own.stop?.number || (own.must_let_go === true && before.must_let_go !== true);
+    || before.stop?.number !== own.stop?.number;
 }
 
 /** What this tab held when its connection ended: it outlives the connection, a reload, and the server. */

@@ -27,6 +27,7 @@ const driving = new Driving({
   does: (what) => act(what, what === "take" ? cards.meant : ""),
   isClogged: () => link.isClogged,
   speed: () => hand.speed,
+  moment: () => hand.moment,
 });
 const hand = new Hand({ act, driving });
 const blindness = new Blindness({
@@ -92,7 +93,7 @@ const words = {
   may_i: () => ({ do: "may_i" }),
   consent: (isGiven) => ({ do: "decide", is_given: isGiven }),
   dismiss: () => ({ do: "dismiss_lost" }),
-  jump: () => ({ do: "jump" }),
+  jump: () => ({ do: "jump", moment: hand.moment }),
   why: (name) => ({ do: "why", name }),
   acknowledge: (key) => ({ do: "acknowledge", key }),
   parameters: (name) => ({ do: "parameters", name }),
