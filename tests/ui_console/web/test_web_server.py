@@ -81,9 +81,7 @@ async def test_a_press_from_before_a_stop_moves_nothing_after_the_lift(stage: St
         await anna.say(do="jump", moment=pressed_at)
         await anna.drive(forward=1.0, right=0.0, speed_rad_s=3.0)
         await stage.placer.wait(lambda: len(stage.drives()) > count)
-        assert stage.drives()[count][1] == Drive(3.0, 3.0, after_stop=1), (
-            "the first that moved it was pressed after the lift"
-        )
+        assert stage.drives()[count][1] == Drive(3.0, 3.0, after_stop=1), "it was pressed after the lift"
 
 
 async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back(stage: Stage) -> None:
