@@ -6,6 +6,7 @@ import { Driving } from "./driving.js";
 import { Hand } from "./hand.js";
 import { Keys } from "./keys.js";
 import { Link } from "./link.js";
+import { Log } from "./log.js";
 import { Login } from "./login.js";
 import { notice, read, showAlarm, showHealth } from "./notices.js";
 import { Stopping } from "./stopping.js";
@@ -20,7 +21,10 @@ const view = {};
 const link = new Link({ heard, saw: (picture) => cards.saw(picture), changed });
 const say = (message) => link.say(message);
 const cards = new Cards({ stage: find("stage"), thumbs: find("thumbs"), say, act });
-const tables = new Tables({ tabs: find("tabs"), panel: find("panel"), act });
+const log = new Log({
+  form: find("log-search"), status: find("log-status"), exporting: find("log-export"), say, redraw: () => tables.draw(),
+});
+const tables = new Tables({ tabs: find("tabs"), panel: find("panel"), act, log });
 const stopping = new Stopping({ say, shown: find("unsure") });
 const driving = new Driving({
   pad: find("pad"), knob: find("knob"), hint: find("let-go"), say,
@@ -50,7 +54,7 @@ function changed({ is, why, ageMs }) {
   driving.letGo();
   cards.letGo();
   if (link.isUp) find("console").hidden = false;
-  else { hand.cut(why, ageMs); cards.cut(); }
+  else { hand.cut(why, ageMs); cards.cut(); log.cut(); }
   if (is === "fresh") cards.watch();
   if (is === "refused") { find("console").hidden = true; login.ask(why); }
   blindness.look();
@@ -76,11 +80,13 @@ function heard(message) {
   if (changes.robots || changes.own) cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
   if (changes.health !== undefined) showHealth(view.health);
   if (changes.alarms) showAlarm(view.alarms, act);
+  if (changes.welcome || changes.robots || changes.log) log.know(view);
   tables.show(view, changes);
 }
 
 function answered(answer) {
   if (answer.why !== undefined) read(`Why ${answer.why}?`, answer.lines);
+  else if (answer.log) log.heard(answer.log);
   else if (answer.refused) notice(answer.refused);
   else if (answer.told === false || answer.done === false) notice("It did not answer so; the alarms say what it said.");
 }

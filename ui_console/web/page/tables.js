@@ -1,5 +1,6 @@
 // Tables of the mission. What is shown was decided by the console model; here it only becomes rows.
 
+import { paragraph, span, table } from "./table.js";
 import { seconds, set } from "./text.js";
 import { timeline } from "./timeline.js";
 
@@ -7,8 +8,8 @@ const NAMES = ["alarms", "robots", "tree", "schedule", "timeline", "links", "par
 const NOTHING = { alarms: "none", tree: "no behavior is known yet", parameters: "ask a component for its parameters" };
 
 export class Tables {
-  constructor({ tabs, panel, act }) {
-    Object.assign(this, { tabs, panel, act });
+  constructor({ tabs, panel, act, log }) {
+    Object.assign(this, { tabs, panel, act, log });
     this.chosen = "alarms";
     this.view = {};
     this.buttons = new Map();
@@ -42,6 +43,7 @@ export class Tables {
     this.chosen = name;
     for (const [other, button] of this.buttons) button.setAttribute("aria-selected", String(other === name));
     this.panel.setAttribute("aria-labelledby", `tab-${name}`);
+    this.log.form.hidden = name !== "log";
     this.draw();
   }
 
@@ -49,18 +51,21 @@ export class Tables {
     this.view = view;
     const alarms = (view.alarms ?? []).filter((alarm) => !alarm.acknowledged_by).length;
     set(this.buttons.get("alarms"), alarms ? `alarms (${alarms})` : "alarms");
-    if (this.section in changed) this.draw();
+    const isFound = this.chosen === "log" && this.log.found !== null; // what was found does not change
+    if (this.section in changed && !isFound) this.draw();
   }
 
   get section() { return this.chosen === "schedule" ? "requests" : this.chosen; }
 
   draw() {
-    const isHeld = this.panel.querySelector("input:focus, button:active") !== null;
+    const isPressed = this.panel.querySelector("input:focus, button:active") !== null;
+    const isHeld = isPressed && this.chosen !== "log"; // what is pressed in the log asks for another table
     this.panel.classList.toggle("is-held", isHeld); // somebody is typing or pressing here: it says that it stands still
     const rows = this.view[this.section];
     if (isHeld || rows === undefined) return;
     const focus = this.panel.contains(document.activeElement) ? document.activeElement.dataset.key : "";
-    if (this.chosen === "timeline") this.panel.replaceChildren(timeline(rows, this.panel.clientWidth));
+    if (this.chosen === "log") this.panel.replaceChildren(...this.log.draw(rows));
+    else if (this.chosen === "timeline") this.panel.replaceChildren(timeline(rows, this.panel.clientWidth));
     else if (rows.length) this.panel.replaceChildren(this[this.section](rows));
     else this.panel.replaceChildren(paragraph(NOTHING[this.chosen] ?? "nothing yet"));
     if (focus) this.panel.querySelector(`[data-key="${CSS.escape(focus)}"]`)?.focus();
@@ -137,10 +142,6 @@ export class Tables {
     ]));
   }
 
-  log(rows) {
-    return table(["at", "about", "what", "told by"], [...rows].reverse().map((row) => [seconds(row.at_s), row.subject, row.what, row.where]));
-  }
-
   more(name) {
     const both = document.createElement("span");
     both.append(
@@ -162,44 +163,4 @@ export class Tables {
 
 function follows(lines) {
   return lines.length ? ` (and what follows from it: ${lines.join("; ")})` : "";
-}
-
-/** Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still. */
-function table(heads, rows) {
-  const made = document.createElement("table");
-  made.setAttribute("role", "table");
-  const head = made.createTHead().insertRow();
-  head.setAttribute("role", "row");
-  for (const one of heads) {
-    const cell = document.createElement("th");
-    cell.scope = "col";
-    cell.setAttribute("role", "columnheader");
-    cell.append(one);
-    head.append(cell);
-  }
-  const body = made.createTBody();
-  for (const row of rows) {
-    const line = body.insertRow();
-    line.setAttribute("role", "row");
-    row.forEach((one, number) => {
-      const cell = line.insertCell();
-      cell.setAttribute("role", "cell");
-      cell.dataset.head = typeof heads[number] === "string" ? heads[number] : "";
-      cell.append(one);
-    });
-  }
-  return made;
-}
-
-function span(className, text) {
-  const made = document.createElement("span");
-  made.className = className;
-  made.textContent = text;
-  return made;
-}
-
-function paragraph(text) {
-  const made = document.createElement("p");
-  made.textContent = text;
-  return made;
 }
