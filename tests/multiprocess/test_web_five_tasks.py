@@ -1,7 +1,7 @@
 """Five tasks of an operator at a tablet, by the guide alone: what is touched is found by its words, and counted.
 
-The guide says how many touches each takes; a touch is a tap, a hold, or a drag of one finger. Choosing from a list takes
-two.
+The guide says how many touches each takes; a touch is a tap, a hold, or a drag of one finger. Choosing from a list
+takes two.
 """
 
 from __future__ import annotations
