@@ -1,6 +1,11 @@
 // Rows become a table.
 
-/** Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still. */
+/**
+ * Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still.
+ *
+ * @param {(string | HTMLElement)[]} heads
+ * @param {(string | HTMLElement)[][]} rows
+ */
 export function table(heads, rows) {
   const made = document.createElement("table");
   made.setAttribute("role", "table");
@@ -27,6 +32,10 @@ export function table(heads, rows) {
   return made;
 }
 
+/**
+ * @param {string} className
+ * @param {string} text
+ */
 export function span(className, text) {
   const made = document.createElement("span");
   made.className = className;
@@ -34,6 +43,7 @@ export function span(className, text) {
   return made;
 }
 
+/** @param {string} text */
 export function paragraph(text) {
   const made = document.createElement("p");
   made.textContent = text;
