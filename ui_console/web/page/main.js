@@ -72,7 +72,10 @@ function heard(message) {
     blindness.hub(down_s < 0 ? -1 : 1000 * Math.max(0, (view.now_s ?? down_s) - down_s));
   }
   if (changes.robots) stopping.heard(view.robots);
-  if (changes.robots || changes.own) cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
+  if (changes.robots || changes.own) {
+    cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
+    nameStop();
+  }
   if (changes.health !== undefined) showHealth(view.health);
   if (changes.alarms) showAlarm(view.alarms, act);
   tables.show(view, changes);
@@ -104,7 +107,7 @@ function act(what, name, more = {}) {
   switch (what) {
     case "halt": driving.letGo(true); return;
     case "stop_robot": driving.letGo(); stopping.one(name); return;
-    case "stop_mine": driving.letGo(); stopMine(hand.held || cards.meant); return;
+    case "stop_mine": driving.letGo(); stopMine(meant()); return;
     case "stop_all": driving.letGo(); stopping.all(); return;
     case "faster": hand.change(1); return;
     case "slower": hand.change(-1); return;
@@ -113,14 +116,20 @@ function act(what, name, more = {}) {
   if (!say(words[what](name, more))) notice(`NOT CONNECTED: ${what.replace("_", " ")} was not sent.`);
 }
 
+function meant() { return hand.held || cards.meant; }
+
+/** A dialog covers every red button but its own. */
+function nameStop() { set(find("reading-stop"), `Stop ${meant()}`); }
+
 function stopMine(name) {
   if (name) stopping.one(name);
   else notice("There is no robot to stop.");
 }
 
-find("stop-all").addEventListener("click", () => act("stop_all", ""));
+for (const id of ["stop-all", "reading-stop-all"]) find(id).addEventListener("click", () => act("stop_all", ""));
+find("reading-stop").addEventListener("click", () => act("stop_mine", ""));
 for (const dialog of document.querySelectorAll("dialog")) {
-  new MutationObserver(() => driving.letGo()).observe(dialog, { attributeFilter: ["open"] });
+  new MutationObserver(() => { driving.letGo(); nameStop(); }).observe(dialog, { attributeFilter: ["open"] });
 }
 document.addEventListener("visibilitychange", () => say({ do: "here", is_there: !document.hidden }));
 let touchedAt = 0;
