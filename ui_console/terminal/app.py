@@ -233,10 +233,12 @@ class ConsoleApp(EndingApp):
         names = [robot.robot for robot in self._view.robots] if self._view is not None else []
         model, panel = self._session.model, self._panel()
         dialog = self.screen.subject if isinstance(self.screen, Dialog) else ""
-        placed, shown = dialog or _subject_of(panel.placed), _subject_of(panel.row)
+        robots = self.screen_stack[0].query_one(f"#{PanelName.ROBOTS}", Panel)
+        placed = (dialog, _subject_of(panel.placed), _subject_of(robots.placed))
+        shown = _subject_of(panel.row)
         return {
             "held": model.robot if model.held is not None else "",
-            "placed": placed if placed in names else "",
+            "placed": next((robot for robot in placed if robot in names), ""),
             "wanted": model.robot,
             "shown": shown if shown in names else names[0] if len(names) == 1 else "",
         }
