@@ -39,6 +39,7 @@ from ui_console.views import AlarmView, ConsoleView
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
+LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which nothing old looks fresh
 SPEED_RAD_S, SPEED_STEP_RAD_S, SPEED_MOST_RAD_S = 4.0, 1.0, 15.0  # chosen: a walk, fine steps, a Scout's most
 NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
 A = TypeVar("A")
@@ -146,8 +147,7 @@ class ConsoleApp(EndingApp):
         self.set_interval(every_s, self.redraw)
         if self.profile is Profile.TERMINAL:
             self.set_interval(REDRAW_EVERY_S, self.redraw_video)
-        if self.profile is Profile.MONITOR:
-            self.set_interval(TABLES_EVERY_S, self.redraw_if_cut)
+        self.set_interval(LINK_LOOK_S, self.redraw_if_cut)
 
     def on_resize(self, _event: Resize) -> None:
         """Show as much as fits now."""
