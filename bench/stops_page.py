@@ -27,6 +27,12 @@ BUTTONS = {
     Gesture.RED_MINE: "#stop-mine",
     Gesture.RED_ALL: "#stop-all",
 }
+IN_A_DIALOG = {
+    Gesture.RED_ONE: "#reading-stop",
+    Gesture.RED_MINE: "#reading-stop",
+    Gesture.RED_ALL: "#reading-stop-all",
+}
+"""A dialog covers every red button but its own."""
 GAMEPAD_BUTTONS = {Gesture.PAD_ONE: 1, Gesture.PAD_ALL: 3}
 SAID = ("link", "blind-title", "unsure", "own", "lost-line", "let-go")
 BEFORE = """
@@ -73,7 +79,7 @@ class Page(TriedConsole):
         for gesture in gestures:
             if gesture in BUTTONS:
                 button = self._page.locator(BUTTONS[gesture]).first
-                await button.evaluate("one => one.scrollIntoView({ block: 'nearest' })")
+                await button.evaluate("one => one.scrollIntoView({ block: 'center' })")
                 self._aimed[gesture] = await button.bounding_box()
 
     async def give(self, gesture: Gesture) -> float:
