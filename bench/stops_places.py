@@ -113,7 +113,7 @@ def _card(part: str, robot: str, needs: str = "") -> Place:
 
 CARD = {
     "take": ".row button:nth-child(1)",
-    "stop": ".row button:nth-child(2)",
+    "stop_robot": ".row button:nth-child(2)",
     "why": ".row button:nth-child(3)",
     "enlarge": ".enlarge",
     "lift": ".lift",
@@ -127,8 +127,8 @@ PAGE = (
     *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login button")),
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
     *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),
-    *(_card(part, ROBOT) for part in ("take", "stop", "why")),
-    *(_card(part, OTHERS[0]) for part in ("take", "stop", "why", "enlarge")),
+    *(_card(part, ROBOT) for part in ("take", "stop_robot", "why")),
+    *(_card(part, OTHERS[0]) for part in ("take", "stop_robot", "why", "enlarge")),
     _card("lift", OTHERS[1], "stopped"),
     Place(
         "dialog of reasons",

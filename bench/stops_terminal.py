@@ -141,6 +141,8 @@ class Terminal(TriedConsole):
         """See ``TriedConsole``."""
         if place.open and not place.of.startswith(("panel:", "action_bare")):
             await self._hold_no_key()
+        if place.needs == "stopped":
+            await self._shows("STOPPED")
         for key in place.open.split():
             await self._press(key)
             await asyncio.sleep(ANSWERED_S if key == "i" else 0.0)

@@ -219,9 +219,7 @@ IN_REACH = """(words) => [...document.querySelectorAll("button.emergency")].some
 
 
 @pytest.mark.parametrize("size", ALL_SIZES)
-async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finger(
-    stage: Stage, size: str
-) -> None:
+async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finger(stage: Stage, size: str) -> None:
     async with page_at(stage, size) as page:
         await take(page)
         await page.evaluate("() => document.getElementById('reading').showModal()")
