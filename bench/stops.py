@@ -14,6 +14,7 @@ import argparse
 import asyncio
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -145,7 +146,8 @@ class Runner:
         moving = [robot for robot in meant if self._moves(robot)]
         too_many = [robot for robot in set(ROBOTS) - set(meant) if world.orders(robot) > orders[robot]]
         if silent or moving or too_many:
-            return {**found, "fault": _faults(silent, moving, too_many)}
+            by = {robot: world.poses.moved_by(robot, SETTLED_S) for robot in moving}
+            return {**found, "moved_by": by, "fault": _faults(silent, moving, too_many)}
         stood_s = [world.poses.moved_last_s(robot, given_s) or given_s for robot in meant]
         latched_s = [world.stopped_s(robot, given_s) or heard_s[robot] for robot in meant]
         found["stands_s"] = round(max(*stood_s, *latched_s) - given_s, 3)
@@ -274,6 +276,9 @@ def together(wanted: list[Cell]) -> list[list[Cell]]:
 async def try_all(wanted: list[Cell], within_s: float) -> list[dict[str, Any]]:
     """Try these cells, each printed as soon as it is known; return them."""
     rows = []
+    trying = asyncio.current_task()
+    assert trying is not None
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, trying.cancel)  # nothing is left behind
     async with world_of(MISSION) as world:
         for name in dict.fromkeys(cell.console for cell in wanted):
             async with console_at_hand(name) as console:

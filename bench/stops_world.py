@@ -81,6 +81,13 @@ class Poses:
         seen = self._seen[robot]
         return max((pose.at_s for pose in seen if pose.at_s >= since_s and _differs(pose, seen[-1])), default=None)
 
+    def moved_by(self, robot: str, last_s: float) -> tuple[float, float]:
+        """Return how far it turned and went in the last moment: radians and meters."""
+        now = self._seen[robot][-1]
+        then = next(pose for pose in self._seen[robot] if pose.at_s >= now.at_s - last_s)
+        turned_rad = math.remainder(now.heading_rad - then.heading_rad, math.tau)
+        return round(turned_rad, 4), round(math.hypot(now.x_m - then.x_m, now.y_m - then.y_m), 4)
+
     async def _look(self, robot: str) -> None:
         self._seen[robot].append(await self._bus.ask("resource_pool/world", AskPose(robot), Pose, within_s=1.0))
 
