@@ -147,6 +147,13 @@ class LetGoNeeded:
 
 
 @dataclass(frozen=True, slots=True)
+class MomentBegan:
+    """A stop, a lift, a grant, a loss, or a broken link: what was pressed before it moves nothing any more."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class PictureSeen:
     """A picture arrived."""
 
@@ -422,6 +429,7 @@ OwnEvent = (
     | LinkTrouble
     | GivenBack
     | LetGoNeeded
+    | MomentBegan
     | PictureSeen
     | WhyHeard
     | Attention
@@ -457,6 +465,7 @@ _WORDS: dict[type[Any], str] = {
     LinkTrouble: "no_answer",
     GivenBack: "released",
     LetGoNeeded: "let_go",
+    MomentBegan: "moment",
     PictureSeen: "picture",
     WhyHeard: "why",
     Attention: "attention",

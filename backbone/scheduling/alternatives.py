@@ -33,7 +33,7 @@ def choose(state: ScheduleState, request: SchedulingRequest) -> tuple[str, ...]:
     """Return the set of RCs this request should wait for.
 
     What it already waits for or holds stays. Otherwise RCs that did not fail come first, then those
-    nobody else asked for exclusively (two claims of any robot get two robots), then those that are
+    no other ARC asked for exclusively (two claims of any robot get two robots), then those that are
     running, then the request's own order.
 
     Raises:
@@ -72,7 +72,7 @@ def _reluctance(state: ScheduleState, arc: str, wish: Wish) -> tuple[bool, int, 
 
 
 def _overloaded_alone(state: ScheduleState, wish: Wish) -> str | None:
-    """Return an RC that could not serve the wish even if nobody else were there; None: all could."""
+    """Return an RC that could not serve the wish alone; None: all could."""
     for name, use in wish.items():
         rc, admission = state.rcs[name], state.compatibility.admission
         streams = sorted((stream(usage) for usage in use.streams), key=lambda one: one.period_us)

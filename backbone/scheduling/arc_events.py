@@ -41,7 +41,7 @@ class ArcEvents:
         priorities: PriorityEvents,
         rules: SchedulingRules,
     ) -> None:
-        self._do = transitions
+        self._transitions = transitions
         self._state = schedule.state
         self._table = schedule.table
         self._tree = tree
@@ -86,7 +86,7 @@ class ArcEvents:
         arc = self._add(Requested(msgspec.structs.replace(request, idle=False), rcs))
         holders = [other for other in self._state.arcs.values() if other.holds]
         if self._table.usable(arc) and self._table.fits(arc, holders):
-            self._do.adopt(arc, event.epochs, event.granted_s)
+            self._transitions.adopt(arc, event.epochs, event.granted_s)
         self._state.request_again(arc, request)
 
     def wanted(self, name: str) -> None:
@@ -102,23 +102,23 @@ class ArcEvents:
 
     def _want(self, arc: ArcEntry) -> None:
         """Queue an idle ARC, or have it wait for that if its owner asked and left too often."""
-        wait_s = self._damping.wait_s(arc.request.owner, self._do.now_s)
+        wait_s = self._damping.wait_s(arc.request.owner, self._transitions.now_s)
         if wait_s:
             self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
         else:
             self._queue(arc)
 
     def _queue(self, arc: ArcEntry) -> None:
-        self._do.trace.record(trace.about("want", self._do.now_s, arc.name), "it wants time again")
-        self._do.queue(arc)
+        self._transitions.trace.record(trace.about("want", self._transitions.now_s, arc.name), "it wants time again")
+        self._transitions.queue(arc)
 
     def _wait_to_ask(self, arc: ArcEntry, wait_s: float, why: str) -> None:
-        self._state.retry_at(arc, self._do.now_s + wait_s, why)
+        self._state.retry_at(arc, self._transitions.now_s + wait_s, why)
         self._retrying[arc.name] = arc
 
     def _leaves(self, arc: ArcEntry) -> None:
         if arc.has_forced and arc.state in (RequestState.WAITING, RequestState.CONNECTING):
-            self._damping.left_in_vain(arc.request.owner, self._do.now_s)
+            self._damping.left_in_vain(arc.request.owner, self._transitions.now_s)
 
     def idled(self, name: str) -> None:
         """An ARC wants no time now; it keeps its request and gives its RCs back."""
@@ -136,9 +136,9 @@ class ArcEvents:
         elif arc.state is not RequestState.IDLE:
             self._record_idle(name, "it wants no time now")
             if arc.state is RequestState.WAITING:
-                self._state.rest(arc, self._do.now_s)
+                self._state.rest(arc, self._transitions.now_s)
             else:
-                self._do.revoke(arc, "self", "", Afterwards.IDLE)
+                self._transitions.revoke(arc, "self", "", Afterwards.IDLE)
 
     def departed(self, name: str, why: str) -> None:
         """An ARC withdrew or died."""
@@ -150,13 +150,13 @@ class ArcEvents:
         if arc is None or (arc.holds and arc.afterwards is Afterwards.GONE):
             return
         self._leaves(arc)
-        self._do.trace.record(trace.about("depart", self._do.now_s, name), because(why, ""))
+        self._transitions.trace.record(trace.about("depart", self._transitions.now_s, name), because(why, ""))
         if not arc.holds:
             self._forget(arc)
         elif arc.state is RequestState.REVOKING:
             self._state.set_afterwards(arc, Afterwards.GONE)
         else:
-            self._do.revoke(arc, why, "", Afterwards.GONE)
+            self._transitions.revoke(arc, why, "", Afterwards.GONE)
 
     def runtime_changed(self, event: RuntimeChanged) -> None:
         """An ARC has other run times from its next slice on; times that cannot be planned change nothing."""
@@ -167,8 +167,8 @@ class ArcEvents:
         if not can_be_planned(minimum_s, maximum_s):
             return
         self._state.set_run_times(arc, minimum_s, maximum_s)
-        line = trace.runtime(self._do.now_s, event.arc, minimum_s, maximum_s)
-        self._do.trace.record(line, "from the next slice on")
+        line = trace.runtime(self._transitions.now_s, event.arc, minimum_s, maximum_s)
+        self._transitions.trace.record(line, "from the next slice on")
 
     def extended(self, name: str, until_s: float) -> None:
         """A running ARC goes on until then, at most until the end of its maximum run time."""
@@ -177,7 +177,7 @@ class ArcEvents:
             return
         until_s = min(until_s, arc.slice_s + arc.maximum_s)
         if until_s > arc.end_s:
-            self._do.extend(arc, until_s)
+            self._transitions.extend(arc, until_s)
 
     # Outcomes of context switches.
 
@@ -185,7 +185,7 @@ class ArcEvents:
         """The ARC's RCs have settled and its gate is open."""
         arc = self._state.arcs.get(name)
         if arc is not None and arc.state is RequestState.CONNECTING:
-            self._do.grant(arc)
+            self._transitions.grant(arc)
 
     def open_failed(self, name: str, rc: str) -> None:
         """The ARC's RCs could not all be connected (``rc``: already counted as down), or its gate did not open."""
@@ -193,10 +193,10 @@ class ArcEvents:
         if arc is None or arc.state is not RequestState.CONNECTING:
             return
         if rc in arc.uses:
-            self._do.lose(arc, "rc", rc)
+            self._transitions.lose(arc, "rc", rc)
         else:
             self._record_idle(name, f"it could not open its gate; again in {RETRY_S:g} s")
-            self._do.lose(arc, "failed", "", Afterwards.IDLE)
+            self._transitions.lose(arc, "failed", "", Afterwards.IDLE)
             self._wait_to_ask(arc, RETRY_S, "it could not open its gate")
         self.freed(name)
 
@@ -207,8 +207,10 @@ class ArcEvents:
             return
         afterwards = arc.afterwards
         waits = afterwards is Afterwards.WAIT
-        self._do.trace.record(trace.about("free", self._do.now_s, name), "its RCs are in their safe states")
-        self._do.free(arc, RequestState.WAITING if waits else RequestState.IDLE)
+        self._transitions.trace.record(
+            trace.about("free", self._transitions.now_s, name), "its RCs are in their safe states"
+        )
+        self._transitions.free(arc, RequestState.WAITING if waits else RequestState.IDLE)
         if afterwards is Afterwards.WANT:
             self.wanted(name)
         elif afterwards is Afterwards.GONE:
@@ -221,7 +223,7 @@ class ArcEvents:
         for arc in [*self._retrying.values()]:
             if arc.retry_s is None:
                 del self._retrying[arc.name]
-            elif arc.state is RequestState.IDLE and arc.retry_s <= self._do.now_s:
+            elif arc.state is RequestState.IDLE and arc.retry_s <= self._transitions.now_s:
                 del self._retrying[arc.name]
                 self._queue(arc)
 
@@ -234,17 +236,17 @@ class ArcEvents:
     def _add(self, event: Requested) -> ArcEntry:
         request = event.request
         for rc in event.rcs:
-            self._do.trace.introduce_rc(self._state.rcs[rc], self._do.now_s)
+            self._transitions.trace.introduce_rc(self._state.rcs[rc], self._transitions.now_s)
         place_in_tree = self._priorities.place(request)
         uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
         longest_s = self._longest_s(request.minimum_runtime_s)
-        arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, self._do.now_s)
-        wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, self._do.now_s)
-        self._do.trace.record_request(arc, self._do.now_s, idle=request.idle or wait_s > 0)
+        arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, self._transitions.now_s)
+        wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, self._transitions.now_s)
+        self._transitions.trace.record_request(arc, self._transitions.now_s, idle=request.idle or wait_s > 0)
         if wait_s:
             self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
         elif not request.idle:
-            self._do.queue(arc)
+            self._transitions.queue(arc)
         return arc
 
     def _longest_s(self, minimum_s: float) -> float:
@@ -265,7 +267,7 @@ class ArcEvents:
             self._successors[name] = Requested(msgspec.structs.replace(event.request, idle=idle), event.rcs)
 
     def _record_idle(self, name: str, cause: str) -> None:
-        self._do.trace.record(trace.about("idle", self._do.now_s, name), cause)
+        self._transitions.trace.record(trace.about("idle", self._transitions.now_s, name), cause)
 
 
 def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:

@@ -1,6 +1,6 @@
-"""Entries of the master schedule: what it knows of each RC and of each ARC.
+"""Entries: the record of each RC and of each ARC in the schedule.
 
-Rule of this file: data, and what can be read off it; nothing decides here.
+Rule of this file: data and what is computed from it alone. Only ``ScheduleState`` writes it.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class ArcEntry:
         granted_s: When it was granted, while it runs.
         slice_s: When its present slice began, while it runs: at the grant, or later where it stayed connected.
         epochs: RC → epoch, while it holds them.
-        awaited: Somebody waited for the end of its slice when last looked.
+        awaited: Its end of slice is on the agenda, because an ARC waits for it.
         afterwards: What becomes of it once free, while it is being revoked.
         has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
         retry_s: When it counts again, after it could not open or left too often; None: when it wants time.

@@ -1,6 +1,6 @@
-"""Estimate: when ARCs of a group that is too big to be planned whole will start, for people.
+"""Estimate: predicted starts of the ARCs of a large group, for people.
 
-Nobody's turn depends on it. Source: decision 0011.
+No turn depends on it. Source: decision 0011.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from backbone.scheduling.table import Table
 
 
 def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot]:
-    """Return where these will be, given in order, if at each RC one turn after the other is taken.
+    """Return the places of these ARCs, given in order, if each RC serves one after the other.
 
-    What sharers of an RC take of its time is counted by what they send, not stream by stream.
+    Sharers of an RC are counted by their share of its time, not stream by stream.
     """
     ends_s: dict[str, float] = {}
     taken_s: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""The words of the RC manager's pure core: what it is told (events) and what it tells (instructions).
+"""Events and instructions: the input and the output of the schedule manager.
 
 Rules of this file: plain frozen data; no bus, no clock. Times are mission seconds.
 An event says what *has happened*; an instruction is carried out in the order given, and its outcome
@@ -17,7 +17,7 @@ from backbone.scheduling.requests import SchedulingRequest
 # ---------------------------------------------------------------------- events
 @dataclass(frozen=True, slots=True)
 class RcKnown:
-    """An RC exists; told again after its restart.
+    """An RC exists; repeated after its restart.
 
     Attributes:
         rc: Its name.
@@ -55,7 +55,7 @@ class RcWentDown:
 
 @dataclass(frozen=True, slots=True)
 class RcCameBack:
-    """The RC answers again; it holds nobody."""
+    """The RC answers again, without holders."""
 
     rc: str
     last_epoch: int

@@ -1,4 +1,4 @@
-"""Invariants: what holds after every decision, whatever happened; looked at by tests and simulations.
+"""Invariants: what holds after every decision; tests and simulations check them.
 
 Rule of this file: it reads the schedule and changes nothing.
 """
@@ -23,12 +23,12 @@ def broken(schedule: MasterSchedule, now_s: float) -> Iterator[Broken]:
         if not whole:
             yield f"{arc.name} holds all its RCs or none", [arc]
         if arc.reservation is not None and arc.state is not RequestState.WAITING:
-            yield "only who waits is reserved", [arc]
+            yield "only a waiting ARC has a reservation", [arc]
     for rc in schedule.state.rcs.values():
         yield from _broken_of(schedule, rc, [arc for arc in arcs if rc.name in arc.epochs])
     forgotten = schedule.forgotten(now_s)
     if forgotten is not None:
-        yield f"nobody's turn is forgotten, but {forgotten.name}'s", [forgotten]
+        yield f"the turn of {forgotten.name} is forgotten", [forgotten]
 
 
 def _broken_of(schedule: MasterSchedule, rc: RcEntry, holders: Sequence[ArcEntry]) -> Iterator[Broken]:
@@ -43,7 +43,7 @@ def _broken_of(schedule: MasterSchedule, rc: RcEntry, holders: Sequence[ArcEntry
         yield f"{rc.name}'s epochs grow", holders
     connected = [arc for arc in holders if arc.state in CONNECTED]
     if connected and not rc.up:
-        yield f"{rc.name} is down and holds nobody", connected
+        yield f"{rc.name} is down and has no holders", connected
     for arc in connected:
         if not schedule.table.fits(arc, [other for other in connected if other is not arc]):
             yield f"{rc.name} serves all its holders in time", connected

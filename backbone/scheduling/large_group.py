@@ -43,9 +43,9 @@ class LargeGroupPlanner:
         self._firsts: dict[str, tuple[int, ArcEntry | None]] = {}
 
     def look_near(self, rc: str) -> None:
-        """Look at those for whom it matters what happened to this RC.
+        """Look anew at the ARCs that a change of this RC concerns.
 
-        That is who uses it, and who may have let one of those go first at another RC.
+        Those are its users, and ARCs that may wait for one of its users at another RC.
         """
         state = self._state
         users = state.users(rc)
@@ -56,7 +56,7 @@ class LargeGroupPlanner:
         self._candidates.update((arc, None) for arc in near if arc.state is RequestState.WAITING)
 
     def _may_hold_up(self, arc: ArcEntry, rc: str) -> bool:
-        """Say whether somebody may have let the ARC go first at the RC, which would be free."""
+        """Say whether another ARC may wait at this free RC only because this one is first in line."""
         if self._state.is_held_alone(rc):
             return False
         first = self._first_at(rc)
@@ -129,7 +129,7 @@ class LargeGroupPlanner:
         table = self._table
         in_the_way = [holder for holder in self._state.holders(arc) if table.clash(arc, holder)]
         start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
-        if len(behind) > LOOK_AHEAD or arc.reservation is not None:  # what is freed for it by force is nobody else's
+        if len(behind) > LOOK_AHEAD or arc.reservation is not None:  # RCs freed for it by force are its own
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
             first = self._first_at(rc)

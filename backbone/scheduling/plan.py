@@ -1,8 +1,8 @@
 """Plan: when each queued ARC of a group can start, one after the other in their order (rule 3).
 
 Each gets the earliest start at which it fits for its whole settling and minimum run time, given who
-holds its RCs and what is reserved for those before it. Places are found when they are asked for:
-whoever wants to know about the first in order does not pay for the last.
+holds its RCs and what is reserved for those before it. Places are found on demand: a question about the first in order
+does not pay for the last.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class Plan:
     def _earliest_s(self, arc: ArcEntry, place: int) -> float:
         """Return the first time from which the ARC fits for its whole length; infinite if there is none.
 
-        A higher ARC stays once it runs: whoever is found to overlap its slot can start only never.
+        A higher ARC stays once it runs: an ARC that overlaps its slot never starts.
         """
         now_s, table = self._now_s, self._table
         touches, excludes = arc.touches, arc.excludes

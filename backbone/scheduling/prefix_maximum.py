@@ -1,4 +1,4 @@
-"""PrefixMaximum: what is known of those that are higher than somebody, without comparing each with each.
+"""Prefix maximum: the largest value among the paths that are higher than a path, without comparing each with each.
 
 Two paths part at siblings, so for every node it is enough to know its children's numbers.
 """

@@ -25,7 +25,7 @@ class PriorityEvents:
     def __init__(
         self, transitions: Transitions, schedule: MasterSchedule, tree: PriorityTree, rules: SchedulingRules
     ) -> None:
-        self._do = transitions
+        self._transitions = transitions
         self._state = schedule.state
         self._table = schedule.table
         self._tree = tree
@@ -36,7 +36,7 @@ class PriorityEvents:
         names, renumbered = self._tree.place(request.path, console=request.console)
         if renumbered:
             self._renumber()
-        self._do.trace.introduce_nodes(self._tree.path(names), self._do.now_s)
+        self._transitions.trace.introduce_nodes(self._tree.path(names), self._transitions.now_s)
         return names
 
     def priority_changed(self, node: str, priority: int) -> None:
@@ -49,7 +49,7 @@ class PriorityEvents:
         if self._tree.obstacle(node, parent):
             return
         old, new = self._tree.move(node, parent)
-        self._do.trace.nodes_moved(old, new)
+        self._transitions.trace.nodes_moved(old, new)
         self._changed(lambda place: carried(place, old, new))
 
     def age(self) -> None:
@@ -58,8 +58,8 @@ class PriorityEvents:
             return
         for arc in self._state.arcs.values():
             if arc.state is RequestState.WAITING:
-                self._state.raise_to(arc, int((self._do.now_s - arc.since_s) / self._aging_s + ROUNDING))
-            elif arc.served(self._do.now_s) or not arc.active:
+                self._state.raise_to(arc, int((self._transitions.now_s - arc.since_s) / self._aging_s + ROUNDING))
+            elif arc.served(self._transitions.now_s) or not arc.active:
                 self._state.raise_to(arc, 0)
         if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._state.arcs.values() if arc.raised):
             self._changed()
@@ -73,12 +73,12 @@ class PriorityEvents:
 
     def _changed(self, moved: Callable[[Place], Place] = _stays) -> None:
         self._renumber(moved)
-        for names in self._do.trace.nodes():
-            self._do.trace.introduce_nodes(self._tree.path(names), self._do.now_s)
+        for names in self._transitions.trace.nodes():
+            self._transitions.trace.introduce_nodes(self._tree.path(names), self._transitions.now_s)
         for rc in self._state.rcs.values():
             for holder in self._table.overloading(rc.name) if rc.sharable else ():
-                self._do.revoke(holder, "order", rc.name)
-        self._do.instruct(RenewLeases())
+                self._transitions.revoke(holder, "order", rc.name)
+        self._transitions.instruct(RenewLeases())
 
     def _renumber(self, moved: Callable[[Place], Place] = _stays) -> None:
         places = [(arc, moved(arc.place_in_tree)) for arc in self._state.arcs.values()]

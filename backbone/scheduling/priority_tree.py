@@ -15,7 +15,7 @@ class PriorityTree:
     """The places and numbers of all nodes and consoles that ever asked.
 
     A number or a place set by an operator holds until the operator sets another; a request's own
-    numbers and places hold for nodes nobody set. A request goes on naming the way its owner was
+    numbers and places hold for all other nodes. A request goes on naming the way its owner was
     started with: the moves since then lead from there to where it is now.
     """
 
@@ -57,7 +57,7 @@ class PriorityTree:
         return tuple(self._shared.setdefault(node, node) for node in numbered)
 
     def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
-        """Return the way as a request names it, with its numbers as they were set: nobody is raised for waiting."""
+        """Return the way as a request names it, with its numbers as they were set, without aging."""
         return [
             PathNode(name.removeprefix(CONSOLE), self._numbers[names[: depth + 1]]) for depth, name in enumerate(names)
         ]

@@ -16,7 +16,7 @@ class RcEvents:
     """Applies events of RCs."""
 
     def __init__(self, transitions: Transitions, schedule: MasterSchedule) -> None:
-        self._do = transitions
+        self._transitions = transitions
         self._state = schedule.state
         self._table = schedule.table
 
@@ -25,7 +25,7 @@ class RcEvents:
         if event.rc not in self._state.rcs:
             rc = self._state.add_rc(event)
             if rc.up:
-                self._do.trace.introduce_rc(rc, self._do.now_s)
+                self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
             return
         if event.up:
             self.came_back(event.rc, event.last_epoch)
@@ -39,10 +39,10 @@ class RcEvents:
         if rc is None or not self._state.rc_down(rc, None if lost_by else fault):
             return
         cause = f"it is put aside: {fault} (rule 11)" if fault else "it does not answer"
-        self._do.trace.record(trace.rc_state(self._do.now_s, name, up=False), cause)
+        self._transitions.trace.record(trace.rc_state(self._transitions.now_s, name, up=False), cause)
         for arc in [*self._state.arcs.values()]:
             if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
-                self._do.revoke(arc, "rc", name)
+                self._transitions.revoke(arc, "rc", name)
 
     def came_back(self, name: str, last_epoch: int) -> None:
         """The RC answers, and holds no ARC."""
@@ -53,9 +53,9 @@ class RcEvents:
             self.went_down(name)  # it was away for a moment and forgot its holders
         if not self._state.rc_up(rc, last_epoch):
             return
-        if self._do.trace.has_introduced(name):
-            self._do.trace.record(trace.rc_state(self._do.now_s, name, up=True), "it answers")
-        self._do.trace.introduce_rc(rc, self._do.now_s)
+        if self._transitions.trace.has_introduced(name):
+            self._transitions.trace.record(trace.rc_state(self._transitions.now_s, name, up=True), "it answers")
+        self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
 
     def capacity_changed(self, name: str, capacity: float) -> None:
         """The RC gives another share of its time; the last in order go until the rest fits."""
@@ -63,7 +63,7 @@ class RcEvents:
         if rc is None or rc.capacity == capacity or not 0 <= capacity <= 1:
             return
         self._state.set_capacity(rc, capacity)
-        if self._do.trace.has_introduced(name):
-            self._do.trace.record(trace.rc_capacity(self._do.now_s, name, capacity))
+        if self._transitions.trace.has_introduced(name):
+            self._transitions.trace.record(trace.rc_capacity(self._transitions.now_s, name, capacity))
         for holder in self._table.overloading(name):
-            self._do.revoke(holder, "capacity", name)
+            self._transitions.revoke(holder, "capacity", name)

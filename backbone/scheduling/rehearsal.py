@@ -84,6 +84,36 @@ class Rehearsal:
         self._opening: dict[str, Opened] = {}
         self._wake_s: float | None = None
 
+    @classmethod
+    def going_on(
+        cls,
+        manager: Decides,
+        now_s: float,
+        *,
+        under_way: Iterable[tuple[float, Opened | Freed]],
+        release_s: Mapping[str, float],
+        wake_s: float | None,
+        pause_s: Callable[[float], float],
+    ) -> Rehearsal:
+        """Go on from a schedule as it is.
+
+        Args:
+            manager: Who decides; a copy that is not used otherwise.
+            now_s: Mission time.
+            under_way: Outcomes of the context switches that have begun, and when they come.
+            release_s: RC → its release time.
+            wake_s: When the manager asked to be woken.
+            pause_s: Deadline in seconds → seconds a decision process takes to stop.
+        """
+        rehearsal = cls(manager, pause_s=pause_s)
+        rehearsal.now_s, rehearsal._wake_s = now_s, wake_s
+        rehearsal._release_s = dict(release_s)
+        for time_s, event in under_way:
+            rehearsal.at(time_s, event)
+            if isinstance(event, Opened):
+                rehearsal._opening[event.arc] = event
+        return rehearsal
+
     def at(self, time_s: float, event: Event) -> None:
         """Let it happen at that time, after all that was arranged for the same time before."""
         heapq.heappush(self._agenda, (time_s, next(self._serial), event))
@@ -114,19 +144,27 @@ class Rehearsal:
 
     def run(self, until_s: float) -> None:
         """Let time pass; all that is due at the last instant has happened afterwards."""
-        while (next_s := self._next_s()) is not None and next_s <= until_s:
-            self.now_s = max(self.now_s, next_s)
-            if not self._agenda or self._agenda[0][0] > self.now_s:
-                self._wake_s = None
-                self.tell(Woken())
-                continue
-            event = heapq.heappop(self._agenda)[2]
-            if not isinstance(event, Opened):
-                self.tell(event)
-            elif self._opening.get(event.arc) is event:  # else its connection was broken off
-                del self._opening[event.arc]
-                self.tell(event)
+        while self.step(until_s):
+            pass
         self.now_s = max(self.now_s, until_s)
+
+    def step(self, until_s: float) -> bool:
+        """Let the next thing happen if it is due by then; return whether anything was."""
+        next_s = self._next_s()
+        if next_s is None or next_s > until_s:
+            return False
+        self.now_s = max(self.now_s, next_s)
+        if not self._agenda or self._agenda[0][0] > self.now_s:
+            self._wake_s = None
+            self.tell(Woken())
+            return True
+        event = heapq.heappop(self._agenda)[2]
+        if not isinstance(event, Opened):
+            self.tell(event)
+        elif self._opening.get(event.arc) is event:  # else its connection was broken off
+            del self._opening[event.arc]
+            self.tell(event)
+        return True
 
     def _next_s(self) -> float | None:
         agenda_s = self._agenda[0][0] if self._agenda else None

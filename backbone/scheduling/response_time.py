@@ -1,4 +1,4 @@
-"""Which streams a sharable RC can serve together so that each packet is done in time.
+"""Response-time analysis: which streams a sharable RC can serve together, each packet by its deadline.
 
 A sharable RC sends one packet at a time and never breaks one off. Among waiting packets the one of
 the highest user priority goes first, then the one of the shorter period (rate monotonic), then the
@@ -66,7 +66,7 @@ def utilization(streams: Sequence[Stream]) -> float:
 
 
 def exceeds(capacity: float, streams: Sequence[Stream]) -> bool:
-    """Say whether they need more of the RC's time together than it may give, in whatever order they come."""
+    """Say whether they need more of the RC's time together than it may give, in any order."""
     return utilization(streams) > capacity + ROUNDING
 
 
@@ -119,7 +119,7 @@ def feasible_order(
     Args:
         streams: In any order.
         capacity: Part of its time the RC may give, 0 to 1.
-        before: ``before(a, b)``: stream number a must stay above stream number b, whatever that costs.
+        before: ``before(a, b)``: stream number a must stay above stream number b.
             A strict partial order.
 
     Returns:
@@ -180,7 +180,7 @@ class _Load:
 
 
 def _blockings_us(streams: Sequence[Stream]) -> list[int]:
-    """Return for each stream how long a lower packet that began one tick ago still takes."""
+    """Return the blocking time of each stream, in µs: the longest lower packet, begun one tick ago."""
     blockings, longest_us = [0] * len(streams), 1
     for place in range(len(streams) - 1, -1, -1):
         blockings[place] = longest_us - 1

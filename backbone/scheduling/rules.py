@@ -57,7 +57,7 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     ] = 0.2
 
     def slice_end_s(self, granted_s: float, minimum_s: float) -> float:
-        """Return when a slice that is granted at this time ends, if nobody ends or extends it.
+        """Return when a slice that is granted at this time ends, unless it is ended or extended.
 
         Example:
             >>> SchedulingRules().slice_end_s(1.5, 5.0), SchedulingRules(grid_s=4.0).slice_end_s(1.5, 5.0)

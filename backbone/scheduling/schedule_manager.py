@@ -15,6 +15,8 @@ Source: RAM 2002, "The RC Scheduler", last paragraph.
 
 from __future__ import annotations
 
+import copy
+import math
 from typing import assert_never
 
 from backbone.scheduling.alternatives import choose
@@ -51,11 +53,22 @@ from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
-from backbone.scheduling.requests import Lease, NotMovable, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.rehearsal import Rehearsal
+from backbone.scheduling.requests import (
+    Lease,
+    NotMovable,
+    RequestState,
+    Scheduled,
+    SchedulingRequest,
+    UnknownRequest,
+)
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.transitions import Transitions
 from backbone.scheduling.views import Attributes, Schedule, Why
+
+FORESEEN_S = 300.0  # chosen: a start later than in five minutes is no answer to an operator
+FORESEEN_LINES = 1000  # chosen: some two hundred slices; measured: 32 ARCs take 80 ms
 
 
 class ScheduleManager:
@@ -88,11 +101,12 @@ class ScheduleManager:
             self._state, strict=rules.policy == "strict", tolerance_s=tolerance_s, exact_up_to=exact_up_to
         )
         self._tree = PriorityTree(mission, mission_priority)
-        self._do = Transitions(self._schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
-        self._priorities = PriorityEvents(self._do, self._schedule, self._tree, rules)
-        self._arcs = ArcEvents(self._do, self._schedule, self._tree, self._priorities, rules)
-        self._rcs = RcEvents(self._do, self._schedule)
-        self._explanation = Explanation(self._schedule, rules)
+        self._transitions = Transitions(self._schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
+        self._priorities = PriorityEvents(self._transitions, self._schedule, self._tree, rules)
+        self._arcs = ArcEvents(self._transitions, self._schedule, self._tree, self._priorities, rules)
+        self._rcs = RcEvents(self._transitions, self._schedule)
+        self._explanation = Explanation(self._schedule, rules, self._granted_s)
+        self._grace_s = rules.grace_s
         self._wake_s: float | None = None
 
     # Events in, instructions out: apply, plan, switch.
@@ -109,18 +123,18 @@ class ScheduleManager:
         Returns:
             Instructions in the order in which they must be carried out.
         """
-        self._do.begin(now_s)
+        self._transitions.begin(now_s)
         self._apply(event)
         self._arcs.retry()
-        self._state.end_slices(self._do.now_s)
+        self._state.end_slices(self._transitions.now_s)
         self._priorities.age()
-        while turn := self._schedule.due(self._do.now_s):
+        while turn := self._schedule.due(self._transitions.now_s):
             self._switch(turn)
             self._priorities.age()
-        self._do.renew_slices()
-        self._do.expect()
+        self._transitions.renew_slices()
+        self._transitions.expect()
         self._set_alarm(rang=isinstance(event, Woken))
-        return self._do.instructions
+        return self._transitions.instructions
 
     def _apply(self, event: Event) -> None:
         match event:
@@ -165,27 +179,27 @@ class ScheduleManager:
     def _switch(self, turn: Turn) -> None:
         """Connect the ARC whose turn it is, or first revoke who is in its way."""
         if not turn.in_the_way:
-            self._do.connect(turn.arc)
+            self._transitions.connect(turn.arc)
             return
         # Those whose slices are over go first: what is freed by force must not look like the reason for it.
         for holder in sorted(turn.in_the_way, key=lambda holder: higher(turn.arc.path, holder.path)):
             overridden = higher(turn.arc.path, holder.path)
-            forced = overridden and not holder.served(self._do.now_s)
+            forced = overridden and not holder.served(self._transitions.now_s)
             if forced or not self._schedule.planner_of(turn.arc).reserves:
                 self._state.reserve(turn.arc, forced=forced)
             if overridden:
-                self._do.revoke(holder, "higher", turn.arc.name)
+                self._transitions.revoke(holder, "higher", turn.arc.name)
             else:
-                self._do.end_slice(holder, turn.arc)
+                self._transitions.end_slice(holder, turn.arc)
 
     def _set_alarm(self, *, rang: bool) -> None:
         """Ask to be woken when the next decision can be due without an event."""
-        slice_end_s = self._state.end_slices(self._do.now_s)
+        slice_end_s = self._state.end_slices(self._transitions.now_s)
         times_s = [self._arcs.next_retry_s(), slice_end_s, self._priorities.next_aging_s()]
         wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
         if rang or wake_s != self._wake_s:
             self._wake_s = wake_s
-            self._do.wake_at(wake_s)
+            self._transitions.wake_at(wake_s)
 
     # Views.
 
@@ -206,11 +220,11 @@ class ScheduleManager:
         Raises:
             UnknownRequest: It has none.
         """
-        return self._explanation.scheduled(self._known(arc), max(now_s, self._do.now_s))
+        return self._explanation.scheduled(self._known(arc), max(now_s, self._transitions.now_s))
 
     def schedule(self, now_s: float) -> Schedule:
         """Return who holds what, who waits for whom, and until when."""
-        return self._explanation.schedule(max(now_s, self._do.now_s))
+        return self._explanation.schedule(max(now_s, self._transitions.now_s))
 
     def why(self, name: str, now_s: float) -> Why:
         """Return why an ARC, an owner (name or address) or an RC is as it is.
@@ -218,7 +232,7 @@ class ScheduleManager:
         Raises:
             UnknownRequest: There is none of this name.
         """
-        return self._explanation.why(name, max(now_s, self._do.now_s))
+        return self._explanation.why(name, max(now_s, self._transitions.now_s))
 
     def attributes(self, name: str) -> Attributes:
         """Return what an ARC, an owner (name or address), or all at and below a node ask for.
@@ -244,7 +258,7 @@ class ScheduleManager:
             Lease(rc, arc.name, epoch, ranks.get(rc, -1))
             for arc in self._state.arcs.values()
             if arc.state in CONNECTED
-            for ranks in [self._do.ranks(arc)]
+            for ranks in [self._transitions.ranks(arc)]
             for rc, epoch in arc.epochs.items()
         ]
 
@@ -254,7 +268,7 @@ class ScheduleManager:
 
     def opening_lines(self) -> list[Record]:
         """Return the records with which a trace begins."""
-        return [Record(self._do.meta())]
+        return [Record(self._transitions.meta())]
 
     def check(self) -> None:
         """Make sure that the invariants of the schedule hold.
@@ -262,13 +276,45 @@ class ScheduleManager:
         Raises:
             AssertionError: One does not; with the story of the ARCs concerned.
         """
-        for invariant, whom in broken(self._schedule, self._do.now_s):
-            story = self._do.trace.story_of({arc.name for arc in whom})
-            raise AssertionError("\n".join([f"broken at {self._do.now_s}: {invariant}", *map(str, story)]))
+        for invariant, whom in broken(self._schedule, self._transitions.now_s):
+            story = self._transitions.trace.story_of({arc.name for arc in whom})
+            raise AssertionError("\n".join([f"broken at {self._transitions.now_s}: {invariant}", *map(str, story)]))
         for rc in self._state.rcs.values():
-            if self._do.trace.says_up(rc.name) not in (None, rc.up):
-                lines = map(str, self._do.trace.story_of({rc.name}))
+            if self._transitions.trace.says_up(rc.name) not in (None, rc.up):
+                lines = map(str, self._transitions.trace.story_of({rc.name}))
                 raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))
+
+    def _granted_s(self, arc: ArcEntry, now_s: float) -> float:
+        """Return when a waiting ARC is granted if nothing else happens, by playing a copy of this schedule forward.
+
+        Infinite: not within ``FORESEEN_S``.
+        """
+        rehearsal = self._going_on(now_s)
+        seen = 0
+        while rehearsal.step(now_s + FORESEEN_S) and len(rehearsal.trace) < FORESEEN_LINES:
+            for line in rehearsal.trace[seen:]:
+                if line["ev"] == "grant" and line["arc"] == arc.name:
+                    return rehearsal.now_s
+            seen = len(rehearsal.trace)
+        return math.inf
+
+    def _going_on(self, now_s: float) -> Rehearsal:
+        """Return a rehearsal of what comes; of the time to stop cleanly half is expected to be taken."""
+        under_way: list[tuple[float, Opened | Freed]] = []
+        for arc in self._state.arcs.values():
+            if arc.state is RequestState.CONNECTING:
+                under_way.append((max(now_s, arc.began_s + arc.settle_s), Opened(arc.name)))
+            elif arc.state is RequestState.REVOKING:
+                pause_s = self._grace_s / 2 if arc.swapped_out == "slice" and not arc.request.stops_at_once else 0.0
+                under_way.append((max(now_s, arc.since_s + pause_s + arc.release_s), Freed(arc.name)))
+        return Rehearsal.going_on(
+            copy.deepcopy(self),
+            now_s,
+            under_way=sorted(under_way, key=lambda item: item[0]),
+            release_s={rc.name: rc.disconnect_s for rc in self._state.rcs.values()},
+            wake_s=self._wake_s,
+            pause_s=lambda deadline_s: deadline_s / 2,
+        )
 
     def _known(self, arc: str) -> ArcEntry:
         if arc not in self._state.arcs:

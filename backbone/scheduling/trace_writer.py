@@ -1,7 +1,7 @@
-"""TraceWriter: what happens to the schedule, in the lines of the trace, each with its cause.
+"""TraceWriter: writes the lines of the trace, each with its cause.
 
-Rule of this file: whatever a line names was introduced by a line before it: RCs, and the nodes of the
-behavior tree, parents first.
+Rule of this file: every name in a line was introduced by a line before it: RCs, and the nodes of the behavior tree,
+parents first.
 """
 
 from __future__ import annotations

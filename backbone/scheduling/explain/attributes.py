@@ -1,4 +1,4 @@
-"""Attributes: what ARCs ask for, as it counts now, for whoever wants to see or change it.
+"""Attributes: run times, priorities and RCs of requests as they count now.
 
 Rule of this file: it reads, it never changes.
 """

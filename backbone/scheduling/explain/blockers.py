@@ -2,7 +2,7 @@
 
 Two answers to two questions. Who stands *directly* in the way is told by the plan at once, for every
 request in the schedule. Who must go *altogether* also counts those that would come before the ARC if
-the first ones were gone; it costs a plan for each of them, and is worked out for one ARC when somebody asks.
+the first ones were gone; it costs a plan for each of them, and is worked out for one ARC on demand.
 
 Rule of this file: it errs towards naming one too many, never one too few.
 """
@@ -63,7 +63,7 @@ class Blockers:
             grace_s: Time a decision process has to stop cleanly at the end of a slice.
 
         Returns:
-            In the order in which to remove them; nobody if only RCs settle or come free.
+            In the order in which to remove them; none if only RCs settle or come free.
         """
         held, rivals = self._holders_in_the_way(arc, now_s), self._rivals(arc)
         left = {*self._table.left_over(arc, [], [*held, *(one for one in rivals if one.touches & arc.touches)])}
@@ -129,7 +129,7 @@ class Blockers:
         return [one for one in rivals if self._table.usable(one)]
 
     def _older_equals(self, arc: ArcEntry) -> list[ArcEntry]:
-        """Return equals that are behind the ARC only as long as somebody waits who is higher than they are."""
+        """Return equals that are behind the ARC only while one waits that is higher than they are."""
         return [
             one
             for one in self._state.beside(arc)
@@ -150,7 +150,7 @@ class Blockers:
         now_s: float,
         grace_s: float,
     ) -> bool:
-        """Say whether the ARC would start after one hand-over if these were gone, whatever that takes of its time."""
+        """Say whether the ARC would start after one hand-over if these were gone."""
         rest = [other for other in group if other not in gone]
         sharing = [other for other in rest if other is not arc and other.holds and other.touches & arc.touches]
         if any(self._stays(h, arc, now_s) and h.state in CONNECTED and not self._table.fits(arc, [h]) for h in sharing):

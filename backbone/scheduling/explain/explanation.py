@@ -7,7 +7,7 @@ it says is what will happen if nothing else does.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from backbone.naming import component_of
@@ -22,6 +22,7 @@ from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.views import RcView, RequestView, Schedule, Why
 
 UNKNOWN_S = -1.0
+MOST_REHEARSED = 32  # measured: to play so many forward takes at most 80 ms
 
 _REASONS = {
     "slice": "its slice was over and it was the turn of {by}",
@@ -34,7 +35,7 @@ _REASONS = {
 }
 
 
-class _Told(NamedTuple):
+class _Answer(NamedTuple):
     """Lines for people, the rule that decides, and what would change it."""
 
     lines: list[str]
@@ -45,13 +46,18 @@ class _Told(NamedTuple):
 class Explanation:
     """Answers about one master schedule."""
 
-    def __init__(self, schedule: MasterSchedule, rules: SchedulingRules) -> None:
+    def __init__(
+        self, schedule: MasterSchedule, rules: SchedulingRules, granted_s: Callable[[ArcEntry, float], float]
+    ) -> None:
         """Explain this schedule.
 
         Args:
             schedule: Nothing in it changes.
             rules: With which it is decided.
+            granted_s: Waiting ARC, time of the question → when it is granted, by playing the schedule forward;
+                infinite: not foreseeable.
         """
+        self._granted_s = granted_s
         self._schedule = schedule
         self._table = schedule.table
         self._state = schedule.state
@@ -112,7 +118,7 @@ class Explanation:
 
     def _request_view(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> RequestView:
         blockers = self._blockers.direct(slot, now_s) if slot is not None else []
-        told = self._told(arc, slot, blockers, granted_s, now_s)
+        answer = self._answer(arc, slot, blockers, granted_s, now_s)
         return RequestView(
             arc=arc.name,
             owner=arc.request.owner,
@@ -121,13 +127,13 @@ class Explanation:
             since_s=arc.since_s,
             until_s=self._until_s(arc),
             expected_start_s=_expected_s(arc, granted_s),
-            because=f"{arc.name} {arc.state}: {told.lines[0]}",
+            because=f"{arc.name} {arc.state}: {answer.lines[0]}",
             blockers=[other.name for other in blockers],
             minimum_runtime_s=arc.minimum_s,
             priority="/".join(f"{name}:{number}" for name, number in arc.path),
             turns=arc.turns,
-            rule=told.rule,
-            would_change=told.would_change,
+            rule=answer.rule,
+            would_change=answer.would_change,
             raised=arc.raised,
         )
 
@@ -184,7 +190,7 @@ class Explanation:
             for arc, granted_s in coming
         ]
         if not holders and not coming:
-            lines.append("nobody asks for it")
+            lines.append("no ARC asks for it")
         return Why(
             name=rc.name,
             state="held" if holders else "free" if rc.up else "down",
@@ -197,13 +203,15 @@ class Explanation:
 
     def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
         slot, granted_s = self._place(arc, now_s)
+        if slot is not None and len(self._state.arcs) <= MOST_REHEARSED:
+            granted_s = self._granted_s(arc, now_s)
         blockers = self._blockers.direct(slot, now_s) if slot is not None else []
-        told = self._told(arc, slot, blockers, granted_s, now_s)
-        lines, would_change = [*told.lines], told.would_change
+        answer = self._answer(arc, slot, blockers, granted_s, now_s)
+        lines, would_change = [*answer.lines], answer.would_change
         lines += [self._stands(other, arc, now_s) for other in blockers]
         if arc.state is RequestState.WAITING:
             blockers = self._blockers.altogether(arc, now_s, grace_s=self._rules.grace_s)
-            would_change = self._would_let_it_start(arc, blockers, told.would_change)
+            would_change = self._would_let_it_start(arc, blockers, answer.would_change)
         if arc.swapped_out and arc.state is RequestState.WAITING:
             lines.append(f"it lost its RCs last because {_reason(arc)}")
         if arc.raised:
@@ -212,15 +220,15 @@ class Explanation:
             name=arc.name,
             state=arc.state,
             lines=[f"{arc.name} {arc.state}: {lines[0]}", *lines[1:]],
-            rule=told.rule,
+            rule=answer.rule,
             blockers=[other.name for other in blockers],
             expected_start_s=_expected_s(arc, granted_s),
             would_change=would_change,
         )
 
-    def _told(
+    def _answer(
         self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
-    ) -> _Told:
+    ) -> _Answer:
         match arc.state:
             case RequestState.WAITING:
                 return self._waits(arc, slot, blockers, granted_s, now_s)
@@ -229,43 +237,45 @@ class Explanation:
             case RequestState.CONNECTING:
                 settled_s = arc.began_s + arc.settle_s
                 what = f"its RCs are being connected since {_at(arc.began_s)}, settled at {_at(settled_s)}"
-                return _Told([what], "6", "its RCs settle, or a higher ARC asks")
+                return _Answer([what], "6", "its RCs settle, or a higher ARC asks")
             case RequestState.REVOKING:
                 what = f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"
-                return _Told([what], "6", "its RCs are free")
+                return _Answer([what], "6", "its RCs are free")
             case RequestState.IDLE if arc.retry_s is not None:
-                return _Told([f"{arc.retry_why}; again at {_at(arc.retry_s)}"], "6", "that time comes")
+                return _Answer([f"{arc.retry_why}; again at {_at(arc.retry_s)}"], "6", "that time comes")
             case RequestState.IDLE:
-                return _Told([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
+                return _Answer([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
 
     def _waits(
         self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
-    ) -> _Told:
+    ) -> _Answer:
         age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
         down = [rc for rc in arc.uses if not self._state.rcs[rc].up]
         if down:
             faults = [f"{rc} is put aside: {self._state.rcs[rc].fault}" for rc in down if self._state.rcs[rc].fault]
             reason = "; ".join([f"{age} for {', '.join(down)}, not up", *faults])
-            return _Told([reason], "11", f"{', '.join(down)} answers")
+            return _Answer([reason], "11", f"{', '.join(down)} answers")
         if slot is None or not self._table.usable(arc):
             crowded = ", ".join(rc for rc in arc.uses if self._state.rcs[rc].sharable)
-            return _Told([f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows")
+            return _Answer(
+                [f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows"
+            )
         if not blockers:
-            return _Told([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
+            return _Answer([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
         whom = _names(blockers)
         fits_now = slot.start_s <= now_s + INSTANT_S
         if self._table.strict and fits_now and all(o.queued and higher(o.path, arc.path) for o in blockers):
-            what = f"{age}: nobody starts while {whom}, higher in its group, waits (policy strict)"
-            return _Told([what], "8", f"{whom} starts or idles")
+            what = f"{age}: none starts while {whom}, higher in its group, waits (policy strict)"
+            return _Answer([what], "8", f"{whom} starts or idles")
         if granted_s == math.inf:
             what = f"{age} for {whom}, without a predicted start: no gap is long enough for it"
             remedy = f"{_release(blockers)}, or a shorter minimum run time"
-            return _Told([what], "9", remedy)
+            return _Answer([what], "9", remedy)
         if not self._schedule.planner_of(arc).is_exact and all(other.queued for other in blockers):
             what = f"{age}; first in line before it: {whom}; granted at about {_at(granted_s)}"
-            return _Told([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
+            return _Answer([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
         what = f"{age} for {whom}, granted at about {_at(granted_s)}"
-        return _Told([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
+        return _Answer([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
 
     def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
         """Return with what the ARC would start after one hand-over."""
@@ -276,12 +286,12 @@ class Explanation:
             needs.append(_release(blockers))
         return ", and ".join(needs) or otherwise
 
-    def _runs(self, arc: ArcEntry, now_s: float) -> _Told:
+    def _runs(self, arc: ArcEntry, now_s: float) -> _Answer:
         if arc.served(now_s):
-            what = f"since {_at(arc.granted_s)}; its slice is over, but nobody entitled can use its RCs"
-            return _Told([what], "5", "an equal or higher ARC asks for its RCs")
+            what = f"since {_at(arc.granted_s)}; its slice is over, and no waiting ARC is entitled to its RCs"
+            return _Answer([what], "5", "an equal or higher ARC asks for its RCs")
         what = f"since {_at(arc.granted_s)}, its slice ends at {_at(arc.end_s)}"
-        return _Told([what], "3", f"at {_at(arc.end_s)} an equal may take over; a higher ARC at once")
+        return _Answer([what], "3", f"at {_at(arc.end_s)} an equal may take over; a higher ARC at once")
 
     def _stands(self, other: ArcEntry, arc: ArcEntry, now_s: float) -> str:
         if higher(other.path, arc.path):

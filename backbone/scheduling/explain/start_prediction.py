@@ -1,6 +1,6 @@
 """StartPrediction: when those who wait will be granted, hand-overs included.
 
-The plan is made of slices only: it decides what may start, and a hand-over must not cost anybody a gap.
+The plan is made of slices only: it decides what may start, and a hand-over must not cost an ARC its gap.
 Here the time is added that it takes until what was held before is free.
 
 Rule of this file: it predicts and decides nothing.

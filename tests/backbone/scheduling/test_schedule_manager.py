@@ -471,7 +471,7 @@ def test_why_knows_owners_by_name_and_address_and_rcs():
     assert bench.manager.why("owner-a", 1.0).state == "running"
     assert bench.manager.why("mission_control/owner-a", 1.0).lines[0].startswith("a running")
     assert bench.manager.why("v", 1.0).blockers == ["a"]
-    assert bench.manager.why("w", 1.0).lines == ["w is up", "nobody asks for it"]
+    assert bench.manager.why("w", 1.0).lines == ["w is up", "no ARC asks for it"]
     with pytest.raises(UnknownRequest):
         bench.manager.why("nobody", 1.0)
     with pytest.raises(UnknownRequest):
