@@ -189,3 +189,10 @@ def test_the_reference_of_behaviors_has_the_parameters_of_their_classes_with_the
             for name, default in zip(re.findall(r"`(\w+)`", names), written, strict=False):
                 one = known[name]
                 assert default == ("required" if one.is_required else f"{one.schema['default']:g}"), name
+
+
+def test_the_only_robot_of_a_mission_needs_its_network_id_too(tmp_path: Path) -> None:
+    smallest = (ROOT / "docs" / "examples" / "smallest.xml").read_text()
+    without = re.sub(r" *<parameter .*\n", "", smallest).replace('name="scout1">', 'name="scout1" driver="serial">')
+    faults = faults_in(tmp_path, re.sub(r" *<scout .*\n", "", without))
+    assert [fault.message for fault in faults] == ["scout scout1 lacks parameter network_id"]
