@@ -13,11 +13,12 @@ from collections.abc import Sequence
 
 import msgspec
 
-from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_facts import ClassFacts, Question
 
 WITHIN_S = 30.0  # chosen: ten times the import of OpenCV and MuJoCo on a loaded machine
 
 _known: dict[str, ClassFacts] = {}
+_judged: dict[str, str] = {}
 
 
 def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
@@ -38,9 +39,30 @@ def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
     return {path: _known.get(path) or failed[path] for path in class_paths}
 
 
+def judge(questions: Sequence[Question]) -> list[str]:
+    """Return what each class says against the parameters; empty: it starts with them, or gave no answer.
+
+    Args:
+        questions: About classes that can be imported; their modules are run.
+    """
+    texts = [msgspec.json.encode(one, order="sorted").decode() for one in questions]
+    left = [text for text in dict.fromkeys(texts) if text not in _judged]
+    if left:
+        printed, _reason = _printed("judge", left)
+        _judged.update(zip(left, map(msgspec.json.decode, printed), strict=False))
+    return [_judged.get(text, "") for text in texts]
+
+
 def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
     """Return the answers up to the first class that ended or held up the process, and how it did so."""
-    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", *class_paths]
+    printed, reason = _printed("facts", class_paths)
+    answers = [msgspec.json.decode(line, type=ClassFacts) for line in printed]
+    return dict(zip(class_paths, answers, strict=False)), reason
+
+
+def _printed(what: str, about: Sequence[str]) -> tuple[list[bytes], str]:
+    """Return the lines that the other process printed, one for each question, and why there are not more."""
+    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", what, *about]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     reason = "the process that imports its module ends without an answer"
     try:
@@ -49,6 +71,4 @@ def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
         ).stdout
     except subprocess.TimeoutExpired as expired:
         printed, reason = expired.stdout or b"", f"its module is not imported within {WITHIN_S:g} s"
-    lines = printed[: printed.rfind(b"\n") + 1].splitlines()
-    answers = [msgspec.json.decode(line, type=ClassFacts) for line in lines]
-    return dict(zip(class_paths, answers, strict=False)), reason
+    return printed[: printed.rfind(b"\n") + 1].splitlines(), reason

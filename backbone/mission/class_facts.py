@@ -90,12 +90,14 @@ class ClassFacts(msgspec.Struct, frozen=True):
         doc: Its documentation.
         parameters: What it can be given in a mission file.
         options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
+        has_rules: Whether it has rules for its parameters besides their types; only the class itself can judge by them.
         failure: Why nothing can be said; empty: all is said.
     """
 
     doc: str = ""
     parameters: tuple[ParameterFacts, ...] = ()
     options: dict[str, tuple[ParameterFacts, ...]] | None = None
+    has_rules: bool = False
     failure: str = ""
 
     def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
@@ -103,6 +105,18 @@ class ClassFacts(msgspec.Struct, frozen=True):
         if self.options is None:
             return self.parameters
         return None if driver not in self.options else (*self.parameters, *self.options[driver])
+
+
+class Question(msgspec.Struct, frozen=True):
+    """Does this class start with these parameters?
+
+    Attributes:
+        class_path: The class.
+        values: The parameters.
+    """
+
+    class_path: str
+    values: dict[str, Any]
 
 
 @lru_cache(maxsize=1)

@@ -1,4 +1,4 @@
-"""The program that imports classes and prints their facts, one JSON line for each; see ``class_asking``."""
+"""The program that imports classes and prints what they say, one JSON line for each; see ``class_asking``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import msgspec
 
 from backbone.component.component import Component
-from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of
+from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 
 _ENTRY = re.compile(r"^    (\w+): (.*)$")
 
@@ -32,6 +32,7 @@ def facts_of(class_path: str) -> ClassFacts:
         inspect.getdoc(found) or "",
         own,
         None if options is None else {driver: _documented(struct) for driver, struct in options.items()},
+        hasattr(found.parameters_type, "__post_init__"),
     )
 
 
@@ -60,14 +61,27 @@ def _documentation(struct: type) -> dict[str, str]:
     return found
 
 
-def _answer(class_paths: Sequence[str]) -> None:
-    """Print the facts of each class as it is known; what the modules print goes nowhere."""
+def refusal(question: Question) -> str:
+    """Return what the class says against its own parameters among these; empty: nothing."""
+    module, _, name = question.class_path.partition(":")
+    struct = getattr(importlib.import_module(module), name).parameters_type
+    own = {field.encode_name for field in msgspec.structs.fields(struct)}
+    try:
+        msgspec.convert({key: value for key, value in question.values.items() if key in own}, struct)
+    except msgspec.ValidationError as error:
+        return str(error)
+    return ""
+
+
+def _answer(what: str, about: Sequence[str]) -> None:
+    """Print one answer a line, as soon as it is known; what the modules print goes nowhere."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    for path in class_paths:
-        answers.write(msgspec.json.encode(facts_of(path)) + b"\n")
+    for one in about:
+        answer = facts_of(one) if what == "facts" else refusal(msgspec.json.decode(one, type=Question))
+        answers.write(msgspec.json.encode(answer) + b"\n")
         answers.flush()
 
 
 if __name__ == "__main__":
-    _answer(sys.argv[1:])
+    _answer(sys.argv[1], sys.argv[2:])

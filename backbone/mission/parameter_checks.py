@@ -9,10 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of
+from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told, told_names
-from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, Tables, check_unique, parameter_value
+from backbone.mission.tables import (
+    CORE_SERVICES,
+    NETWORK_ID,
+    Tables,
+    check_unique,
+    parameter_value,
+    parameters,
+    section,
+)
 from backbone.scheduling.rules import SchedulingRules
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # other names are the schema's to refuse
@@ -59,6 +67,37 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
                 f"{kind} {element.text('name')} lacks parameter {one.name}",
                 f'Add <parameter name="{one.name}" value="…"/>: {one.meaning}',
             )
+
+
+def open_questions(tables: Tables) -> list[tuple[Element, Question]]:
+    """Return the elements whose parameters are each legal, and that have to be judged together by their class."""
+    resources = section(tables.root, "resources")
+    found = []
+    for element in [*resources, *tables.behaviors]:
+        facts = tables.facts_of(element.text("type"))
+        given = parameters(element)
+        if facts is None or not facts.has_rules or not given:
+            continue
+        known = facts.parameters_with(element.text("driver")) or facts.parameters
+        if all(one.accepts(given[one.name]) if one.name in given else not one.is_required for one in known):
+            found.append((element, Question(tables.types[element.text("type")].text("class"), given)))
+    return found
+
+
+def report_refusal(element: Element, refusal: str, tables: Tables, report: Report) -> None:
+    """Report what a class says against the parameters of an element, at the one that it speaks of."""
+    given = element.all("parameter")
+    named = (one for one in given if re.search(rf"\b{re.escape(one.text('name'))}\b", refusal))
+    quoted = (one for one in given if any(repr(word) in refusal for word in (one.text("value"), *one.words("value"))))
+    about = next(named, None) or next(quoted, None)
+    facts = tables.facts_of(element.text("type"))
+    meanings = {} if facts is None else {one.name: one.meaning for one in facts.parameters}
+    name = "" if about is None else about.text("name")
+    report.fault(
+        element.place if about is None else about.place_of("value"),
+        f"{element.text('type')} {element.text('name')} refuses its parameters: {refusal}",
+        f"{name}: {meanings[name]}" if name in meanings else "Write what its class can start with",
+    )
 
 
 def check_type_class(component_type: Element, facts: ClassFacts | None, report: Report) -> None:

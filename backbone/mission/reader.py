@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from backbone.mission.checks import check
-from backbone.mission.class_asking import ask_classes
+from backbone.mission.class_asking import ask_classes, judge
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.completion import complete
 from backbone.mission.describe import describe
 from backbone.mission.document import Element, parse, read_bytes
 from backbone.mission.model import MissionDescription
+from backbone.mission.parameter_checks import open_questions, report_refusal
 from backbone.mission.report import Fault, MissionInvalid, Report
-from backbone.mission.tables import section
+from backbone.mission.tables import Tables, section
 from backbone.mission.validation import fill_defaults, repair, validated
 
 __all__ = ["Fault", "MissionInvalid", "read_mission", "read_mission_bytes"]
@@ -55,11 +56,25 @@ def read_mission_bytes(data: bytes, source: str, classes: Mapping[str, ClassFact
         complete(root)
         mission = validated(root, report)
         fill_defaults(root)
-        check(root, known_classes(root) if classes is None else {**classes, **shipped_classes()}, report)
+        if classes is None:
+            known = known_classes(root)
+            check(root, known, report)
+            _check_rules(root, known, report)
+        else:
+            check(root, {**classes, **shipped_classes()}, report)
     faults = report.faults()
     if faults or mission is None:
         raise MissionInvalid(faults)
     return describe(mission, source)
+
+
+def _check_rules(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
+    """Report parameters that only their class can judge, and refuses."""
+    tables = Tables.of(root, classes)
+    opened = open_questions(tables)
+    for (element, _), refusal in zip(opened, judge([question for _, question in opened]), strict=True):
+        if refusal:
+            report_refusal(element, refusal, tables, report)
 
 
 def known_classes(root: Element) -> dict[str, ClassFacts]:

@@ -101,6 +101,22 @@ def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
     assert "veiw_s" in at_parameter.message
 
 
+def test_a_class_that_ends_its_process_when_it_judges_holds_nothing_up(modules: Path) -> None:
+    rule = "    def __post_init__(self):\n        import os\n        os._exit(1)\n\nclass Own"
+    (modules / "own_judge.py").write_text(GOOD.replace("\nclass Own", rule))
+    assert not faults_in(modules, with_own_type("own_judge:Own", depth_m="2"))
+
+
+def test_rules_of_a_class_are_asked_once_for_the_same_parameters(modules: Path) -> None:
+    rule = "    def __post_init__(self):\n        raise ValueError(f'{self.depth_m} is too deep')\n\nclass Own"
+    (modules / "own_rule.py").write_text(GOOD.replace("\nclass Own", rule))
+    text = with_own_type("own_rule:Own", depth_m="2.5")
+    [fault] = faults_in(modules, text)
+    assert fault.message == "own mine refuses its parameters: 2.5 is too deep"
+    (modules / "own_rule.py").write_text("raise SystemError\nclass Own: ...")
+    assert faults_in(modules, text) == [fault]
+
+
 def test_a_module_that_hangs_is_a_fault_and_holds_up_nothing_else(
     modules: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
