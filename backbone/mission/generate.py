@@ -5,6 +5,7 @@ Each stands in the repository, so that editors, readers and missions need not ma
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -19,15 +20,6 @@ HERE = Path(__file__).parent
 REFERENCE = HERE.parents[1] / "docs" / "reference" / "mission-file.md"
 
 
-def generated() -> dict[Path, str]:
-    """Return the text of every generated file."""
-    return {
-        HERE / SHIPPED: shipped_classes_text(),
-        HERE / XSD: xsd_text(),
-        REFERENCE: reference_text(REFERENCE.read_text("utf-8")),
-    }
-
-
 def shipped_classes_text() -> str:
     """Return what the classes of the shipped types say of themselves, one class a line."""
     facts = ask_classes([one.text("class") for one in shipped_types()])
@@ -39,6 +31,17 @@ def shipped_classes_text() -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
+def _reference_text() -> str:
+    return reference_text(REFERENCE.read_text("utf-8"))
+
+
+GENERATED: dict[Path, Callable[[], str]] = {
+    HERE / SHIPPED: shipped_classes_text,
+    HERE / XSD: xsd_text,
+    REFERENCE: _reference_text,
+}
+"""Every generated file, and what makes its text; the reference has tables made of the facts of classes."""
+
 if __name__ == "__main__":
-    for file, text in generated().items():
-        file.write_text(text, "utf-8")
+    for file, text in GENERATED.items():
+        file.write_text(text(), "utf-8")

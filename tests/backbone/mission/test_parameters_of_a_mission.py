@@ -12,7 +12,7 @@ import pytest
 from backbone.mission import class_asking
 from backbone.mission.class_asking import ask_classes
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
-from backbone.mission.generate import generated
+from backbone.mission.generate import GENERATED
 from backbone.mission.reader import Fault, MissionInvalid, read_mission, read_mission_bytes
 from backbone.mission.shipped_types import shipped_types
 from backbone.mission.tables import parameter_value
@@ -62,9 +62,9 @@ def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("file", generated(), ids=lambda path: path.name)
+@pytest.mark.parametrize("file", GENERATED, ids=lambda path: path.name)
 def test_a_generated_file_is_what_its_declaration_makes(file: Path) -> None:
-    assert file.read_text("utf-8") == generated()[file], "run: python -m backbone.mission.generate"
+    assert file.read_text("utf-8") == GENERATED[file](), "run: python -m backbone.mission.generate"
 
 
 def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:
