@@ -13,10 +13,10 @@ from typing import Any, assert_never
 import msgspec
 
 from backbone.errors import Refusal
-from backbone.mission.class_facts import ClassFacts
+from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
-from ui_console.design.catalogue import entries, stock_classes
+from ui_console.design.catalogue import entries
 from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
 from ui_console.design.file import FileChanged, save
@@ -92,7 +92,7 @@ class DesignRoom:
         self.revision = 1
         self.guests: dict[Designer, None] = {}
         self._kept, self._look_up = kept, look_up
-        self._facts: dict[str, ClassFacts] = {}
+        self._facts = dict(shipped_classes())
         self._trusted = _classes_of(draft.saved)
         self._turn = asyncio.Lock()
         self._told: dict[str, bytes] = {}
@@ -215,12 +215,6 @@ class DesignRoom:
         async with self._turn:
             await self._show(self.draft, "")
         self._to_keep.clear()
-
-    async def learn_stock(self) -> None:
-        """Ask the project's own classes for their documentation and parameters, and tell it."""
-        facts = await self._look_up(stock_classes())
-        async with self._turn:
-            await self._known(facts)
 
     async def keep_on(self) -> None:
         """Keep the draft beside the file whenever it has changed; until cancelled."""

@@ -74,13 +74,9 @@ class DesignServer:
         await room.prepare()
         try:
             async with self._reception.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
-                tasks = [
-                    beside.create_task(room.keep_on(), name="design: keep_on"),
-                    beside.create_task(room.learn_stock(), name="design: learn_stock"),
-                ]
+                keeping = beside.create_task(room.keep_on(), name="design: keep_on")
                 ready(port_of(server))
                 await end.wait()
-                for task in tasks:
-                    task.cancel()
+                keeping.cancel()
         finally:
             await room.keep_now()
