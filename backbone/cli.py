@@ -216,9 +216,9 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
 @app.command()
 def schema() -> None:
     """Print the XML schema of mission files."""
-    from backbone.mission.reader import schema_text
+    from backbone.mission.declaration.xsd import xsd_text
 
-    print(schema_text())
+    print(xsd_text())
 
 
 @app.command()

@@ -16,7 +16,8 @@ from backbone.component.messages import ComponentState, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.health import MissionHealth
 from backbone.operators import OperatorActed
-from backbone.rc_manager.messages import Leases, Schedule, Why
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.views import Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.consent import Settled, Sought, Topic
 

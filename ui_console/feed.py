@@ -46,8 +46,9 @@ from backbone.nameserver.messages import (
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Leases, Schedule
+from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.reasons import reasons_for
+from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.console_events import (
@@ -76,8 +77,8 @@ from ui_console.team_model import ROBOT_KIND
 log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
-LINK_FRESH_S = 1.0  # chosen: nothing that is shown is older without saying so; machine seconds
-LINK_EVERY_S = 0.3  # chosen: two answers may be lost before what is shown counts as old; machine seconds
+LINK_FRESH_S = 0.8  # chosen: what is older than a second says so, and drawing that takes a moment; machine seconds
+LINK_EVERY_S = 0.3  # chosen: an answer may be lost before what is shown counts as old; machine seconds
 PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and asking costs nothing to speak of; machine seconds
 
 LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link; machine seconds

@@ -20,7 +20,9 @@ from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.mission_log import AskLog
 from backbone.naming import Subsystem, component_of
 from backbone.people import People, is_console, screens_of
-from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.spoken import value_text
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause

@@ -24,7 +24,8 @@ from websockets.exceptions import ConnectionClosed
 
 from backbone.bus.interface import Bus
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
 from resource_pool.messages import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]

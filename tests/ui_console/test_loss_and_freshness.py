@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 from console_scenes import ASK, GRANT, SCHEDULE, STOP, held_model, model
+from screen_text import screen_text
+from written_session import WrittenSession
 
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.consent import Consent, Settled, Sought, Topic
@@ -19,6 +21,9 @@ from ui_console.console_events import (
     ScheduleHeard,
     StopHeard,
 )
+from ui_console.feed import LINK_FRESH_S
+from ui_console.terminal.app import LINK_LOOK_S, ConsoleApp
+from ui_console.terminal.keys import Profile
 from ui_console.views import AlarmKind, LostView
 
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
@@ -56,6 +61,24 @@ def test_whose_turn_is_over_has_lost_nothing() -> None:
 
 
 # ---------------------------------------------------------------------- a link that is down
+WITHIN_S = 1.0
+DRAWN_S = 0.1  # of a busy machine's screen
+
+
+def test_what_is_not_heard_counts_as_old_early_enough_to_be_drawn_within_a_second() -> None:
+    assert LINK_FRESH_S + LINK_LOOK_S + DRAWN_S <= WITHIN_S
+
+
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_a_screen_says_at_the_next_look_that_its_link_is_down(profile: Profile) -> None:
+    session = WrittenSession(shown=held_model())
+    async with ConsoleApp(session, profile=profile).run_test(size=(80, 24)) as pilot:
+        assert "NO LINK" not in screen_text(pilot.app)
+        session.model.apply(LinkHeard(12.0, False))
+        await pilot.pause(2 * LINK_LOOK_S)
+        assert "NO LINK" in screen_text(pilot.app)
+
+
 @pytest.mark.parametrize("word", [LinkHeard(12.5, False), None])
 def test_what_is_shown_is_never_older_than_a_second_without_saying_so(word: LinkHeard | None) -> None:
     """The link says that it is down, or says nothing any more."""

@@ -39,6 +39,7 @@ from ui_console.views import AlarmView, ConsoleView
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
+LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which nothing old looks fresh
 SPEED_RAD_S, SPEED_STEP_RAD_S, SPEED_MOST_RAD_S = 4.0, 1.0, 15.0  # chosen: a walk, fine steps, a Scout's most
 NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
 A = TypeVar("A")
@@ -146,8 +147,7 @@ class ConsoleApp(EndingApp):
         self.set_interval(every_s, self.redraw)
         if self.profile is Profile.TERMINAL:
             self.set_interval(REDRAW_EVERY_S, self.redraw_video)
-        if self.profile is Profile.MONITOR:
-            self.set_interval(TABLES_EVERY_S, self.redraw_if_cut)
+        self.set_interval(LINK_LOOK_S, self.redraw_if_cut)
 
     def on_resize(self, _event: Resize) -> None:
         """Show as much as fits now."""
@@ -234,10 +234,12 @@ class ConsoleApp(EndingApp):
         names = [robot.robot for robot in self._view.robots] if self._view is not None else []
         model, panel = self._session.model, self._panel()
         dialog = self.screen.subject if isinstance(self.screen, Dialog) else ""
-        placed, shown = dialog or _subject_of(panel.placed), _subject_of(panel.row)
+        robots = self.screen_stack[0].query_one(f"#{PanelName.ROBOTS}", Panel)
+        placed = (dialog, _subject_of(panel.placed), _subject_of(robots.placed))
+        shown = _subject_of(panel.row)
         return {
             "held": model.robot if model.held is not None else "",
-            "placed": placed if placed in names else "",
+            "placed": next((robot for robot in placed if robot in names), ""),
             "wanted": model.robot,
             "shown": shown if shown in names else names[0] if len(names) == 1 else "",
         }

@@ -23,7 +23,9 @@ from backbone.mission_log import AskLog, AskPeople, MissionLog, PeopleKnown
 from backbone.mission_picture import LAUNCHER
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Holder, RcView, RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.requests import Holder, RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
 from resource_pool.stop_latch import StopLatch

@@ -104,7 +104,10 @@ function heard(message) {
     blindness.hub(down_s < 0 ? -1 : 1000 * Math.max(0, (view.now_s ?? down_s) - down_s));
   }
   if (changes.robots) stopping.heard(changes.robots);
-  if (changes.robots || changes.own) cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
+  if (changes.robots || changes.own) {
+    cards.show(view.robots ?? [], view.own ?? {}, view.drawn ?? {});
+    nameStop();
+  }
   if (changes.health !== undefined) showHealth(changes.health);
   if (changes.alarms) showAlarm(changes.alarms, act);
   if (changes.welcome || changes.robots || changes.log) log.know(view);
@@ -148,7 +151,7 @@ function act(what, name = "", more = {}) {
       return;
     case "stop_mine":
       driving.letGo();
-      stopMine(hand.held || cards.meant);
+      stopMine(meant());
       return;
     case "stop_all":
       driving.letGo();
@@ -165,15 +168,25 @@ function act(what, name = "", more = {}) {
   if (!say(words[what](name, more))) notice(`NOT CONNECTED: ${what.replace("_", " ")} was not sent.`);
 }
 
+function meant() {
+  return hand.held || cards.meant;
+}
+
+/** A dialog covers every red button but its own. */
+function nameStop() {
+  set(find("reading-stop"), `Stop ${meant()}`);
+}
+
 /** @param {string} name */
 function stopMine(name) {
   if (name) stopping.one(name);
   else notice("There is no robot to stop.");
 }
 
-find("stop-all").addEventListener("click", () => act("stop_all", ""));
+for (const id of ["stop-all", "reading-stop-all"]) find(id).addEventListener("click", () => act("stop_all", ""));
+find("reading-stop").addEventListener("click", () => act("stop_mine", ""));
 for (const dialog of document.querySelectorAll("dialog")) {
-  new MutationObserver(() => driving.letGo()).observe(dialog, { attributeFilter: ["open"] });
+  new MutationObserver(() => { driving.letGo(); nameStop(); }).observe(dialog, { attributeFilter: ["open"] });
 }
 document.addEventListener("visibilitychange", () => say({ do: "here", is_there: !document.hidden }));
 let touchedAt = 0;
