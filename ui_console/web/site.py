@@ -65,6 +65,7 @@ DESIGN_FILES = _page(
     "design_panes.js",
     "design_status.js",
     "design_tree.js",
+    "dom.js",
     "freshness.js",
     "link.js",
     "login.js",

@@ -53,6 +53,13 @@ def test_nothing_comes_from_elsewhere_and_nothing_is_inline() -> None:
             assert not re.search(r"\beval\(|innerHTML|new Function|document\.write|insertAdjacentHTML", text), name
 
 
+def test_files_of_the_pages_have_short_lines_and_few() -> None:
+    for name, text in texts().items():
+        lines = text.splitlines()
+        assert not [line for line in lines if name.endswith(".js") and len(line) > 120], name
+        assert len(lines) <= 400, name
+
+
 def test_what_the_modules_look_for_is_on_the_page() -> None:
     for html, files in (("index.html", FILES), ("design.html", DESIGN_FILES)):
         ids = set(re.findall(r'id="([^"]+)"', texts()[html]))

@@ -7,6 +7,7 @@ import { Details, Palette, showMinute, showProblems } from "./design_panels.js";
 import { Panes } from "./design_panes.js";
 import { notice, showPeople, showStatus } from "./design_status.js";
 import { isWithin, keyOf, pathOf, Tree } from "./design_tree.js";
+import { find } from "./dom.js";
 import { Link } from "./link.js";
 import { Login } from "./login.js";
 import { followTheme } from "./theme.js";
@@ -14,11 +15,10 @@ import { followTheme } from "./theme.js";
 const OLD_MS = 2000,
   SILENT_MS = 5000; // chosen: nothing moves here; a check of a large mission takes a moment
 const AT_THE_MISSION = ["behavior", "resource", "world", "type"]; // what the server puts in the right section by itself
-const find = (id) => document.getElementById(id);
 const view = {};
 
 const link = new Link({ heard, saw: () => {}, changed, silentMs: SILENT_MS, oldMs: OLD_MS });
-const login = new Login({ form: find("login"), enter: (hello) => link.open(hello) });
+const login = new Login({ form: find("login", HTMLFormElement), enter: (hello) => link.open(hello) });
 const tree = new Tree({
   root: find("tree"),
   choose: (path, isTouched) => {
@@ -49,7 +49,7 @@ let carried = null,
   selects = 0,
   wasDown = true;
 const { show } = new Panes({ rehearse: (is_shown) => link.say({ do: "rehearse", is_shown }) });
-followTheme(find("theme"));
+followTheme(find("theme", HTMLSelectElement));
 
 // ---------------------------------------------------------------- what is refused, and what has to be asked
 let asked = null; // the questions of the dialog whose answers were said last
@@ -126,7 +126,8 @@ function heard(message) {
     for (const tab of document.querySelectorAll("[role=tab][data-pane=problems]"))
       tab.textContent = view.problems.length ? `Problems (${view.problems.length})` : "Problems";
   }
-  if ((news.element || news.selected !== undefined) && view.selected === selects) showChosen(); // else a newer choice is on its way
+  const isNewest = view.selected === selects; // else a newer choice is on its way
+  if ((news.element || news.selected !== undefined) && isNewest) showChosen();
   if ((news.element || news.tree) && view.element)
     details.show(view.element, tree.row(view.element.path)?.problems ?? []);
   if ("rehearsal" in news) showMinute(find("minute"), view.rehearsal);
@@ -316,7 +317,7 @@ function put(path) {
 function showActions() {
   const { path, properties } = view.element;
   const has = (name) => properties.some((one) => one.name === name && !one.is_parameter && one.value !== null);
-  for (const button of document.querySelectorAll("#actions button")) {
+  for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("#actions button"))) {
     const act = button.dataset.act;
     button.disabled =
       (["up", "down", "into", "out", "carry", "remove"].includes(act) && path.length === 0) ||
@@ -344,7 +345,7 @@ function treeKey(event) {
   else if (event.key === "Enter" && carried) put(tree.at);
   else if (event.key === "Enter") {
     show("details");
-    find("properties").querySelector("input, select")?.focus();
+    /** @type {HTMLElement} */ (find("properties").querySelector("input, select"))?.focus();
   } else return false;
   return true;
 }
@@ -357,10 +358,10 @@ addEventListener("keydown", (event) => {
     document.querySelector("dialog[open]")
   )
     return;
-  const isField = event.target.closest("input, select, textarea") !== null;
+  const isField = /** @type {Element} */ (event.target).closest("input, select, textarea") !== null;
   const key = event.key.toLowerCase();
   if (key === "s") {
-    document.activeElement?.blur();
+    /** @type {HTMLElement} */ (document.activeElement)?.blur();
     acts.save();
   } else if (!isField && key === "z" && !event.shiftKey) acts.undo();
   else if (!isField && (key === "y" || (key === "z" && event.shiftKey))) acts.redo();
@@ -368,7 +369,7 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
 });
 
-for (const button of document.querySelectorAll("#actions button"))
+for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("#actions button")))
   button.addEventListener("click", () => acts[button.dataset.act]());
 for (const name of ["undo", "redo", "revert", "save"]) find(name).addEventListener("click", acts[name]);
 find("save-as").addEventListener("click", saveAs);

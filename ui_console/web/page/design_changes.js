@@ -8,7 +8,9 @@
  */
 export class Changes {
   constructor({ say, revision, refused }) {
-    Object.assign(this, { say, revision, refused });
+    this.say = say;
+    this.revision = revision;
+    this.refused = refused;
     this.waiting = [];
     this.underway = null; // what was said and is neither done nor refused yet
   }

@@ -1,20 +1,24 @@
 // Questions: one dialog to answer, one to choose, one to read. Each is a promise; null means that nothing was chosen.
 
-const find = (id) => document.getElementById(id);
+import { find } from "./dom.js";
 
 /**
- * Ask for each of `asks` ({name, doc, proposed, choices, is_required}); resolves to the answers in their order, or null.
+ * Ask for each of `asks` ({name, doc, proposed, choices, is_required}); resolves to the answers in their order, or to
+ * null.
  * `refused` says why earlier answers were not taken.
  */
 export function ask(title, doc, asks, refused = "") {
-  const dialog = find("ask"),
+  const dialog = find("ask", HTMLDialogElement),
     form = dialog.querySelector("form");
   find("ask-title").textContent = title;
   find("ask-doc").textContent = doc;
   find("ask-refused").textContent = refused;
   const fields = asks.map((asked, number) => field(asked, `answer-${number}`));
   find("ask-fields").replaceChildren(...fields.map((one) => one.label));
+  /** @type {HTMLButtonElement} */
   const cancel = form.querySelector("button[value=cancel]");
+  /** @type {HTMLButtonElement} */
+  const done = form.querySelector("button[value=done]");
   return new Promise((resolve) => {
     const close = (answers) => {
       dialog.onclose = form.onsubmit = cancel.onclick = null;
@@ -28,15 +32,15 @@ export function ask(title, doc, asks, refused = "") {
     cancel.onclick = () => close(null);
     dialog.onclose = () => close(null);
     dialog.showModal();
-    (fields[0]?.input ?? form.querySelector("button[value=done]")).focus();
-    fields[0]?.input.select?.();
+    (fields[0]?.input ?? done).focus();
+    if (fields[0]?.input instanceof HTMLInputElement) fields[0].input.select();
   });
 }
 
 /** Let one of `options` ({label, doc}) be chosen; resolves to it, or null. */
 export function choose(title, options) {
-  const dialog = find("choose"),
-    filter = find("choose-find"),
+  const dialog = find("choose", HTMLDialogElement),
+    filter = find("choose-find", HTMLInputElement),
     list = find("choose-list");
   find("choose-title").textContent = title;
   filter.value = "";
@@ -82,7 +86,7 @@ export function read(title, text, line = 1) {
   find("reading-title").textContent = title;
   const shown = find("reading-text");
   shown.textContent = text;
-  find("reading").showModal();
+  find("reading", HTMLDialogElement).showModal();
   shown.scrollTop = (shown.scrollHeight * (line - 1)) / Math.max(1, text.split("\n").length);
 }
 
@@ -99,7 +103,7 @@ function field(asked, id) {
   input.required = asked.is_required;
   input.autocomplete = "off";
   if (asked.choices.length) {
-    input.addEventListener("keydown", (event) => {
+    input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       if (event.key === "Enter") {
         event.preventDefault();
         input.form.requestSubmit();

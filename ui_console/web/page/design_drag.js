@@ -6,14 +6,18 @@ const SCROLL_PX = 10; // a frame
 const BORDER_SHARE = 0.28; // chosen: of a row's height, above and below, where the place between rows is meant
 
 /**
- * Whatever has `data-drag` can be dragged: by a mouse anywhere, by a finger at its `.handle`, so that fingers still scroll.
+ * Whatever has `data-drag` can be dragged: by a mouse anywhere, by a finger at its `.handle`, so that fingers still
+ * scroll.
  *
  * `place(what, row, part)` says what a drop there would mean, or null; part is "before", "into" or "after".
  * `drop(place)` does it.
  */
 export class Drag {
   constructor({ tree, what, place, drop }) {
-    Object.assign(this, { tree, what, place, drop });
+    this.tree = tree;
+    this.what = what;
+    this.place = place;
+    this.drop = drop;
     this.held = null;
     document.addEventListener("pointerdown", (event) => this.down(event));
     document.addEventListener("pointermove", (event) => this.move(event));

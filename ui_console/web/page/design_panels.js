@@ -1,14 +1,19 @@
 // Parts, details, problems and the first minute.
 
+import { find } from "./dom.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 const COLORS = 6;
-const find = (id) => document.getElementById(id);
 
 // ---------------------------------------------------------------- parts
 /** What can be dragged into the mission; `add(label)` adds it to the chosen element, `learn(type)` asks its class. */
 export class Palette {
   constructor({ root, filter, add, read, learn }) {
-    Object.assign(this, { root, filter, add, read, learn });
+    this.root = root;
+    this.filter = filter;
+    this.add = add;
+    this.read = read;
+    this.learn = learn;
     this.rows = [];
     filter.addEventListener("input", () => this.draw());
     filter.addEventListener("keydown", (event) => {
@@ -23,7 +28,7 @@ export class Palette {
   }
 
   draw() {
-    const focus = this.root.contains(document.activeElement) ? document.activeElement.dataset.key : "";
+    const focus = this.root.contains(document.activeElement) ? document.activeElement.getAttribute("data-key") : "";
     const wanted = this.filter.value.trim().toLowerCase();
     const groups = new Map();
     for (const row of this.rows) {
@@ -69,12 +74,13 @@ export class Palette {
 
 // ---------------------------------------------------------------- details
 /**
- * What can be set of the chosen element; `set(path, property, value)` is called when a field was changed. A value that was
- * refused stays in its field, marked, until it is changed; Escape brings back what is set.
+ * What can be set of the chosen element; `set(path, property, value)` is called when a field was changed. A value that
+ * was refused stays in its field, marked, until it is changed; Escape brings back what is set.
  */
 export class Details {
   constructor({ form, set }) {
-    Object.assign(this, { form, set });
+    this.form = form;
+    this.set = set;
     this.shape = this.path = "";
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -97,7 +103,7 @@ export class Details {
   }
 
   rebuild(element) {
-    const focus = this.form.contains(document.activeElement) ? document.activeElement.dataset.key : "";
+    const focus = this.form.contains(document.activeElement) ? document.activeElement.getAttribute("data-key") : "";
     const set = document.createElement("button");
     set.textContent = "Set"; // what Enter presses
     this.properties = new Map(element.properties.map((one) => [keyOf(one), one]));
@@ -116,7 +122,7 @@ export class Details {
     input.spellcheck = false;
     input.addEventListener("change", () => this.commit(input));
     input.addEventListener("input", () => this.mark(input, ""));
-    input.addEventListener("keydown", (event) => {
+    input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       if (event.key === "Escape") this.takeBack(input);
     });
     const refused = line("refused", "");

@@ -1,16 +1,16 @@
 // Panes of the designer: beside each other where there is room, one at a time where there is not.
 
-const find = (id) => document.getElementById(id);
+import { find } from "./dom.js";
 
-/** Shows the panes that tabs choose; `rehearse(isShown)` is called when the first minute comes into sight or leaves it. */
+/** Shows the panes that tabs choose; `rehearse(isShown)` is called when the first minute comes into sight or leaves. */
 export class Panes {
   constructor({ rehearse }) {
     this.rehearse = rehearse;
     this.show = (pane) => this.choose(pane);
     for (const list of [find("panes"), find("below-tabs")]) {
       list.addEventListener("click", (event) => {
-        const tab = event.target.closest("[role=tab]");
-        if (tab) this.choose(tab.dataset.pane);
+        const tab = /** @type {Element} */ (event.target).closest("[role=tab]");
+        if (tab) this.choose(tab.getAttribute("data-pane"));
       });
       list.addEventListener("keydown", (event) => this.step(list, event));
     }
@@ -41,6 +41,6 @@ export class Panes {
 
 function mark(list, pane) {
   for (const tab of document.querySelectorAll(`${list} [role=tab]`)) {
-    tab.setAttribute("aria-selected", String(tab.dataset.pane === pane));
+    tab.setAttribute("aria-selected", String(tab.getAttribute("data-pane") === pane));
   }
 }

@@ -1,7 +1,8 @@
 // What the designer's page says in passing: how the draft is, who else is here, and notices.
 
+import { find } from "./dom.js";
+
 const NOTICES = 3;
-const find = (id) => document.getElementById(id);
 
 /** Show how the draft is, and which commands it allows. */
 export function showStatus(status) {
@@ -11,10 +12,10 @@ export function showStatus(status) {
   find("state").textContent = `${status.is_changed ? "changed" : "saved"}, ${count}`;
   find("state").className = status.problems ? "failure" : status.is_changed ? "warning" : "success";
   document.title = `${status.is_changed ? "● " : ""}${name} – Mission design`;
-  find("undo").disabled = !status.can_undo;
-  find("redo").disabled = !status.can_redo;
-  find("revert").disabled = !status.is_changed || status.is_new;
-  find("save").disabled = !status.is_changed;
+  find("undo", HTMLButtonElement).disabled = !status.can_undo;
+  find("redo", HTMLButtonElement).disabled = !status.can_redo;
+  find("revert", HTMLButtonElement).disabled = !status.is_changed || status.is_new;
+  find("save", HTMLButtonElement).disabled = !status.is_changed;
 }
 
 /** Show who else works on the draft. */

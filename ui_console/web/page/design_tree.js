@@ -10,10 +10,12 @@ export const isWithin = (path, above) =>
 /** What is folded stays so wherever it is moved. */
 const nameOf = (row) => `${row.path.length} ${row.tag} ${row.told}`;
 
-/** Shows `rows` ({path, tag, told, problems}); `choose(path, isTouched)` is called when one is chosen by hand, or by a key. */
+/** Shows `rows` ({path, tag, told, problems}); `choose(path, isTouched)` is called when a hand or a key chooses one. */
 export class Tree {
   constructor({ root, choose, key }) {
-    Object.assign(this, { root, choose, key });
+    this.root = root;
+    this.choose = choose;
+    this.key = key;
     this.rows = [];
     this.byKey = new Map();
     this.inside = new Map();

@@ -25,8 +25,8 @@ const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "col
  * letters write, and not while a dialog asks for something.
  *
  * @typedef {{ key: string, code: string, isRepeat: boolean, hasModifier: boolean }} Key Of the event.
- * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean }} Place A text is written there; a red
- *   button has the focus; a dialog is open; a robot is held.
+ * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean }} Place A text is written there; a
+ *   red button has the focus; a dialog is open; a robot is held.
  *
  * @param {Key} key
  * @param {Place} at

@@ -59,7 +59,9 @@ export class Found {
 
 /** The search form and its table; `say` sends to the server, `redraw` has the table drawn anew. */
 export class Log {
-  /** @param {{ form: HTMLFormElement, status: HTMLElement, exporting: HTMLElement, say: Say, redraw: () => void }} given */
+  /**
+   * @param {{ form: HTMLFormElement, status: HTMLElement, exporting: HTMLElement, say: Say, redraw: () => void }} given
+   */
   constructor({ form, status, exporting, say, redraw }) {
     this.form = form;
     this.status = status;

@@ -186,7 +186,10 @@ function stopMine(name) {
 for (const id of ["stop-all", "reading-stop-all"]) find(id).addEventListener("click", () => act("stop_all", ""));
 find("reading-stop").addEventListener("click", () => act("stop_mine", ""));
 for (const dialog of document.querySelectorAll("dialog")) {
-  new MutationObserver(() => { driving.letGo(); nameStop(); }).observe(dialog, { attributeFilter: ["open"] });
+  new MutationObserver(() => {
+    driving.letGo();
+    nameStop();
+  }).observe(dialog, { attributeFilter: ["open"] });
 }
 document.addEventListener("visibilitychange", () => say({ do: "here", is_there: !document.hidden }));
 let touchedAt = 0;

@@ -4,7 +4,8 @@ import { paragraph, span, table } from "./table.js";
 import { seconds, set } from "./text.js";
 import { timeline } from "./timeline.js";
 
-/** @import { AlarmView, ComponentRow, LinkView, NodeView, ParameterView, RequestRow, RobotView, View } from "./messages.d.ts" */
+/** @import { AlarmView, ComponentRow, LinkView, NodeView, ParameterView } from "./messages.d.ts" */
+/** @import { RequestRow, RobotView, View } from "./messages.d.ts" */
 /** @import { Log } from "./log.js" */
 /** @import { Act } from "./types.d.ts" */
 
@@ -133,7 +134,7 @@ export class Tables {
       ["level", "what", "where", "since", "times", all],
       rows.map((row) => [
         span(row.severity, row.is_active ? `${row.severity}, now` : row.severity),
-        `${row.line}${row.remedy ? ` — ${row.remedy}` : ""}${row.while_away ? " (while away)" : ""}${follows(row.also)}`,
+        told(row),
         [row.robot === row.subject ? "" : row.robot, row.where].filter(Boolean).join(", "),
         seconds(row.first_s),
         String(row.count),
@@ -282,7 +283,9 @@ export class Tables {
   }
 }
 
-/** @param {string[]} lines */
-function follows(lines) {
-  return lines.length ? ` (and what follows from it: ${lines.join("; ")})` : "";
+/** @param {AlarmView} alarm */
+function told(alarm) {
+  const remedy = alarm.remedy ? ` — ${alarm.remedy}` : "";
+  const follows = alarm.also.length ? ` (and what follows from it: ${alarm.also.join("; ")})` : "";
+  return `${alarm.line}${remedy}${alarm.while_away ? " (while away)" : ""}${follows}`;
 }
