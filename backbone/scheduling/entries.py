@@ -90,7 +90,8 @@ class ArcEntry:
         granted_s: When it was granted, while it runs.
         slice_s: When its present slice began, while it runs: at the grant, or later where it stayed connected.
         epochs: RC → epoch, while it holds them.
-        awaited: Its end of slice is on the agenda, because an ARC waits for it.
+        awaited: A look at it is on the agenda, because an ARC waits for the end of its slice.
+        look_s: When that look is: at the end of its slice, or later where the discipline lets it run on.
         afterwards: What becomes of it once free, while it is being revoked.
         has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
         retry_s: When it counts again, after it could not open or left too often; None: when it wants time.
@@ -125,6 +126,7 @@ class ArcEntry:
     slice_s: float = 0.0
     epochs: dict[str, int] = field(default_factory=dict)
     awaited: bool = False
+    look_s: float = 0.0
     afterwards: Afterwards = Afterwards.WAIT
     has_forced: bool = False
     retry_s: float | None = None

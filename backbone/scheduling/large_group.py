@@ -77,8 +77,9 @@ class LargeGroupPlanner:
             if not table.fits(arc, staying):
                 continue  # one by one they would let it in, but not together
             in_the_way = table.in_the_way(arc, [], holders, now_s)
-            if in_the_way or table.fits(arc, holders):
-                return Turn(arc, in_the_way)
+            turn = Turn(arc, in_the_way)
+            if (in_the_way and not table.runs_on(turn)) or (not in_the_way and table.fits(arc, holders)):
+                return turn
         return None
 
     def _takes_from_others(self, arc: ArcEntry, now_s: float) -> bool:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from backbone.scheduling.entries import ArcEntry
+from backbone.scheduling.priority import higher
 
 Hold = tuple[ArcEntry, float, float]
 """Who stands in the way as one other ARC sees it, from when (minus infinity: it holds its RCs) and until when."""
@@ -41,6 +42,14 @@ class Turn(NamedTuple):
 
     arc: ArcEntry
     in_the_way: Sequence[ArcEntry]
+
+
+def in_order_of_revocation(turn: Turn) -> list[ArcEntry]:
+    """Return the holders that must go; those whose slices are over before those that are overridden.
+
+    What is freed by force must not look like the reason for the end of a slice.
+    """
+    return sorted(turn.in_the_way, key=lambda holder: higher(turn.arc.path, holder.path))
 
 
 class Planner(Protocol):

@@ -48,7 +48,7 @@ from backbone.scheduling.explain.attributes import attributes
 from backbone.scheduling.explain.explanation import Explanation
 from backbone.scheduling.invariants import broken
 from backbone.scheduling.master_schedule import EXACT_UP_TO, MasterSchedule
-from backbone.scheduling.planner import Turn
+from backbone.scheduling.planner import Turn, in_order_of_revocation
 from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
@@ -181,8 +181,7 @@ class ScheduleManager:
         if not turn.in_the_way:
             self._transitions.connect(turn.arc)
             return
-        # Those whose slices are over go first: what is freed by force must not look like the reason for it.
-        for holder in sorted(turn.in_the_way, key=lambda holder: higher(turn.arc.path, holder.path)):
+        for holder in in_order_of_revocation(turn):
             overridden = higher(turn.arc.path, holder.path)
             forced = overridden and not holder.served(self._transitions.now_s)
             if forced or not self._schedule.planner_of(turn.arc).reserves:

@@ -259,7 +259,7 @@ class ScheduleState:
 
     def end_at(self, arc: ArcEntry, end_s: float) -> None:
         """Let the slice of a running ARC end then."""
-        arc.end_s, arc.awaited = end_s, False
+        arc.end_s, arc.look_s, arc.awaited = end_s, end_s, False
         self._held_alone |= arc.excludes
         if self._is_waited_for(arc):
             self._await_end(arc)
@@ -323,36 +323,38 @@ class ScheduleState:
     # Ends of slices.
 
     def end_slices(self, now_s: float) -> float | None:
-        """Let slices that are over end where an ARC waits for them; return when the next such slice ends."""
+        """Look at slices that are over where an ARC waits for their end; return when the next look is due."""
         self.now_s = now_s
         self.version += 1  # time alone changes plans
         while self._ends:
-            end_s, _, arc = self._ends[0]
-            stands = arc.state is RequestState.RUNNING and arc.end_s == end_s
+            look_s, _, arc = self._ends[0]
+            stands = arc.state is RequestState.RUNNING and arc.look_s == look_s
             wanted = stands and self._is_waited_for(arc)
-            if wanted and end_s > now_s + INSTANT_S:
-                return end_s
+            if wanted and look_s > now_s + INSTANT_S:
+                return look_s
             heapq.heappop(self._ends)
             if stands:
                 arc.awaited = wanted
-            if wanted and self.fairness.runs_on(arc, self._waiting_beside(arc), now_s):
-                self.end_at(arc, now_s + arc.minimum_s)
+            if wanted and self.runs_on(arc):
+                arc.look_s, arc.awaited = now_s + arc.minimum_s, False
+                self._await_end(arc)
             elif wanted:
                 self._held_alone &= ~arc.excludes
                 self._concerns(arc.uses)
         return None
 
+    def runs_on(self, arc: ArcEntry) -> bool:
+        """Say whether the discipline prefers an ARC whose slice is over to the equals that wait for its RCs."""
+        waiting = [other for other in self.beside(arc) if other.state is RequestState.WAITING]
+        return self.fairness.runs_on(arc, filter(self.compatibility.usable, waiting), self.now_s)
+
     def _is_waited_for(self, holder: ArcEntry) -> bool:
         return any(user.state is RequestState.WAITING for rc in holder.uses for user in self.groups.users(rc))
-
-    def _waiting_beside(self, arc: ArcEntry) -> list[ArcEntry]:
-        waiting = [other for other in self.beside(arc) if other.state is RequestState.WAITING]
-        return [other for other in waiting if self.compatibility.usable(other)]
 
     def _await_end(self, arc: ArcEntry) -> None:
         if not arc.awaited:
             arc.awaited = True
-            heapq.heappush(self._ends, (arc.end_s, next(self._pushes), arc))
+            heapq.heappush(self._ends, (arc.look_s, next(self._pushes), arc))
 
     # What can be read off it.
 

@@ -18,6 +18,7 @@ from collections.abc import Iterable, Sequence
 
 from backbone.scheduling.entries import CONNECTED, INSTANT_S, SOON_S, ArcEntry
 from backbone.scheduling.fairness import Seniority
+from backbone.scheduling.planner import Turn
 from backbone.scheduling.priority import by_precedence, rank
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.state import ScheduleState
@@ -111,6 +112,11 @@ class Table:
             ):
                 return False
         return True
+
+    def runs_on(self, turn: Turn) -> bool:
+        """Say whether the discipline prefers one of the equals in the way to the ARC whose turn it would be."""
+        equals = [holder for holder in turn.in_the_way if not rank(holder.path, turn.arc.path)]
+        return any(self.state.runs_on(holder) for holder in equals)
 
     def in_the_way(
         self, arc: ArcEntry, pending: Sequence[ArcEntry], group: Sequence[ArcEntry], now_s: float

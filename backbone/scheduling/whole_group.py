@@ -15,12 +15,13 @@ Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Collection, Iterable, Sequence
 
 from backbone.scheduling.entries import CONNECTED, ArcEntry
 from backbone.scheduling.groups import Group
 from backbone.scheduling.plan import Plan
-from backbone.scheduling.planner import Slot, Turn
+from backbone.scheduling.planner import Slot, Turn, in_order_of_revocation
 from backbone.scheduling.priority import by_precedence
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.table import Table
@@ -75,9 +76,11 @@ class WholeGroupPlanner:
     def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
         """Return an ARC of the group whose time is now.
 
-        Where RCs are freed late, plans change as time passes; such a group is looked at when they are.
+        Where RCs are freed late, or an ARC runs on beyond its slice under the discipline ``time``, plans change as
+        time passes; such a group is looked at when they are free, or when that ARC's next look is due.
         """
-        if any(self._table.is_overdue(arc, now_s) for arc in group):
+        runs_on = not self._among_equals and any(arc.served(now_s) for arc in group)
+        if runs_on or any(self._table.is_overdue(arc, now_s) for arc in group):
             return None
         self._plans.clear()
         turn = self._due_in(self._state.groups.of(group[0]), now_s)
@@ -97,10 +100,15 @@ class WholeGroupPlanner:
         while queued:
             by_time = _Plans(self._table, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
             turn = self._due_of(queued, possible, by_time, now_s)
-            if turn is None or self._in_turn(turn, group, now_s):
+            if turn is None:
+                break
+            if self._in_turn(turn, group, now_s) and not self._table.runs_on(turn):
                 return turn
             queued.remove(turn.arc)
-        return None
+        in_turns = _Plans(self._table, _in_turns(group), group.arcs, now_s, slack_s=self._slack_s)
+        turn = self._due_of(in_turns.order, possible, in_turns, now_s)
+        only_lower = turn is not None and all(turn.arc.goes_before(holder) for holder in turn.in_the_way)
+        return turn if only_lower else None  # no equal loses by it: it starts in a gap, or overrides
 
     def _plans_of(self, group: Group[ArcEntry], now_s: float) -> _Plans:
         if self._planned != self._state.version:
@@ -140,18 +148,31 @@ class WholeGroupPlanner:
         return None
 
     def _in_turn(self, turn: Turn, group: Group[ArcEntry], now_s: float) -> bool:
-        """Say whether an ARC would displace each that must go for this turn also if equals took turns.
+        """Say whether the turn would be right also if equals took turns.
 
-        RCs come free as whole sets: an ARC that had least time, but would not get all its RCs so, ends no slice.
+        RCs come free as whole sets: an ARC that had least time, but would not get all its RCs so, ends no slice. Nor
+        does it start in a gap that ARCs higher than it will need.
         """
-        order = by_precedence([arc for arc in group.arcs if arc.queued], lambda arc: arc.path, lambda arc: arc.stamp)
-        plan = Plan(self._table, order, group.arcs, now_s, slack_s=0.0, handed_over=True)
-        entitled = [arc for arc in order if plan.starts_now(arc)]
-        holders = [holder for holder in group.arcs if holder.state in CONNECTED]
-        return all(
-            any(arc.touches & holder.touches and not self._table.fits(arc, holders) for arc in entitled)
-            for holder in turn.in_the_way
-        )
+        order = _in_turns(group)
+        plan = functools.partial(Plan, self._table, order, now_s=now_s, slack_s=0.0, handed_over=True)
+        if plan(group=group.arcs).start_s(turn.arc) == math.inf:
+            return False
+        rest = [*group.arcs]
+        for holder in in_order_of_revocation(turn):
+            keepers = [arc for arc in rest if arc.state in CONNECTED]
+            now = plan(group=rest)
+            due = [arc for arc in order if now.starts_now(arc)]
+            entitled = [arc for arc in due if arc.touches & holder.touches and _may_displace(arc, holder, now_s)]
+            if not any(self._needs_more(arc, keepers, due) for arc in entitled):
+                return False
+            if not turn.arc.goes_before(holder):
+                rest.remove(holder)
+        return True
+
+    def _needs_more(self, arc: ArcEntry, keepers: Sequence[ArcEntry], due: Sequence[ArcEntry]) -> bool:
+        """Say whether the ARC does not fit beside those that hold RCs, or not beside them and others that are due."""
+        others = [other for other in due if other is not arc]
+        return not (self._table.fits(arc, keepers) and self._table.fits(arc, [*keepers, *others]))
 
     # Views: which ARCs wait before which, and when an ARC will start.
 
@@ -196,6 +217,20 @@ class WholeGroupPlanner:
 
     def _queued_in_order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
         return self._table.in_order([arc for arc in arcs if arc.queued])
+
+
+def _may_displace(arc: ArcEntry, holder: ArcEntry, now_s: float) -> bool:
+    return arc.goes_before(holder) or (holder.served(now_s) and not holder.goes_before(arc))
+
+
+def _in_turns(group: Group[ArcEntry]) -> list[ArcEntry]:
+    """Return the queued ARCs in the order they would have if equals took turns."""
+
+    def seniority(arc: ArcEntry) -> tuple[float, int]:
+        is_first = arc.reservation is not None and arc.has_forced
+        return (-math.inf, arc.reservation or 0) if is_first else arc.stamp
+
+    return by_precedence([arc for arc in group.arcs if arc.queued], lambda arc: arc.path, seniority)
 
 
 class _Plans:

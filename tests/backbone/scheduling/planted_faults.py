@@ -74,11 +74,13 @@ FAULTS = [
         "higher(arc.path, other.path) for",
     ),
     Planted("an overridden ARC has time to stop", "transitions.py", 'if why == "slice" and not', "if not"),
-    Planted("those that stay begin no new slice", "schedule_manager.py", "        self._do.renew_slices()\n", ""),
-    Planted("a revoked ARC hears no expected time", "schedule_manager.py", "        self._do.expect()\n", ""),
+    Planted(
+        "those that stay begin no new slice", "schedule_manager.py", "        self._transitions.renew_slices()\n", ""
+    ),
+    Planted("a revoked ARC hears no expected time", "schedule_manager.py", "        self._transitions.expect()\n", ""),
     Planted(
         "who is overridden goes before whose slice is over",
-        "schedule_manager.py",
+        "planner.py",
         "key=lambda holder: higher(turn.arc.path, holder.path))",
         "key=lambda holder: not higher(turn.arc.path, holder.path))",
     ),
@@ -139,13 +141,13 @@ FAULTS = [
     Planted(
         "holders keep an RC that is down",
         "rc_events.py",
-        '                self._do.revoke(arc, "rc", name)',
+        '                self._transitions.revoke(arc, "rc", name)',
         "                pass",
     ),
     Planted(
         "a lowered capacity revokes nobody",
         "rc_events.py",
-        '            self._do.revoke(holder, "capacity", name)',
+        '            self._transitions.revoke(holder, "capacity", name)',
         "            pass",
     ),
     Planted(

@@ -23,7 +23,7 @@ def test_a_planted_fault_has_its_place(fault: Planted) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_what_is_not_planted_is_not_caught(tmp_path: Path) -> None:
-    done = tested(copied(tmp_path))
+    done = outcome_of(copied(tmp_path))
     assert done.returncode == 0, done.stdout[-2000:]
 
 
@@ -34,7 +34,7 @@ def test_a_planted_fault_is_caught(fault: Planted, tmp_path: Path) -> None:
     copy = copied(tmp_path)
     planted = copy / ROOM / fault.file
     planted.write_text(planted.read_text().replace(fault.right, fault.wrong))
-    done = tested(copy)
+    done = outcome_of(copy)
     assert done.returncode == FOUND, done.stdout[-2000:]
 
 
@@ -43,7 +43,7 @@ def copied(to: Path) -> Path:
     return shutil.copytree(TOP, to / "copy", ignore=LEFT_OUT)
 
 
-def tested(folder: Path) -> subprocess.CompletedProcess[str]:
+def outcome_of(folder: Path) -> subprocess.CompletedProcess[str]:
     """Run the tests of the room in this copy, until one fails."""
     return subprocess.run(
         [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "tests/backbone/scheduling"],

@@ -78,6 +78,18 @@ def test_the_checker_finds_nothing_when_who_waits_long_rises(seed):
     assert violations(play(*random_mission(Random(seed), aging_s=7.0))) == []
 
 
+@settings(max_examples=120, derandomize=True, deadline=None)
+@given(seeds)
+def test_the_checker_finds_nothing_under_equal_time(seed):
+    assert violations(play(*random_mission(Random(seed), discipline="time"))) == []
+
+
+@pytest.mark.parametrize("seed", [42, 227, 237, 303, 591, 594])
+def test_equal_time_ends_a_slice_and_starts_in_a_gap_only_where_turns_would(seed):
+    """One in a hundred missions had an end that no ARC was entitled to, or a gap that stayed empty."""
+    assert violations(play(*random_mission(Random(seed), discipline="time"))) == []
+
+
 RIVALS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 2.5, 5.0]), st.integers(0, 12)), min_size=2, max_size=6)
 
 
