@@ -152,6 +152,8 @@ class Runner:
         latched_s = [world.stopped_s(robot, given_s) or heard_s[robot] for robot in meant]
         found["stands_s"] = round(max(*stood_s, *latched_s) - given_s, 3)
         found["latched_s"] = round(max(latched_s) - given_s, 3)
+        if (acted_s := world.acted_s(given_s)) is not None:
+            found["acted_s"] = round(acted_s - given_s, 3)
         if found["stands_s"] > self._within_s:
             found["fault"] = f"more than {self._within_s:g} s"
         return found

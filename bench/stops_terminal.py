@@ -30,7 +30,7 @@ ESCAPE_S = 0.15  # chosen: a terminal tells escape from the begin of another key
 MOST_ESCAPES = 5
 SHOWN_S = 0.5  # chosen: what a key did is drawn by then
 ANSWERED_S = 0.5  # chosen: a component has told its parameters by then
-SHOWN_WITHIN_S = 10.0
+SHOWN_WITHIN_S = 30.0
 FRAMES = re.compile(r"[\u2500-\u259f].*")
 CANNOT = r"NO LINK|CANNOT STOP|MAY NOT ARRIVE|no_answer"
 """What consoles say when they are cut off."""

@@ -7,6 +7,7 @@ import math
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager, suppress
+from typing import Any
 
 from stops_places import OTHERS, ROBOT
 
@@ -16,9 +17,12 @@ from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.errors import LinkError
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.messages import AskPose, Pose
 from ui_console.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
@@ -168,7 +172,17 @@ class World:
         self._drivers, self.holder, self.asker = operators[: len(OTHERS)], *operators[len(OTHERS) :]
         self._own = {operator.launch.address for operator in operators}
         self._stops: dict[str, StopState] = {}
+        self._acted_s = 0.0
         watch_stops(bus, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
+
+    def _heard_act(self, envelope: Envelope[Any]) -> None:
+        if envelope.body.action in (OperatorAction.STOP_ROBOT, OperatorAction.STOP_ALL):
+            self._acted_s = envelope.body.at_s
+
+    def acted_s(self, since_s: float) -> float | None:
+        """Return when a console began to carry the stop out that was given then; None: it did not say."""
+        return self._acted_s if self._acted_s >= since_s else None
 
     def _heard(self, state: StopState) -> None:
         self._stops[state.rc] = state
