@@ -25,7 +25,9 @@ from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy, RequestState, UnknownRequest, Why
+from backbone.rc_manager.messages import AskWhy
+from backbone.scheduling.requests import RequestState, UnknownRequest
+from backbone.scheduling.views import Why
 from backbone.spoken import counted
 from backbone.wire import Message
 

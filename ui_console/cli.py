@@ -419,7 +419,6 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
 
     from ui_console.web.door import Doorkeeper
     from ui_console.web.hub import WebHub
-    from ui_console.web.token_file import kept_or_new
 
     try:
         from ui_console.web.reception import CannotListen
@@ -430,9 +429,8 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     encryption = site.encryption
     launch, clock, secret = await _launch(where, {})
     launch = msgspec.structs.replace(launch, name=f"web-{os.getpid()}")
-    tokens = _token_file(launch.mission, site) if where.connect is None else None
-    if tokens is not None and not site.has_new_tokens:
-        passes = kept_or_new(passes, tokens.read())
+    tokens = _tokens_of_mission(where, launch.mission, secret, site)
+    passes = _passes_with(tokens, passes, site)
 
     async def join(one_more: Launch) -> Any:
         return await _open_bus(one_more, clock, secret)
@@ -453,12 +451,22 @@ async def _serve(where: _Where, passes: Mapping[str, Pass], site: _Site) -> int:
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 
-def _token_file(mission: str, site: _Site) -> TokenFile | None:
-    """Return where the tokens are kept; None: nowhere, for no open page can come back to a port that nobody chose."""
-    from backbone import run_files
+def _tokens_of_mission(where: _Where, mission: str, secret: str, site: _Site) -> TokenFile | None:
+    """Return where the tokens of a console's page are kept; None: nowhere, see ``token_file``."""
     from ui_console.web.token_file import TokenFile
 
-    return TokenFile(run_files.run_directory(mission), site.port) if site.port else None
+    if not site.port:
+        return None
+    if where.connect is None:
+        return TokenFile.of_mission_here(mission, site.port)
+    return TokenFile.of_mission_elsewhere(mission, where.connect, secret, site.port)
+
+
+def _passes_with(tokens: TokenFile | None, passes: Mapping[str, Pass], site: _Site) -> Mapping[str, Pass]:
+    """Return what opens the server: the tokens of the server before, where they are kept and wanted."""
+    from ui_console.web.token_file import kept_or_new
+
+    return passes if tokens is None or site.has_new_tokens else kept_or_new(passes, tokens.read())
 
 
 def _keep(tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:
@@ -477,6 +485,7 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
     from ui_console.design.look_up import look_up
     from ui_console.web.design_room import DesignRoom
     from ui_console.web.door import Doorkeeper
+    from ui_console.web.token_file import TokenFile
 
     try:
         from ui_console.web.design_server import DesignServer, begin
@@ -499,9 +508,16 @@ async def _serve_design(file: str, passes: Mapping[str, Pass], site: _Site) -> i
 
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended, number)
+    tokens = TokenFile.of_design(file, site.port) if site.port else None
+    passes = _passes_with(tokens, passes, site)
+
+    def ready(port: int) -> None:
+        _keep(tokens, passes)
+        _tell_where(site, port, passes)
+
     room = DesignRoom(draft, kept, look_up)
     server = DesignServer(room, Doorkeeper(passes))
-    await server.run(site.host, site.port, lambda port: _tell_where(site, port, passes), end, encryption)
+    await server.run(site.host, site.port, ready, end, encryption)
     return ExitCode.INTERRUPTED if signal.SIGINT in came else ExitCode.DONE
 
 

@@ -10,7 +10,15 @@ from collections.abc import Callable
 from backbone.errors import Refusal, code_of
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import SwappedOut
-from ui_console.console_events import Asked, CommandRefused, ConsoleEvent, PictureSeen, StopHeard, event_json
+from ui_console.console_events import (
+    Asked,
+    CommandRefused,
+    ConsoleEvent,
+    MomentBegan,
+    PictureSeen,
+    StopHeard,
+    event_json,
+)
 from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.teleoperation import Teleoperation
@@ -18,7 +26,7 @@ from ui_console.teleoperation import Teleoperation
 DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
-_FOR_SCREENS_ONLY = (Asked, PictureSeen)
+_FOR_SCREENS_ONLY = (Asked, MomentBegan, PictureSeen)
 
 
 class ScriptDriver:

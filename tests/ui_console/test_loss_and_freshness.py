@@ -17,6 +17,7 @@ from ui_console.console_events import (
     LetGoNeeded,
     LinkHeard,
     Lost,
+    MomentBegan,
     ScheduleHeard,
     StopHeard,
 )
@@ -111,6 +112,15 @@ def test_what_has_to_be_let_go_is_said_only_while_a_robot_is_held() -> None:
     shown.apply(LetGoNeeded(13.0, True))
     shown.apply(GivenBack(14.0, "released", True))
     assert not shown.own(14.0).must_let_go
+
+
+def test_each_moment_has_a_number_of_its_own_that_no_later_grant_has_again() -> None:
+    shown = held_model()
+    seen = [shown.own(11.0).moment]
+    for event in (MomentBegan(12.0), GivenBack(13.0, "released", True), MomentBegan(14.0)):
+        shown.apply(event)
+        seen.append(shown.own(14.0).moment)
+    assert seen == [seen[0], seen[0] + 1, seen[0] + 1, seen[0] + 2]
 
 
 def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_takes() -> None:

@@ -21,7 +21,7 @@ from textual.screen import Screen
 from textual.widgets import Input, Static
 
 from backbone.cli import ExitCode
-from ui_console.console_model import LOG_SHOWN
+from backbone.errors import Refusal
 from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
@@ -30,7 +30,7 @@ from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
 from ui_console.terminal.lines import Row, robot_rows
-from ui_console.terminal.log_search import SEARCH_HELP, WrongSearch, read_search
+from ui_console.terminal.log_search import FOUND_SHOWN, SEARCH_HELP, Found, read_search
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
@@ -112,7 +112,7 @@ class ConsoleApp(EndingApp):
         self.speed_rad_s = SPEED_RAD_S
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
-        self._search = ""
+        self._found: Found | None = None
         self._view: ConsoleView | None = None
 
     @property
@@ -168,8 +168,8 @@ class ConsoleApp(EndingApp):
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)
-        is_searched = self._turn is PanelName.LOG and bool(self._search)
-        turn.border_title = Text(f"log: {self._search}" if is_searched else self._turn)
+        found = self._found if self._turn is PanelName.LOG else None
+        turn.border_title = Text(found.title if found is not None else self._turn)
         self._show(self._turn, turn, view)
         keys = hints(view, self.profile, self._robot_meant())
         main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
@@ -215,9 +215,10 @@ class ConsoleApp(EndingApp):
     def _show(self, name: PanelName, panel: Panel, view: ConsoleView) -> None:
         is_chosen = name is self.chosen
         panel.set_class(is_chosen, "-chosen")
-        if name is PanelName.LOG and self._search:
-            found = self._session.model.team.log(LOG_SHOWN, read_search(self._search))
-            view = msgspec.structs.replace(view, log=found)
+        if name is PanelName.LOG and self._found is not None:
+            found = self._found
+            log = self._session.model.team.log(FOUND_SHOWN, found.asked, found.log.events)
+            view = msgspec.structs.replace(view, log=log)
         rows = table_rows(name, view, panel.content_size.width)
         panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
@@ -484,16 +485,19 @@ class ConsoleApp(EndingApp):
         self.redraw()
 
     def action_search(self) -> None:
-        """Show only what fits in the log."""
-        self._open(Question("search the log", self._search, SEARCH_HELP), self._searched)
+        """Show what the mission's log has of something, however long ago, and what comes of it from now on."""
+        before = self._found.line if self._found is not None else ""
+        self._open(Question("search the log", before, SEARCH_HELP), self._search)
 
-    def _searched(self, line: str) -> None:
+    @work(group="search", exclusive=True)
+    async def _search(self, line: str) -> None:
+        question = read_search(line)
         try:
-            read_search(line)
-        except WrongSearch as wrong:
-            self.notify(str(wrong), severity="warning", markup=False)
+            found = Found(" ".join(line.split()), *await self._session.search_log(question)) if question else None
+        except Refusal as refusal:
+            self.notify(f"{refusal.detail}. {refusal.remedy}", severity="warning", markup=False)
             return
-        self._search = " ".join(line.split())
+        self._found = found
         self.chosen = self._turn = PanelName.LOG
         self.redraw()
 

@@ -11,7 +11,7 @@ from screen_text import same_as_before, screen_text
 from textual.binding import Binding
 from textual.pilot import Pilot
 
-from ui_console.design.catalogue import ClassFacts
+from backbone.mission.class_facts import ClassFacts
 from ui_console.design.draft import Draft
 from ui_console.design.screen import DesignApp, PanelName, keys_help
 
@@ -24,7 +24,7 @@ def app_of(draft: Draft) -> DesignApp:
 
 
 def shipped() -> Draft:
-    return Draft.opened(str(ROOT / "mission.xml"))
+    return Draft.opened(str(ROOT / "tests" / "backbone" / "mission" / "everything_declared.xml"))
 
 
 def two_hosts() -> Draft:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from web_browser import Finger
+from web_browser import Cable, Finger
 from web_page import (
     ALL_SIZES,
     GAMEPAD,
@@ -20,7 +20,10 @@ from web_page import (
     wait_stopped,
     wait_until,
 )
-from web_stage import LOW, Stage
+from web_stage import ANYBODY, LOW, Stage
+
+from resource_pool.messages import Drive
+from ui_console.driving import STICK_LASTS_S
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
@@ -230,6 +233,31 @@ async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finge
             await (button.click() if size == "desktop" else button.tap())
             await wait_until(lambda: sum(one.is_stopped for one in stage.robots.values()) == count, words)  # noqa: B023
         assert await dialog.count() == 1, "the reading goes on"
+
+
+async def test_a_hold_from_before_a_stop_moves_nothing_however_late_it_arrives(stage: Stage) -> None:
+    async with (
+        Cable(stage.port).plugged_in() as cable,
+        stage.browser() as other,
+        page_at(stage, address=f"http://127.0.0.1:{cable.port}/#token={ANYBODY}") as page,
+    ):
+        await take(page)
+        wheels = Wheels(stage)
+        await page.keyboard.down("d")
+        await wheels.wait_turning()
+        cable.may_pass.clear()
+        await other.say(do="stop_robot", robot="scout1")
+        await wait_until(lambda: stage.robots["scout1"].is_stopped, "stopped")
+        stage.robots["scout1"].free()
+        await asyncio.sleep(STICK_LASTS_S + 0.1)
+        wheels.forget()
+        cable.may_pass.set()
+        await page.locator("#let-go").wait_for()
+        assert not any(isinstance(one, Drive) for one in wheels.news), "they were sent before the stop"
+        await wheels.assert_still("the key is still down")
+        await page.keyboard.up("d")
+        await page.keyboard.down("d")
+        await wheels.wait_turning()
 
 
 async def test_a_letter_that_stops_is_written_with_alt(stage: Stage) -> None:
