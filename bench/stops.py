@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from measuring import report
+from playwright.async_api import Error as PageError
 from stops_link import relay_to_mission
 from stops_page import page_present
 from stops_places import KINDS, OTHERS, ROBOT, Cell, Gesture, Link, cells
@@ -69,7 +70,7 @@ class Runner:
                 found = [await self._stop(cell) for cell in tried]
             else:
                 found = await self._stop_without_link([cell.gesture for cell in tried], tried[0].link)
-        except (NotSeen, AssertionError) as error:
+        except (NotSeen, AssertionError, PageError) as error:
             found = [{"fault": f"could not be tried: {error}"}] * len(tried)
         await self._clean_up(tried[0])
         return found
@@ -119,7 +120,7 @@ class Runner:
 
     async def _clean_up(self, cell: Cell) -> None:
         await self._console.let_go()
-        with suppress(NotSeen):
+        with suppress(NotSeen, PageError):
             await self._console.leave(cell.place)
         if cell.place.needs == "asked":
             await self._world.asker.leave()
