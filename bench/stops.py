@@ -104,6 +104,8 @@ class Runner:
         world, console = self._world, self._console
         if cell.link is Link.OTHER or not console.kind.drives:
             await console.take()
+            if console.kind.drives:
+                await until(world.console_asks, f"{console.name} asks for {ROBOT}")
             await world.holder.turn()
             await until(lambda: world.poses.turns(ROBOT), f"{ROBOT} turns")
             return

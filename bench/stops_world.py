@@ -218,12 +218,23 @@ class World:
             state = await lift_stop(self.bus, state, "olga")
         return was_stopped
 
+    async def console_asks(self) -> bool:
+        """Return whether the console that is tried is there and asks for a robot."""
+        schedule = await self._schedule()
+        return any(self._is_tried(request.owner) for request in schedule.requests)
+
     async def console_holds(self) -> bool:
         """Return whether the console that is tried has the robot."""
-        schedule = await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
+        schedule = await self._schedule()
         owners = {request.arc: request.owner for request in schedule.requests}
         holders = [owners.get(one.arc, "") for rc in schedule.rcs if rc.rc == ROBOT for one in rc.holders]
-        return any(owner.startswith("ui_console/") and owner not in self._own for owner in holders)
+        return any(map(self._is_tried, holders))
+
+    def _is_tried(self, owner: str) -> bool:
+        return owner.startswith("ui_console/") and owner not in self._own
+
+    async def _schedule(self) -> Schedule:
+        return await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
 
     async def others_turn(self, robots: Iterable[str]) -> None:
         """Have these other robots turn."""
