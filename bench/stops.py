@@ -34,6 +34,7 @@ from stops_terminal import BIN, CANNOT, Script, Terminal, TriedConsole
 from stops_world import ROBOTS, NotSeen, World, until, world_of
 
 from backbone import run_files
+from backbone.errors import LinkError, Refusal
 
 MISSION, MISSION_XML = "stops", Path(__file__).parents[1] / "mission.xml"
 STANDS_WITHIN_S = 0.5  # the bound of an emergency stop
@@ -70,7 +71,7 @@ class Runner:
                 found = [await self._stop(cell) for cell in tried]
             else:
                 found = await self._stop_without_link([cell.gesture for cell in tried], tried[0].link)
-        except (NotSeen, AssertionError, PageError) as error:
+        except (NotSeen, AssertionError, PageError, Refusal, LinkError) as error:
             found = [{"fault": f"could not be tried: {error}"}] * len(tried)
         await self._clean_up(tried[0])
         return found

@@ -24,7 +24,7 @@ from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
-from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
+from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.messages import AskPose, Pose
 from ui_console.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
 from ui_console.teleoperation import Teleoperation
@@ -215,7 +215,10 @@ class World:
         state = await ask_stop(self.bus, robot)
         was_stopped = state.is_stopped
         while state.is_stopped:
-            state = await lift_stop(self.bus, state, "olga")
+            with suppress(OtherStop):  # an order that was late came in between
+                state = await lift_stop(self.bus, state, "olga")
+                continue
+            state = await ask_stop(self.bus, robot)
         return was_stopped
 
     async def console_asks(self) -> bool:
