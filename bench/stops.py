@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from measuring import report
+from playwright.async_api import Error as PageError
 from stops_link import relay_to_mission
 from stops_page import page_present
 from stops_places import KINDS, OTHERS, ROBOT, Cell, Gesture, Link, cells
@@ -33,6 +34,7 @@ from stops_terminal import BIN, CANNOT, Script, Terminal, TriedConsole
 from stops_world import ROBOTS, NotSeen, World, until, world_of
 
 from backbone import run_files
+from backbone.errors import LinkError, Refusal
 
 MISSION, MISSION_XML = "stops", Path(__file__).parents[1] / "mission.xml"
 STANDS_WITHIN_S = 0.5  # the bound of an emergency stop
@@ -69,7 +71,7 @@ class Runner:
                 found = [await self._stop(cell) for cell in tried]
             else:
                 found = await self._stop_without_link([cell.gesture for cell in tried], tried[0].link)
-        except (NotSeen, AssertionError) as error:
+        except (NotSeen, AssertionError, PageError, Refusal, LinkError) as error:
             found = [{"fault": f"could not be tried: {error}"}] * len(tried)
         await self._clean_up(tried[0])
         return found
@@ -103,6 +105,8 @@ class Runner:
         world, console = self._world, self._console
         if cell.link is Link.OTHER or not console.kind.drives:
             await console.take()
+            if console.kind.drives:
+                await until(world.console_asks, f"{console.name} asks for {ROBOT}")
             await world.holder.turn()
             await until(lambda: world.poses.turns(ROBOT), f"{ROBOT} turns")
             return
@@ -119,7 +123,7 @@ class Runner:
 
     async def _clean_up(self, cell: Cell) -> None:
         await self._console.let_go()
-        with suppress(NotSeen):
+        with suppress(NotSeen, PageError):
             await self._console.leave(cell.place)
         if cell.place.needs == "asked":
             await self._world.asker.leave()
@@ -152,6 +156,8 @@ class Runner:
         latched_s = [world.stopped_s(robot, given_s) or heard_s[robot] for robot in meant]
         found["stands_s"] = round(max(*stood_s, *latched_s) - given_s, 3)
         found["latched_s"] = round(max(latched_s) - given_s, 3)
+        if (acted_s := world.acted_s(given_s)) is not None:
+            found["acted_s"] = round(acted_s - given_s, 3)
         if found["stands_s"] > self._within_s:
             found["fault"] = f"more than {self._within_s:g} s"
         return found

@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
+from playwright.async_api import async_playwright
 from stops_link import Relay, relay_to_port
 from stops_places import ROBOT, Gesture, Place
 from stops_terminal import BIN, TriedConsole
@@ -58,7 +59,7 @@ class Page(TriedConsole):
         await self._page.wait_for_selector("body:not(.is-blind)")
         if await self._page.evaluate("() => document.getElementById('take').disabled"):
             return  # it asks
-        await self._page.locator(CARD).get_by_role("button", name="Take over").click()
+        await self._page.evaluate(f"() => document.querySelector('{CARD} .row button').click()")
 
     async def go(self, place: Place) -> None:
         """See ``TriedConsole``."""
@@ -145,8 +146,6 @@ class Page(TriedConsole):
 @asynccontextmanager
 async def page_present(name: str, environment: dict[str, str], mission: str) -> AsyncIterator[Page]:
     """Serve the mission's page, and have it open in a browser at the size of the console's name."""
-    from playwright.async_api import async_playwright  # noqa: PLC0415  only pages need it
-
     words = [str(BIN / "scout-console"), "serve", "--port", "0", "--mission", mission]
     pipe = asyncio.subprocess.PIPE
     server = await asyncio.create_subprocess_exec(*words, env={**os.environ, **environment}, stdout=pipe)

@@ -111,6 +111,14 @@ def _card(part: str, robot: str, needs: str = "") -> Place:
     return Place(f"card of {robot}, {part}", part, script, "", "document.activeElement.blur()", needs, robot)
 
 
+def _log_field(selector: str) -> Place:
+    selector = f"#log-search {selector}" if selector[0] == "[" else selector
+    reveal = "document.getElementById('tab-log').click(); "
+    return replace(_focus(selector, reveal), close="document.getElementById('tab-alarms').click()")
+
+
+NAMED = ("text", "robot", "person", "level", "since", "until")
+LOG_FIELDS = (*(f"[name={name}]" for name in NAMED), "[type=submit]", "[type=reset]", "#log-export")
 CARD = {
     "take": ".row button:nth-child(1)",
     "stop_robot": ".row button:nth-child(2)",
@@ -124,9 +132,10 @@ PAGE = (
     Place("nothing has the focus", "body"),
     *map(_tab, TABLES),
     *(_focus(f"#{control}") for control in CONTROLS),
-    *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login button")),
+    *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login [type=submit]")),
     *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
     *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),
+    *map(_log_field, LOG_FIELDS),
     *(_card(part, ROBOT) for part in ("take", "stop_robot", "why")),
     *(_card(part, OTHERS[0]) for part in ("take", "stop_robot", "why", "enlarge")),
     _card("lift", OTHERS[1], "stopped"),

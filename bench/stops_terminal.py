@@ -29,8 +29,7 @@ LET_GO_S = KEYS_LET_GO_S + 0.1  # a little more, for the terminal takes a moment
 ESCAPE_S = 0.15  # chosen: a terminal tells escape from the begin of another key by a pause
 MOST_ESCAPES = 5
 SHOWN_S = 0.5  # chosen: what a key did is drawn by then
-ANSWERED_S = 0.5  # chosen: a component has told its parameters by then
-SHOWN_WITHIN_S = 10.0
+SHOWN_WITHIN_S = 30.0
 FRAMES = re.compile(r"[\u2500-\u259f].*")
 CANNOT = r"NO LINK|CANNOT STOP|MAY NOT ARRIVE|no_answer"
 """What consoles say when they are cut off."""
@@ -149,7 +148,8 @@ class Terminal(TriedConsole):
             await self._shows("STOPPED")
         for key in place.open.split():
             await self._press(key)
-            await asyncio.sleep(ANSWERED_S if key == "i" else 0.0)
+            if key == "i":
+                await self._shows("─ parameters")
         if place.shows:
             await self._shows(place.shows)
 

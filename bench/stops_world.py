@@ -7,6 +7,7 @@ import math
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import asynccontextmanager, suppress
+from typing import Any
 
 from stops_places import OTHERS, ROBOT
 
@@ -16,10 +17,14 @@ from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.errors import LinkError
+from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
+from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
-from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
+from backbone.wire import Envelope
+from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.messages import AskPose, Pose
 from ui_console.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
 from ui_console.teleoperation import Teleoperation
@@ -168,7 +173,17 @@ class World:
         self._drivers, self.holder, self.asker = operators[: len(OTHERS)], *operators[len(OTHERS) :]
         self._own = {operator.launch.address for operator in operators}
         self._stops: dict[str, StopState] = {}
+        self._acted_s = 0.0
         watch_stops(bus, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
+
+    def _heard_act(self, envelope: Envelope[Any]) -> None:
+        if envelope.body.action in (OperatorAction.STOP_ROBOT, OperatorAction.STOP_ALL):
+            self._acted_s = envelope.body.at_s
+
+    def acted_s(self, since_s: float) -> float | None:
+        """Return when a console began to carry the stop out that was given then; None: it did not say."""
+        return self._acted_s if self._acted_s >= since_s else None
 
     def _heard(self, state: StopState) -> None:
         self._stops[state.rc] = state
@@ -200,15 +215,29 @@ class World:
         state = await ask_stop(self.bus, robot)
         was_stopped = state.is_stopped
         while state.is_stopped:
-            state = await lift_stop(self.bus, state, "olga")
+            with suppress(OtherStop):  # an order that was late came in between
+                state = await lift_stop(self.bus, state, "olga")
+                continue
+            state = await ask_stop(self.bus, robot)
         return was_stopped
+
+    async def console_asks(self) -> bool:
+        """Return whether the console that is tried is there and asks for a robot."""
+        schedule = await self._schedule()
+        return any(self._is_tried(request.owner) for request in schedule.requests)
 
     async def console_holds(self) -> bool:
         """Return whether the console that is tried has the robot."""
-        schedule = await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
+        schedule = await self._schedule()
         owners = {request.arc: request.owner for request in schedule.requests}
         holders = [owners.get(one.arc, "") for rc in schedule.rcs if rc.rc == ROBOT for one in rc.holders]
-        return any(owner.startswith("ui_console/") and owner not in self._own for owner in holders)
+        return any(map(self._is_tried, holders))
+
+    def _is_tried(self, owner: str) -> bool:
+        return owner.startswith("ui_console/") and owner not in self._own
+
+    async def _schedule(self) -> Schedule:
+        return await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
 
     async def others_turn(self, robots: Iterable[str]) -> None:
         """Have these other robots turn."""

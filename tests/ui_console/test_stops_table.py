@@ -82,7 +82,9 @@ class Controls(HTMLParser):
             self._around.append(f"#{given['id']}")
             self.found |= {f"#{given['id']}"} if tag == "dialog" else set()
         elif (tag in ("button", "input", "select", "textarea", "a") or "tabindex" in given) and not self._in_a_dialog:
-            self.found.add(f"#{given['id']}" if "id" in given else f"{self._around[-1]} {tag}")
+            around = self._around[-1] if self._around else ""
+            named = f"{around} [name={given['name']}]" if "name" in given else f"{around} [type={given.get('type')}]"
+            self.found.add(f"#{given['id']}" if "id" in given else named)
 
     def handle_endtag(self, tag: str) -> None:
         if tag in ("form", "dialog") and self._around and (tag == "dialog" or not self._in_a_dialog):

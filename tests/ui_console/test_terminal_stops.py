@@ -67,6 +67,18 @@ async def test_the_emergency_stop_works_whatever_is_in_front_and_is_never_typed(
         assert [field.value for field in pilot.app.screen.query(Input)] == before
 
 
+@pytest.mark.parametrize(("key", "wanted"), STOPPING.items())
+async def test_a_stop_passes_the_keys_that_wait(key: str, wanted: object) -> None:
+    """A key that is held repeats, and on a busy machine its repeats wait in a line."""
+    session = WrittenSession(shown=held_model())
+    async with ConsoleApp(session).run_test(size=SIZE) as pilot:
+        burst(pilot, *["d"] * 50, key)
+        await settle(pilot)
+    assert wanted in session.wanted[:5]
+    assert session.wanted.count(wanted) == 1
+    assert len(session.wanted) == 50 + len(["stop", wanted])
+
+
 @pytest.mark.parametrize("profile", list(Profile))
 async def test_every_profile_stops_one_robot_and_all(profile: Profile) -> None:
     session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), shown=held_model())

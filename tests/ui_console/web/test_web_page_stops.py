@@ -214,6 +214,27 @@ async def test_keys_stop_one_and_all_whatever_has_the_focus(stage: Stage) -> Non
                 robot.free()
 
 
+IN_REACH = """(words) => [...document.querySelectorAll("button.emergency")].some((button) => {
+  if (!button.checkVisibility() || !button.textContent.startsWith(words)) return false;
+  const box = button.getBoundingClientRect();
+  return document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2) === button;
+})"""
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finger(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        await take(page)
+        await page.evaluate("() => document.getElementById('reading').showModal()")
+        dialog = page.locator("dialog[open]")
+        for words, count in (("Stop scout1", 1), ("Stop all", 3)):
+            assert await page.evaluate(IN_REACH, words), words
+            button = dialog.get_by_role("button", name=words)
+            await (button.click() if size == "desktop" else button.tap())
+            await wait_until(lambda: sum(one.is_stopped for one in stage.robots.values()) == count, words)  # noqa: B023
+        assert await dialog.count() == 1, "the reading goes on"
+
+
 async def test_a_hold_from_before_a_stop_moves_nothing_however_late_it_arrives(stage: Stage) -> None:
     async with (
         Cable(stage.port).plugged_in() as cable,
@@ -237,27 +258,6 @@ async def test_a_hold_from_before_a_stop_moves_nothing_however_late_it_arrives(s
         await page.keyboard.up("d")
         await page.keyboard.down("d")
         await wheels.wait_turning()
-
-
-IN_REACH = """(words) => [...document.querySelectorAll("button.emergency")].some((button) => {
-  if (!button.checkVisibility() || !button.textContent.startsWith(words)) return false;
-  const box = button.getBoundingClientRect();
-  return document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2) === button;
-})"""
-
-
-@pytest.mark.parametrize("size", ALL_SIZES)
-async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finger(stage: Stage, size: str) -> None:
-    async with page_at(stage, size) as page:
-        await take(page)
-        await page.evaluate("() => document.getElementById('reading').showModal()")
-        dialog = page.locator("dialog[open]")
-        for words, count in (("Stop scout1", 1), ("Stop all", 3)):
-            assert await page.evaluate(IN_REACH, words), words
-            button = dialog.get_by_role("button", name=words)
-            await (button.click() if size == "desktop" else button.tap())
-            await wait_until(lambda: sum(one.is_stopped for one in stage.robots.values()) == count, words)  # noqa: B023
-        assert await dialog.count() == 1, "the reading goes on"
 
 
 async def test_a_letter_that_stops_is_written_with_alt(stage: Stage) -> None:

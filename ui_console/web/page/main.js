@@ -168,6 +168,7 @@ function act(what, name = "", more = {}) {
   if (!say(words[what](name, more))) notice(`NOT CONNECTED: ${what.replace("_", " ")} was not sent.`);
 }
 
+/** The robot that a stop of one is for. */
 function meant() {
   return hand.held || cards.meant;
 }
