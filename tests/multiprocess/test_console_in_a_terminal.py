@@ -176,7 +176,6 @@ def test_a_script_is_told_once_all_that_screens_show(mission: RunningMission) ->
 # ---------------------------------------------------------------------- whatever the terminal
 TERMINALS = ["TERM=xterm-256color", "TERM=vt100", "TERM=dumb", "NO_COLOR=1", "TEXTUAL_THEME=textual-light"]
 KEYS_OF_A_CONSOLE = [*"wasdjtrpmMgnkKyiev", "Up", "Space", "Tab", "BTab", "+", "-", "?", "[", "]", "x", "X", "c", "l"]
-KEYS_OF_THE_DESIGNER = [*"aenxudctw+-<>JK?", "Tab", "BTab", "Up", "Down", "Space", "Delete"]
 
 
 def press_all_twice(screen: Terminal, keys: list[str]) -> None:
@@ -228,21 +227,6 @@ def test_a_console_is_drawn_in_any_terminal_and_ctrl_c_ends_it(
         screen.shows(r"you hold scout1")
         screen.press("C-c")
         ended_well(screen, 130)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("variables", TERMINALS)
-def test_no_key_pressed_twice_ends_the_designer_in_any_terminal(
-    mission: RunningMission, tmp_path: Path, variables: str
-) -> None:
-    with terminal(mission, tmp_path) as screen:
-        screen.open("scout-console", "design", str(tmp_path / "guard.xml"), size=(80, 24), variables=variables)
-        screen.shows(r"guard.xml")
-        press_all_twice(screen, KEYS_OF_THE_DESIGNER)
-        screen.press("C-c")  # also from a dialog, which may still be open
-        if "not saved" in screen.shows(r"not saved|ENDED WITH"):
-            screen.press("y")
-        ended_well(screen, 0)
 
 
 CRASHING = """

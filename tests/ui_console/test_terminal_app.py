@@ -34,8 +34,9 @@ from ui_console.console_events import (
     StoryHeard,
 )
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.profile import Profile
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
-from ui_console.terminal.keys import DRIVES, Profile
+from ui_console.terminal.keys import DRIVES
 from ui_console.terminal.keys import KEYS as KEYS_OF_THE_CONSOLE
 from ui_console.terminal.tables import PanelName
 from ui_console.terminal.widgets import DrivePad, Panel, Video

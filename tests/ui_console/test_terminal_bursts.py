@@ -14,8 +14,8 @@ from textual.pilot import Pilot
 from written_session import WrittenSession, settle
 
 from ui_console.console_events import StopHeard
+from ui_console.profile import Profile
 from ui_console.terminal.app import ConsoleApp
-from ui_console.terminal.keys import Profile
 from ui_console.terminal.tables import PanelName
 
 CONSOLE_SCREENS: dict[str, list[str]] = {

@@ -7,8 +7,9 @@ import pytest
 from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 
 from ui_console.console_events import LinkTrouble, ScheduleHeard, StopHeard
+from ui_console.profile import Profile
 from ui_console.terminal.head import Head, head
-from ui_console.terminal.keys import Profile, has, hints, key_lines, keys_help
+from ui_console.terminal.keys import has, hints, key_lines, keys_help
 from ui_console.views import ConsentView, ConsoleView, HealthView, LostView
 
 WIDTHS = [20, 40, 50, 80, 120, 200]

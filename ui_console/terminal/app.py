@@ -24,11 +24,12 @@ from backbone.cli import ExitCode
 from ui_console.console_model import LOG_SHOWN
 from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
+from ui_console.profile import Profile
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
 from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
-from ui_console.terminal.keys import KEYS, Profile, has, hints, keys_help, robot_meant, stop_meant
+from ui_console.terminal.keys import KEYS, has, hints, keys_help, robot_meant, stop_meant
 from ui_console.terminal.lines import Row, robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, WrongSearch, read_search
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows

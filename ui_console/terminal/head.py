@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from backbone.spoken import counted
-from ui_console.terminal.keys import Profile, has
+from ui_console.profile import Profile
+from ui_console.terminal.keys import has
 from ui_console.terminal.lines import ALARM_STYLES
 from ui_console.views import ConsoleView, HealthView, LostView, VideoView
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 from rich.style import Style
 from rich.text import Text
 from textual.binding import Binding
 
+from ui_console.profile import Profile
 from ui_console.views import ConsoleView
 
 MOST_PICKED_BY_KEY = 9
@@ -20,15 +20,6 @@ STOP_KEYS = frozenset({"x", "X"})
 """Keys of the emergency stop: no dialog and no field takes them for anything else."""
 ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x"})
 """What they arrive as when escape was pressed a tenth of a second before, and from terminals that tell keys apart."""
-
-
-class Profile(StrEnum):
-    """How a console looks."""
-
-    TERMINAL = "terminal"  # picture, tables, keys
-    PENDANT = "pendant"  # keys for one hand and the state of one robot; the picture is on a video monitor
-    MONITOR = "monitor"  # tables only; drives nothing
-
 
 DRIVE_KEYS = [
     Binding("up,w", "drive('forward')", "drive forward while held"),

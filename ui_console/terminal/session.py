@@ -20,11 +20,11 @@ from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
 from ui_console.gamepad import Gamepad, PadWish, Stick, play_gamepad
 from ui_console.observer import Observer
+from ui_console.profile import Profile
 from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
-from ui_console.terminal.keys import Profile
 from ui_console.terminal.pixels import can_show_pixels
 
 Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
