@@ -19,6 +19,7 @@ from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import Leases, Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.consent import Settled, Sought, Topic
+from ui_console.losses import why_lost
 
 
 # ---------------------------------------------------------------------- of its own robot
@@ -492,12 +493,14 @@ def event_json(event: ConsoleEvent) -> bytes:
     """Return the event as one line of JSON, without its end.
 
     Example:
-        >>> event_json(Lost(2.0, "higher", "console-1", -1.0))
-        b'{"event":"suspended","at_s":2.0,"reason":"higher","by":"console-1","expected_start_s":-1.0}'
+        >>> event_json(LinkTrouble(2.0, "scout1 did not answer"))
+        b'{"event":"no_answer","at_s":2.0,"detail":"scout1 did not answer"}'
     """
     plain: dict[str, Any] = msgspec.to_builtins(_by_name(event))
     if isinstance(event, Granted):
         plain["after_s"] = event.after_s
+    if isinstance(event, Lost):
+        plain["why"] = why_lost(event.reason, event.by)
     return msgspec.json.encode({"event": event_word(event), **plain})
 
 

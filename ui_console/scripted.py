@@ -10,8 +10,20 @@ from collections.abc import Callable
 from backbone.errors import Refusal, code_of
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import SwappedOut
-from ui_console.console_events import Asked, CommandRefused, ConsoleEvent, PictureSeen, StopHeard, event_json
+from ui_console.console_events import (
+    Asked,
+    CommandApplied,
+    CommandRefused,
+    ConsoleEvent,
+    Granted,
+    LinkTrouble,
+    Lost,
+    PictureSeen,
+    StopHeard,
+    event_json,
+)
 from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
+from ui_console.losses import UNDECIDED
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.teleoperation import Teleoperation
 
@@ -42,17 +54,35 @@ class ScriptDriver:
         self._console: Teleoperation | None = None
         self._stops: list[StopRobot | StopAll] = []
         self._stopped = False
+        self._unanswered = ""
 
     def show(self, event: ConsoleEvent) -> None:
-        """Write the event, if it is one for scripts."""
-        if isinstance(event, _FOR_SCREENS_ONLY):
+        """Write the event, if it is one for scripts; the same silence is one line until there is an answer."""
+        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
             return
+        if isinstance(event, Lost) and event.reason in UNDECIDED:
+            self._player.require_let_go()
         if isinstance(event, StopHeard) and (event.stop.is_stopped or self._stopped):
             self._stopped = event.stop.is_stopped
             self._player.require_let_go()
         if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True
         self._write(event_json(event))
+
+    @property
+    def must_halt(self) -> bool:
+        """Whether its lines move nothing before one that halts."""
+        return self._player.must_let_go
+
+    def _is_told(self, event: ConsoleEvent) -> bool:
+        """Take note of a silence and of its end; return whether the script knows of this silence."""
+        if isinstance(event, LinkTrouble):
+            is_told = event.detail == self._unanswered
+            self._unanswered = self._unanswered or event.detail
+            return is_told
+        if isinstance(event, CommandApplied | Granted | Lost):
+            self._unanswered = ""
+        return False
 
     def feed(self, line: str | None) -> None:
         """Take the next line of the script; None: its end. A wrong line ends the script there."""

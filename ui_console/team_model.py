@@ -81,10 +81,12 @@ class TeamModel:
 
     Args:
         mission: Its name.
+        lift_remedy: What an operator of this console does about a stop.
     """
 
-    def __init__(self, mission: str = "") -> None:
+    def __init__(self, mission: str = "", lift_remedy: str = "Lift the stop when the robot may move.") -> None:
         self.mission = mission
+        self._lift_remedy = lift_remedy
         self.schedule: Schedule | None = None
         """As last heard."""
         self.alarms = AlarmBook()
@@ -522,8 +524,7 @@ class TeamModel:
         unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
         line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
         if stop.is_stopped:
-            remedy = "Lift the stop when the robot may move."
-            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
         else:
             self.alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
 

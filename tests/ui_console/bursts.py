@@ -12,6 +12,7 @@ from typing import Any
 from textual.app import App
 from textual.events import Key
 from textual.pilot import Pilot
+from textual.screen import Screen
 
 SIZES = [(80, 24), (120, 40), (200, 60)]
 LOOKS = list(itertools.product(["textual-dark", "textual-light"], [False, True]))
@@ -79,20 +80,34 @@ async def press_all_twice(
     """
     ending = [key for key in keys if key in LEAVE]
     async with app.run_test(size=size, notifications=True) as pilot:
+        opened: Screen[Any] | None = None
         for key in [*(key for key in keys if key not in LEAVE), *ending]:
-            await _close_dialogs(pilot)
-            await to_main(pilot)
-            if opening:
-                await pilot.press(*opening)
-            await until(pilot, lambda: len(app.screen_stack) == 1 + is_dialog, "the screen that the keys open is there")
+            if app.screen is not opened or not is_dialog:
+                opened = await _open(pilot, opening, to_main, is_dialog=is_dialog)
             burst(pilot, key, key)
             await pilot.pause()
             if not app.is_running:
                 assert key in LEAVE, f"{key} twice ended the screen"
                 break
-            await answered(pilot)
             assert app.return_code is None, f"{key} twice ended the screen"
     assert app.return_code in (None, *LEAVE.values())
+
+
+async def _open(
+    pilot: Pilot[None],
+    opening: Sequence[str],
+    to_main: Callable[[Pilot[None]], Awaitable[None]],
+    *,
+    is_dialog: bool,
+) -> Screen[Any]:
+    """Return the screen that these keys open from the main one."""
+    await answered(pilot)
+    await _close_dialogs(pilot)
+    await to_main(pilot)
+    if opening:
+        await pilot.press(*opening)
+    await until(pilot, lambda: len(pilot.app.screen_stack) == 1 + is_dialog, "the screen that the keys open is there")
+    return pilot.app.screen
 
 
 async def until(pilot: Pilot[Any], is_so: Callable[[], bool], what: str) -> None:

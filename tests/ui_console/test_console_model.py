@@ -157,7 +157,7 @@ def test_the_status_line_follows_a_take_over_from_wish_to_release() -> None:
     shown.apply(WhyHeard(9.97, Why("c", "waiting", ["watch1 has its minimum run time"], "R5", [], 12.0, "")))
     assert shown.status_line(9.97) == "waiting for scout1: watch1 has its minimum run time"
     shown.apply(GRANT)
-    assert shown.status_line(11.0) == "you hold scout1 (epoch 7), slice 4 s"
+    assert shown.status_line(11.0) == "you hold scout1, slice 4 s"
     shown.apply(StopHeard(11.0, STOP))
     assert shown.status_line(11.0) == "scout1 is STOPPED by anna: child in the room"
     shown.apply(Lost(12.0, "higher", "console-2", -1.0))
