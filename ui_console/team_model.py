@@ -21,7 +21,7 @@ from backbone.mission_log import AskLog
 from backbone.naming import Subsystem, component_of
 from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
-from backbone.spoken import value_text
+from backbone.spoken import counted, value_text
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.console_events import (
@@ -530,8 +530,8 @@ class TeamModel:
 
     def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
         self._radios[radio] = values
-        counted = {(radio, name.removeprefix("overruns_")) for name in values}
-        self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in counted}
+        known = {(radio, name.removeprefix("overruns_")) for name in values}
+        self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in known}
         for name, count in values.items():
             arc = name.removeprefix("overruns_")
             if arc == name:
@@ -539,7 +539,8 @@ class TeamModel:
             before = self._overruns.get((radio, arc), 0.0)
             self._overruns[radio, arc] = count
             if count > before:
-                line = f"{count:.0f} packets of {arc} on {radio} were late or lost"
+                late = int(count)
+                line = f"{counted(late, 'packet')} of {arc} on {radio} {'was' if late == 1 else 'were'} late or lost"
                 remedy = "Claim with a longer period, or use another radio."
                 self.alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
 

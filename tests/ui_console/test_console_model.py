@@ -241,7 +241,9 @@ def test_a_request_that_waits_long_without_a_prospect_starves_and_stops_starving
 def test_packets_late_on_a_radio_are_an_alarm_each_time_there_are_more() -> None:
     shown = model(RadioCounted(1.0, "radio", {"overruns_a": 0.0}))
     assert alarm_lines(shown) == []
-    for at_s, overruns in ((2.0, 3.0), (3.0, 3.0), (4.0, 5.0)):
+    shown.apply(RadioCounted(1.5, "radio", {"overruns_a": 1.0}))
+    assert alarm_lines(shown) == ["1 packet of a on radio was late or lost"]
+    for at_s, overruns in ((2.0, 1.0), (4.0, 5.0)):
         shown.apply(RadioCounted(at_s, "radio", {"overruns_a": overruns}))
     [alarm] = shown.team.alarms.views()
     assert (alarm.kind, alarm.count, alarm.line) == (
