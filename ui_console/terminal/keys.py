@@ -18,7 +18,7 @@ from ui_console.views import ConsoleView
 MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})
 """Keys of the emergency stop: no dialog and no field takes them for anything else."""
-ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x"})
+ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x", "alt+q"})
 """What they arrive as when escape was pressed a tenth of a second before, and from terminals that tell keys apart."""
 
 DRIVE_KEYS = [
@@ -57,7 +57,7 @@ KEYS = [
     Binding("slash", "search", "search the log: words, a robot, a person, a level, since when"),
     Binding("v", "bare", "picture alone, and back"),
     Binding("question_mark,f1", "keys", "these keys"),
-    Binding("q", "quit", "give the robot back and leave"),
+    Binding("q,alt+q", "quit", "give the robot back and leave"),
     Binding("ctrl+q", "quit", "give the robot back and leave", priority=True),
     Binding("ctrl+c", "interrupt", "the same from any dialog; exit code 130", priority=True),
 ]
