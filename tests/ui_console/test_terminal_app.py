@@ -105,6 +105,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
         "q",
         "ctrl+c",
         "ctrl+q",
+        "alt+q",
         "v",
         "question_mark",
         "f1",
@@ -150,7 +151,7 @@ async def test_plus_and_minus_change_the_speed_of_the_next_press_within_bounds()
         assert screen.speed_rad_s == SPEED_MOST_RAD_S
 
 
-@pytest.mark.parametrize(("key", "code"), [("q", 0), ("ctrl+q", 0), ("ctrl+c", 130)])
+@pytest.mark.parametrize(("key", "code"), [("q", 0), ("alt+q", 0), ("ctrl+q", 0), ("ctrl+c", 130)])
 async def test_q_and_ctrl_c_quit_and_say_how_it_ended(key: str, code: int) -> None:
     screen = ConsoleApp(WrittenSession())
     async with screen.run_test() as pilot:
