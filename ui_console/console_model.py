@@ -288,7 +288,9 @@ class ConsoleModel:
             return f"watching; you hold no robot{f' here; {there}' if there else ''}"
         wanted = self.robot or "a robot"
         if self.why is not None and self.why.why.lines:
-            return f"waiting for {wanted}: {self.team.people.named(self.why.why.lines[0])}"
+            why = self.why.why
+            reason = why.lines[0].removeprefix(f"{why.name} {why.state}: ")  # which the line says in its own words
+            return f"waiting for {wanted}: {self.team.people.named(reason)}"
         if self.lost is not None:
             return f"waiting for {wanted}: {self._why_lost(self.lost)}"
         return f"waiting for {wanted}"

@@ -447,3 +447,10 @@ def test_a_claim_that_was_refused_waits_for_nothing_and_says_why_until_the_next(
     assert not shown.own(100.0).is_asked
     shown.apply(ASK)
     assert shown.status_line(101.0) == "waiting for scout1"
+
+
+def test_a_console_that_waits_says_the_reason_without_repeating_who_waits() -> None:
+    line = "console-1-capture waiting: since 24.54 s (3.5 s) for console-9-capture"
+    why = Why("console-1-capture", "waiting", [line], "3", [], -1.0, "")
+    shown = model(ASK, WhyHeard(2.0, why))
+    assert shown.status_line(3.0) == "waiting for scout1: since 24.54 s (3.5 s) for console-9-capture"
