@@ -110,10 +110,17 @@ class CommandRefused:
 
 @dataclass(frozen=True, slots=True)
 class LinkTrouble:
-    """Somebody did not answer: what was asked may or may not have happened."""
+    """A peer did not answer: what was asked may or may not have happened.
+
+    Attributes:
+        at_s: When.
+        detail: What was not answered, for people.
+        command: The command of this console's hands that was not answered; empty: something else.
+    """
 
     at_s: float
     detail: str
+    command: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -494,7 +501,7 @@ def event_json(event: ConsoleEvent) -> bytes:
 
     Example:
         >>> event_json(LinkTrouble(2.0, "scout1 did not answer"))
-        b'{"event":"no_answer","at_s":2.0,"detail":"scout1 did not answer"}'
+        b'{"event":"no_answer","at_s":2.0,"detail":"scout1 did not answer","command":""}'
     """
     plain: dict[str, Any] = msgspec.to_builtins(_by_name(event))
     if isinstance(event, Granted):

@@ -53,11 +53,10 @@ class ScriptDriver:
         self._wrong: WrongScript | None = None
         self._console: Teleoperation | None = None
         self._stops: list[StopRobot | StopAll] = []
-        self._stopped = False
-        self._unanswered = ""
+        self._stopped = self._is_unanswered = False
 
     def show(self, event: ConsoleEvent) -> None:
-        """Write the event, if it is one for scripts; the same silence is one line until there is an answer."""
+        """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
         if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
             return
         if isinstance(event, Lost) and event.reason in UNDECIDED:
@@ -76,12 +75,11 @@ class ScriptDriver:
 
     def _is_told(self, event: ConsoleEvent) -> bool:
         """Take note of a silence and of its end; return whether the script knows of this silence."""
-        if isinstance(event, LinkTrouble):
-            is_told = event.detail == self._unanswered
-            self._unanswered = self._unanswered or event.detail
+        if isinstance(event, LinkTrouble) and event.command:
+            is_told, self._is_unanswered = self._is_unanswered, True
             return is_told
         if isinstance(event, CommandApplied | Granted | Lost):
-            self._unanswered = ""
+            self._is_unanswered = False
         return False
 
     def feed(self, line: str | None) -> None:

@@ -10,7 +10,8 @@ from ui_console.script import read_script
 from ui_console.scripted import ScriptDriver
 
 DRIVE = '{"at_s": 0, "left_rad_s": 4, "right_rad_s": 4}\n{"at_s": 2, "left_rad_s": 2, "right_rad_s": 2}'
-UNANSWERED = LinkTrouble(2.0, "nobody answered Drive at resource_pool/console-1-drive")
+UNANSWERED = LinkTrouble(2.0, "nobody answered Drive at resource_pool/console-1-drive", "drive")
+LATE = LinkTrouble(2.1, "resource_pool/console-1-drive did not answer Halt within 0.5 s", "halt")
 APPLIED = CommandApplied(3.0, "scout1", 7, "drive", {"left_rad_s": 4.0}, 0.01)
 GRANTED = Granted(4.0, {"scout": "scout1"}, {"scout1": 8}, 9.0, 1.0, True)
 
@@ -25,7 +26,7 @@ def heard(*events: ConsoleEvent) -> list[dict[str, Any]]:
 
 def test_a_silence_is_one_line_until_there_is_an_answer() -> None:
     assert [line["event"] for line in heard(*[UNANSWERED] * 9)] == ["no_answer"]
-    told = heard(UNANSWERED, UNANSWERED, APPLIED, UNANSWERED, UNANSWERED)
+    told = heard(UNANSWERED, LATE, UNANSWERED, APPLIED, LATE, UNANSWERED)
     assert [line["event"] for line in told] == ["no_answer", "applied", "no_answer"]
     other = LinkTrouble(2.5, "scout1 did not confirm the stop: nobody answered")
     assert [line["detail"] for line in heard(UNANSWERED, other, UNANSWERED)] == [UNANSWERED.detail, other.detail]
