@@ -19,18 +19,9 @@ from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.naming import component_of
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import (
-    AskAttributes,
-    Attributes,
-    Done,
-    MoveNode,
-    PathNode,
-    RcUse,
-    RequestAttributes,
-    SetPriority,
-    UnknownRequest,
-    Usage,
-)
+from backbone.rc_manager.messages import AskAttributes, Done, MoveNode, SetPriority
+from backbone.scheduling.requests import PathNode, RcUse, UnknownRequest, Usage
+from backbone.scheduling.views import Attributes, RequestAttributes
 from backbone.spoken import value_text
 
 PRIORITY, PARENT = "priority", "parent"

@@ -216,9 +216,9 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
 @app.command()
 def schema() -> None:
     """Print the XML schema of mission files."""
-    from backbone.mission.reader import schema_text
+    from backbone.mission.declaration.xsd import xsd_text
 
-    print(schema_text())
+    print(xsd_text())
 
 
 @app.command()
@@ -349,21 +349,21 @@ def log(
         from datetime import datetime
 
         from backbone.log_lines import log_json, log_lines
-        from backbone.mission_log import AskLog, Log
+        from backbone.log_question import LogQuestion
+        from backbone.mission_log import Log
         from backbone.mission_picture import LAUNCHER
-        from backbone.moments import Now, moment
+        from backbone.moments import Now
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)
-            since_s, until_s = moment(since, now), moment(until, now) if until else now.mission_s
-            asked = AskLog(since_s, until_s, robot, person, level, text, most)
+            asked = LogQuestion(text, robot, person, level, since, until).asked(now, most)
             told = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
         show([json.dumps(log_json(told, now))] if as_json else log_lines(told, now))
         if not told.events:
             say("nothing of that kind happened")
         if told.left_out:
             say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
-        if told.since_s > max(0.0, since_s):
+        if told.since_s > asked.since_s:
             say(f"what was before {told.since_s:.1f} s is not kept any more")
         return ExitCode.DONE
 

@@ -24,13 +24,14 @@ from backbone.mission.model import ArcWish, Behavior, MissionDescription
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import NoHost
 from backbone.placer.placement import HostView, place
-from backbone.rc_manager.claims import scheduling_request
-from backbone.rc_manager.decisions import RcKnown, Requested
-from backbone.rc_manager.messages import SchedulingRequest, Usage, Why
-from backbone.rc_manager.rehearsal import Line, Rehearsal, Timetable
-from backbone.rc_manager.rules import SchedulingRules
-from backbone.rc_manager.schedule_manager import ScheduleManager
 from backbone.rc_manager.service import TOLERANCE_S
+from backbone.scheduling.claims import scheduling_request
+from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.rehearsal import Line, Rehearsal, Timetable
+from backbone.scheduling.requests import SchedulingRequest, Usage
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.views import Why
 
 FIRST_MINUTE_S = 60.0
 

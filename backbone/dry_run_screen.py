@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from backbone.dry_run import Claimed, DryRun, Placed
-from backbone.rc_manager.rehearsal import Run, Timetable
+from backbone.scheduling.rehearsal import Run, Timetable
 
 COLUMNS = 60  # chosen: one a second of the first minute; with names beside it fits a terminal of 100
 RULER_EVERY = 10

@@ -36,10 +36,7 @@ def _about(event: StoryEvent) -> str:
 
 def log_json(log: Log, now: Now) -> dict[str, Any]:
     """Return the events, each also with the time of day, as plain data."""
-    events = [
-        event_json(event) | {"time": now.time_of_day(event.at_s).astimezone().isoformat(timespec="milliseconds")}
-        for event in log.events
-    ]
+    events = [timed_event_json(event, now) for event in log.events]
     return {"events": events, "left_out": log.left_out, "since_s": log.since_s}
 
 
@@ -55,6 +52,12 @@ def story_lines(events: Iterable[StoryEvent]) -> list[str]:
 def story_json(name: str, events: Iterable[StoryEvent], missing: Sequence[str]) -> dict[str, Any]:
     """Return a story as plain data; ``missing`` names those who did not tell their part."""
     return {"name": name, "events": [event_json(event) for event in events], "missing": list(missing)}
+
+
+def timed_event_json(event: StoryEvent, now: Now) -> dict[str, Any]:
+    """Return one event with the time of day as plain data."""
+    time = now.time_of_day(event.at_s).astimezone().isoformat(timespec="milliseconds")
+    return event_json(event) | {"time": time}
 
 
 def event_json(event: StoryEvent) -> dict[str, Any]:

@@ -28,7 +28,8 @@ from backbone.operators import OperatorActed
 from backbone.people import People
 from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import RequestState, Schedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
 from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope

@@ -27,7 +27,9 @@ from backbone.people import People
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, RequestState, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
 
 LAUNCHER = "backbone/launcher"

@@ -17,7 +17,8 @@ from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.health import HealthWord
 from backbone.mission_picture import MissionPicture
 from backbone.naming import Subsystem, component_of
-from backbone.rc_manager.messages import RcView, RequestState, RequestView, Schedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.spoken import counted
 
 _STATE_STYLE = {

@@ -25,7 +25,9 @@ from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy, RequestState, UnknownRequest, Why
+from backbone.rc_manager.messages import AskWhy
+from backbone.scheduling.requests import RequestState, UnknownRequest
+from backbone.scheduling.views import Why
 from backbone.spoken import counted
 from backbone.wire import Message
 
@@ -35,7 +37,7 @@ RULES = {
     "3": "each starts as early as it fits whole, and takes nothing from those before it",
     "5": "a slice ends only if somebody entitled can use the RCs",
     "6": "RCs are stopped and freed, then settle for the next one",
-    "8": "policy strict: nobody starts while a higher one of its group waits",
+    "8": "policy strict: none starts while a higher one of its group waits",
     "9": "who is higher may keep others waiting for ever; that is allowed, and shown",
     "11": "what is down or can give too little serves nobody",
     "14": "who wants no time now keeps its request and frees its RCs",

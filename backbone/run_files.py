@@ -21,6 +21,7 @@ from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 
 FILE_NAME = "run.json"
+KEPT = ".kept"  # no legal name of a mission
 ENDED = ".ended-"  # a folder whose mission ends is hidden as .<mission>.ended-<pid of the zygote that removes it>
 TRIAL_BYTES = 1 << 16  # chosen: room for what a mission writes until all is ready, logs included
 START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports a process's start in hundredths, corrected by clock steps
@@ -94,6 +95,24 @@ def run_directory(mission: str) -> Path:
         RunFolderUnusable: The system refused.
     """
     return _directory() / legal(mission)
+
+
+def kept_directory() -> Path:
+    """Return the folder for what outlives a process and belongs to no mission of this machine, for this user alone.
+
+    It ends with the login session, or where the system keeps no folder for that, with the machine's temporary files.
+
+    Raises:
+        UnsafeDirectory: Somebody else could put files there.
+        RunFolderUnusable: The system refused.
+    """
+    directory = _directory() / KEPT
+    try:
+        directory.mkdir(mode=0o700, exist_ok=True)
+        _check_private(directory)
+    except OSError as error:
+        raise _unusable(directory, error) from error
+    return directory
 
 
 def prepare(mission: str) -> Path:

@@ -35,10 +35,10 @@ except ModuleNotFoundError as missing:
         raise
     scheduler_solver = None
 
-from backbone.rc_manager.decisions import Departed, Event, Freed, Instruction, Opened, Requested, Woken
-from backbone.rc_manager.rehearsal import Rehearsal, Timetable
-from backbone.rc_manager.rules import SchedulingRules
-from backbone.rc_manager.schedule_manager import ScheduleManager
+from backbone.scheduling.events import Departed, Event, Freed, Instruction, Opened, Requested, Woken
+from backbone.scheduling.rehearsal import Rehearsal, Timetable
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.schedule_manager import ScheduleManager
 
 SIZES = ((10, 20), (30, 20), (100, 50), (1000, 200), (10_000, 1000))
 HEADLINE = ((30, 20), (10_000, 1000))

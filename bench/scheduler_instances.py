@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from random import Random
 
-from backbone.rc_manager.decisions import RcKnown, Requested
-from backbone.rc_manager.messages import PathNode, RcUse, SchedulingRequest, Usage
+from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
 
 MISSION = "fleet"
 SHAPES = ("uniform", "cells", "hub", "tree", "radio")

@@ -23,12 +23,12 @@ import msgspec
 from ortools.sat.python import cp_model
 from scheduler_instances import MISSION, Fleet
 
-from backbone.rc_manager.decisions import Event, Instruction, Requested
-from backbone.rc_manager.messages import RcUse
-from backbone.rc_manager.priority import Path, higher
-from backbone.rc_manager.rehearsal import Rehearsal, Timetable
-from backbone.rc_manager.rules import SchedulingRules
-from backbone.rc_manager.schedule_manager import ScheduleManager
+from backbone.scheduling.events import Event, Instruction, Requested
+from backbone.scheduling.priority import Path, higher
+from backbone.scheduling.rehearsal import Rehearsal, Timetable
+from backbone.scheduling.requests import RcUse
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.schedule_manager import ScheduleManager
 
 SLICE_S = 5.0  # RAM 2002: the papers' slice
 PARTS = 1_000_000  # the solver counts in whole numbers: a radio's capacity in millionths

@@ -34,7 +34,7 @@ from backbone.component.messages import AskState, AskStatistics, ComponentState,
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 
 MISSION = Path(__file__).parents[1] / "mission.xml"
-WATCHER = "mission_control.behaviors.watch_for_motion:WatchForMotion"
+HALTING_WATCHER = '<type name="watch_for_motion" class="halting_watcher:HaltingWatcher" subsystem="mission_control"/>'
 SLICE_S = 0.3
 
 
@@ -52,8 +52,7 @@ def fast_mission(folder: Path, *, settling: bool, clean_stop: bool) -> Path:
     if not settling:
         text = re.sub(r'connect-s="[^"]*"', 'connect-s="0"', text)
     if clean_stop:
-        assert WATCHER in text
-        text = text.replace(WATCHER, "halting_watcher:HaltingWatcher")
+        text = text.replace("  <resources>", f"  <types>{HALTING_WATCHER}</types>\n  <resources>")
     file = folder / "mission.xml"
     file.write_text(text)
     return file

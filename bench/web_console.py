@@ -38,7 +38,7 @@ def with_three_frequencies(mission: str, pictures_per_s: float) -> str:
     """Return the shipped mission with a frequency, a framegrabber of this rate and a watcher for each robot."""
     text = re.sub(r'(name="frame_rate_hz" value=")[^"]*', rf"\g<1>{pictures_per_s:g}", mission)
     for kind, names in (("video_frequency", ("video1", "video2", "video3")), ("framegrabber", ("grabber",))):
-        found = re.search(rf'    <resource type="{kind}" name="\w+".*?</resource>\n', text, re.DOTALL)
+        found = re.search(rf'    <resource type="{kind}" name="\w+"[^>]*?(?:/>|[^/]>.*?</resource>)\n', text, re.DOTALL)
         assert found is not None
         one = found[0]
         if kind == "framegrabber":

@@ -28,7 +28,7 @@ from backbone.component.messages import Absence, LifeState, LogLevel
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
-from backbone.mission.behavior_orders import PathStep
+from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
@@ -103,6 +103,7 @@ class Behavior(Component[B], Generic[B]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
+    given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
     accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | Report | AskBehavior
     children_together: ClassVar[bool] = True
 

@@ -31,11 +31,9 @@ from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.claims import STREAMED_KINDS, scheduling_request
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     BEAT_EVERY_S,
-    LEASE_S,
     AskRequest,
     Beat,
     ChangeRuntime,
@@ -46,16 +44,20 @@ from backbone.rc_manager.messages import (
     GateClosed,
     GateOpens,
     Leases,
-    MissingRuntime,
     OpenGate,
+    SetIdle,
+    TakePath,
+    Withdraw,
+)
+from backbone.scheduling.claims import STREAMED_KINDS, scheduling_request
+from backbone.scheduling.requests import (
+    LEASE_S,
+    MissingRuntime,
     PathNode,
     Scheduled,
     SchedulingRequest,
-    SetIdle,
-    TakePath,
     UnknownRequest,
     Usage,
-    Withdraw,
 )
 from backbone.wire import Envelope, Message
 from resource_pool.gate import Gate

@@ -22,7 +22,7 @@ from backbone.naming import Subsystem, address
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
 from backbone.placer.wishes import Wish
-from backbone.rc_manager.messages import PathNode, Usage
+from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,

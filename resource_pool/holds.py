@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from backbone.rc_manager.messages import Held, RcUse, StaleEpoch
+from backbone.rc_manager.messages import Held, StaleEpoch
+from backbone.scheduling.requests import RcUse
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ from backbone.ranges import (
     Text,
     WheelSpeed,
 )
-from backbone.rc_manager.messages import Usage
+from backbone.scheduling.requests import Usage
 from backbone.wire import Message
 from scout_model.description import AirDescription
 

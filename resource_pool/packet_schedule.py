@@ -23,7 +23,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, field, replace
 
-from backbone.rc_manager.messages import Usage
+from backbone.scheduling.requests import Usage
 
 MAIN_KIND = "drive"  # chosen: the stream by which a robot hears that it is not forgotten
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times, far below a packet

@@ -33,15 +33,14 @@ from backbone.rc_manager.messages import (
     Connected,
     Disconnect,
     Disconnected,
-    Holder,
-    Lease,
     Leases,
     RcState,
     StaleEpoch,
     most_epoch,
 )
+from backbone.scheduling.requests import Holder, Lease
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver
+from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver, options_of_drivers
 from resource_pool.holds import Hold, HoldTable
 from resource_pool.messages import HardwareFault, ImpossibleUse, NeedsRestart, NotFromYou
 
@@ -78,6 +77,7 @@ class ResourceController(Component[R], Generic[R]):
     """Base of every RC; derive, set ``parameters_type`` and ``commands``, override the hooks."""
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RcParameters
+    given_elsewhere: ClassVar[frozenset[str]] = frozenset({"driver", "sharable", "capacity", "links", "options"})
     commands: ClassVar[types.UnionType | type[Any] | None] = None
     """Questions this kind of RC answers besides those of the RC manager; each has the fields ``arc`` and ``epoch``."""
     driver_kind: ClassVar[str] = ""
@@ -106,6 +106,11 @@ class ResourceController(Component[R], Generic[R]):
         self._drivers: list[Any] = []
         self._changing = asyncio.Lock()
         self._lease_changed = asyncio.Event()
+
+    @classmethod
+    def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:
+        """Return the options of each built-in driver of this RC's kind."""
+        return options_of_drivers(cls.driver_kind) if cls.driver_kind else None
 
     # ------------------------------------------------------------------ hooks
     async def connected(self, hold: Hold) -> None:

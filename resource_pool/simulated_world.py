@@ -54,6 +54,7 @@ class SimulatedWorld(Component[WorldParameters]):
     """Plays robots and room for the simulated drivers, and audits what it hears."""
 
     parameters_type = WorldParameters
+    given_elsewhere = frozenset({"world"})
     accepts = AskWorld | AskPose
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:

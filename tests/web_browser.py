@@ -108,11 +108,17 @@ class Finger:
 
 
 class Cable:
-    """A connection to the server that can be pulled out, also one way: nothing passes then, and nobody is told."""
+    """A connection to the server that can be pulled out, also one way: nothing passes then, and nobody is told.
+
+    Attributes:
+        may_pass: While it is clear, everything waits on its way, and arrives in a burst afterwards.
+    """
 
     def __init__(self, to_port: int) -> None:
         self._to_port, self.port = to_port, 0
         self.is_cut_up = self.is_cut_down = False
+        self.may_pass = asyncio.Event()
+        self.may_pass.set()
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
@@ -152,6 +158,7 @@ class Cable:
     async def _carry(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, *, is_up: bool) -> None:
         with contextlib.suppress(ConnectionError):
             while data := await reader.read(65536):
+                await self.may_pass.wait()
                 if not (self.is_cut_up if is_up else self.is_cut_down):
                     writer.write(data)
                     await writer.drain()

@@ -206,11 +206,11 @@ def serve(
         from ui_console.web.serving import Claims, Site, serve_console
     except ModuleNotFoundError as missing:
         raise _usage(f"{missing.name} is not installed; install scout-backbone[web]") from missing
-    site, claims = Site(host, port, certificate, key), Claims(kind, away_after)
+    site, claims = Site(host, port, certificate, key, new_tokens), Claims(kind, away_after)
     if design:
         run(lambda: serve_designer(design, passes, site))
     where = _where(mission, connect, secret_file)
-    run(lambda: serve_console(where, passes, site, claims, has_new_tokens=new_tokens))
+    run(lambda: serve_console(where, passes, site, claims))
 
 
 @app.command(hidden=True, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})

@@ -15,7 +15,8 @@ from backbone.errors import LinkError, NoResponder, Refusal, code_of
 from backbone.naming import component_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
 from ui_console.consent import (
     CONSENT_WITHIN_S,
     MAX_WHY,

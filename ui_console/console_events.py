@@ -16,7 +16,8 @@ from backbone.component.messages import ComponentState, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.health import MissionHealth
 from backbone.operators import OperatorActed
-from backbone.rc_manager.messages import Leases, Schedule, Why
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.views import Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.consent import Settled, Sought, Topic
 from ui_console.losses import why_lost
@@ -151,6 +152,13 @@ class LetGoNeeded:
 
     at_s: float
     is_needed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MomentBegan:
+    """A stop, a lift, a grant, a loss, or a broken link: what was pressed before it moves nothing any more."""
+
+    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -429,6 +437,7 @@ OwnEvent = (
     | LinkTrouble
     | GivenBack
     | LetGoNeeded
+    | MomentBegan
     | PictureSeen
     | WhyHeard
     | Attention
@@ -464,6 +473,7 @@ _WORDS: dict[type[Any], str] = {
     LinkTrouble: "no_answer",
     GivenBack: "released",
     LetGoNeeded: "let_go",
+    MomentBegan: "moment",
     PictureSeen: "picture",
     WhyHeard: "why",
     Attention: "attention",

@@ -34,6 +34,7 @@ from ui_console.console_events import (
     LetGoNeeded,
     LinkTrouble,
     Lost,
+    MomentBegan,
     OwnEvent,
     PictureSeen,
     TeamEvent,
@@ -108,6 +109,8 @@ class ConsoleModel:
         self._address = f"{Subsystem.UI_CONSOLE}/{name}"
         self._pictures: dict[str, deque[PictureSeen]] = {}
         self._sought: dict[tuple[str, Topic], Sought] = {}
+        self.moment = 0
+        """Grows whenever presses from before count no more."""
         self._must_let_go = False
         self._went: _Went | None = None
         self._asked_whom: ConsentAsked | None = None
@@ -203,6 +206,7 @@ class ConsoleModel:
             must_let_go=self._must_let_go and held is not None,
             lost=self._lost_view(now_s),
             link_down_s=link_down_s,
+            moment=self.moment,
         )
 
     def other_screens(self) -> list[str]:
@@ -309,6 +313,8 @@ class ConsoleModel:
                 self._sought.pop((settled.sought.asker, settled.sought.topic), None)
             case LetGoNeeded(is_needed=is_needed):
                 self._must_let_go = is_needed
+            case MomentBegan():
+                self.moment += 1
             case Asked(robot=robot):
                 self._asked_whom = self._went = None
                 self._refused = ""

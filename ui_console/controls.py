@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
-from ui_console.console_events import CommandApplied, CommandRefused, LetGoNeeded, LinkTrouble
+from ui_console.console_events import CommandApplied, CommandRefused, LetGoNeeded, LinkTrouble, MomentBegan
 from ui_console.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class Controls:
         """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop."""
         self._dead_man.require_let_go()
         self._pressed.set()
+        self._console.show(MomentBegan(self._console.clock.now_s()))
 
     # ------------------------------------------------------------------ the hands
     def hold(self, drive: Drive, lasts_s: float | None = None) -> None:

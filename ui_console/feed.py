@@ -46,8 +46,9 @@ from backbone.nameserver.messages import (
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Leases, Schedule
+from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.reasons import reasons_for
+from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.console_events import (
@@ -76,11 +77,20 @@ from ui_console.team_model import ROBOT_KIND
 log = logging.getLogger(__name__)
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
-LINK_FRESH_S = 1.0  # chosen: nothing that is shown is older without saying so; machine seconds
-LINK_EVERY_S = 0.3  # chosen: two answers may be lost before what is shown counts as old; machine seconds
+LINK_FRESH_S = 0.8  # chosen: what is older than a second says so, and drawing that takes a moment; machine seconds
+LINK_EVERY_S = 0.3  # chosen: an answer may be lost before what is shown counts as old; machine seconds
 PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and asking costs nothing to speak of; machine seconds
 
+LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link; machine seconds
+
 FeedEvent = TeamEvent | LinkTrouble | CommandRefused
+
+
+class LogAway(Refusal):
+    """The mission's log cannot be searched now."""
+
+    code = "console.log_away"
+    remedy = "Search again in a moment; the table without a search shows what this console heard."
 
 
 class ConsoleFeed:
@@ -189,6 +199,18 @@ class ConsoleFeed:
             return [refusal.detail, refusal.remedy]
         except LinkError as error:
             return [f"nobody answers: {error}"]
+
+    async def search_log(self, asked: AskLog) -> Log:
+        """Return what the mission's log has of this, as far back as the launcher keeps it.
+
+        Raises:
+            LogAway: The launcher did not answer.
+            Refusal: It refused the question.
+        """
+        try:
+            return await self._bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
+        except LinkError as error:
+            raise LogAway(f"the launcher, which keeps the log, did not answer: {error}") from error
 
     async def ask_parameters(self, name: str) -> bool:
         """Have a component tell its parameters; return whether it did."""

@@ -15,7 +15,8 @@ from backbone.errors import LinkError, Refusal
 from backbone.people import is_console
 from backbone.ranges import Instant, Mention
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
 from backbone.wire import Message
 from ui_console.feed import REPLY_TIME_S
 from ui_console.observer import Observer

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from itertools import islice
 
 from backbone.component.messages import StoryEvent
 from backbone.mission_log import AskLog, chosen
@@ -38,16 +39,23 @@ class LogBoard:
         own = [event for event in self._events if (event.at_s, event.where) not in told]
         self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=LOG_KEPT)
 
-    def rows(self, count: int, asked: AskLog | None) -> list[LogRow]:
+    def rows(self, count: int, asked: AskLog | None, found: Sequence[StoryEvent] = ()) -> list[LogRow]:
         """Return the newest, oldest first.
 
         Args:
             count: At most so many.
             asked: Only what fits; None: all.
+            found: What the launcher's log has of it; what was heard here since comes after that.
         """
-        events = [*map(self._people.named_event, self._events)] if asked is not None else [*self._events]
-        newest = (chosen(events, asked) if asked is not None else events)[-count:] if count else []
-        return [_row(self._people.named_event(event)) for event in newest]
+        if asked is None:
+            newest = list(islice(reversed(self._events), count))
+            return [_row(self._people.named_event(event)) for event in reversed(newest)]
+        known = found[-count:] if count else []
+        told = {(event.at_s, event.where) for event in known}
+        since_s = known[-1].at_s if known else 0.0
+        heard = chosen(map(self._people.named_event, self._events), asked)
+        news = [event for event in heard if event.at_s >= since_s and (event.at_s, event.where) not in told]
+        return [_row(event) for event in [*known, *news][-count:]] if count else []
 
 
 def _row(event: StoryEvent) -> LogRow:

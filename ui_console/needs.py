@@ -6,7 +6,7 @@ from backbone.component.messages import ComponentState
 from backbone.creator.messages import creator_name
 from backbone.naming import component_of
 from backbone.people import is_console
-from backbone.rc_manager.messages import Schedule
+from backbone.scheduling.views import Schedule
 
 
 class Needs:

@@ -18,6 +18,7 @@ from ui_console.console_events import (
     Granted,
     LinkTrouble,
     Lost,
+    MomentBegan,
     PictureSeen,
     StopHeard,
     event_json,
@@ -30,7 +31,7 @@ from ui_console.teleoperation import Teleoperation
 DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
-_FOR_SCREENS_ONLY = (Asked, PictureSeen)
+_FOR_SCREENS_ONLY = (Asked, MomentBegan, PictureSeen)
 
 
 class ScriptDriver:

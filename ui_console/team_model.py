@@ -10,7 +10,7 @@ model calls before it shows it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import assert_never
 
 import msgspec
@@ -20,7 +20,9 @@ from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.mission_log import AskLog
 from backbone.naming import Subsystem, component_of
 from backbone.people import People, is_console, screens_of
-from backbone.rc_manager.messages import Leases, RcView, RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.spoken import counted, value_text
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
@@ -275,14 +277,15 @@ class TeamModel:
         """Return the component of this name, if it is there."""
         return next((c for at, c in self._components.items() if component_of(at) == name), None)
 
-    def log(self, count: int = LOG_KEPT, asked: AskLog | None = None) -> list[LogRow]:
+    def log(self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()) -> list[LogRow]:
         """Return the newest that happened, oldest first.
 
         Args:
             count: At most so many.
             asked: Only what fits; None: all.
+            found: What the launcher's log has of it.
         """
-        return self._log.rows(count, asked)
+        return self._log.rows(count, asked, found)
 
     def alarm_views(self, *own: AlarmBook) -> list[AlarmView]:
         """Return the alarms of the mission and of these books: one line for one cause, by the names of people."""

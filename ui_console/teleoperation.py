@@ -22,7 +22,8 @@ from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy, Why
+from backbone.rc_manager.messages import AskWhy
+from backbone.scheduling.views import Why
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import (
     ArcClient,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from backbone.naming import component_of
 from backbone.people import is_console
-from backbone.rc_manager.messages import RcView, RequestView, Schedule
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from ui_console.views import Certainty, SliceView, TimelineRow, TimelineView
 
 HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.naming import Subsystem, component_of
 from backbone.people import People
-from backbone.rc_manager.messages import RequestState, RequestView, Schedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RequestView, Schedule
 from ui_console.views import NodeState, NodeView
 
 _STATE_OF_REQUEST = {

@@ -458,6 +458,7 @@ class OwnView(msgspec.Struct, frozen=True):
         must_let_go: True: a control is held that moves nothing before it is let go and pressed anew.
         lost: The robot that went without the operator asking for it, until they take one or dismiss it.
         link_down_s: Since when this console hears nothing from the mission's hub; negative: the link is up.
+        moment: Grows with each stop, lift, grant and loss; a press that began at an earlier one moves nothing.
     """
 
     console: str
@@ -478,6 +479,7 @@ class OwnView(msgspec.Struct, frozen=True):
     must_let_go: bool = False
     lost: LostView | None = None
     link_down_s: float = NONE_S
+    moment: int = 0
 
 
 class HealthView(msgspec.Struct, frozen=True):

@@ -96,10 +96,17 @@ class Component(Generic[P]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = NoParameters
+    given_elsewhere: ClassVar[frozenset[str]] = frozenset()
+    """Parameters that no <parameter> of a mission file gives: its other elements and attributes do."""
     accepts: ClassVar[types.UnionType | type[Any] | None] = None
     """Questions it answers besides the common ones: a message class or a union of them."""
     registers: ClassVar[bool] = True
     """False only for the nameserver, which keeps the register itself."""
+
+    @classmethod
+    def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:
+        """Return for each built-in driver the parameters it takes besides; None: the class uses no driver."""
+        return None
 
     @classmethod
     def before_bus(cls, launch: Launch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from backbone.component_database.messages import Multiplicity
 from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.document import Element
+from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.report import Report, told_names
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
@@ -33,6 +34,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
                 "Choose another name",
             )
         check_parameters(behavior, TREE_PARAMETERS, report)
+        check_class_parameters(behavior, TREE_PARAMETERS, tables, report)
     sets = _Sets(tables)
     arc_kinds = [name for name in tables.types if tables.needs(name)]
     for behavior, arc in tables.claims():

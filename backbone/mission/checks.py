@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import ipaddress
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from backbone.component_database.messages import Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
-from backbone.mission.class_paths import class_path_fault
-from backbone.mission.core_checks import check_service_parameters
+from backbone.mission.class_facts import ClassFacts, shipped_classes
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault
+from backbone.mission.declaration.elements import is_loopback
 from backbone.mission.document import Element
-from backbone.mission.model import is_loopback
+from backbone.mission.parameter_checks import check_class_parameters, check_service_parameters, check_type_class
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, told, told_names
 from backbone.mission.tables import (
@@ -43,16 +44,21 @@ FIRST_NETWORK_ID, LAST_NETWORK_ID = 1, 254  # as the radio's packets carry it: o
 SET_BY_RESOURCE = ("driver", "sharable", "capacity", "links")  # Resource.rc_parameters
 
 
-def check(root: Element, report: Report) -> None:
-    """Report everything that does not fit."""
-    tables = Tables.of(root)
+def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> None:
+    """Report everything that does not fit.
+
+    Args:
+        root: The mission.
+        classes: Class path → what is known of the class; parameters of other classes are not judged.
+        report: Where faults go.
+    """
+    tables = Tables.of(root, classes)
     _check_hosts(tables, report)
     _check_core(tables, report)
     _check_types(tables, report)
     check_world(tables, report)
-    if tables.types:  # the schema asks for types; without any, every word about kinds would repeat that
-        _check_resources(tables, report)
-        check_behaviors(tables, report)
+    _check_resources(tables, report)
+    check_behaviors(tables, report)
     _check_component_names(tables, report)
     check_processes(tables, _reserved(tables), report)
 
@@ -76,7 +82,7 @@ def _check_hosts(tables: Tables, report: Report) -> None:
 def _check_door(hosts: list[Element], report: Report) -> None:
     """Report a first host that other machines cannot reach, and ports of hosts that run no hub."""
     for host in hosts[1:]:
-        if host.text("port"):
+        if host.has("port"):
             report.fault(
                 host.place_of("port"),
                 f"host {host.text('name')} has a port, but runs no hub",
@@ -100,15 +106,10 @@ def _is_ip(address: str) -> bool:
 
 
 def _check_core(tables: Tables, report: Report) -> None:
-    core = tables.root.first("core")
-    if core is None:
-        return
     first: dict[tuple[str, str], Element] = {}
-    for service in core.all("service"):
+    for service in section(tables.root, "core"):
         name, where = service.text("type"), service.text("host")
         if is_known(service, "type", "core service", CORE_SERVICES, report):
-            if tables.types:
-                is_known(service, "type", "component type", tables.types, report)
             before = first.setdefault((name, where if name == CREATOR else ""), service)
             if before is not service:
                 report.fault(
@@ -125,21 +126,6 @@ def _check_core(tables: Tables, report: Report) -> None:
                 service.place_of("host"),
                 f"{name} on host {where}: other hosts than the first run only their creator",
                 f"Put it on {main}",
-            )
-    there = {name for name, _host in first}
-    for name in CORE_SERVICES:
-        if name not in there and name != CREATOR:
-            report.fault(
-                core.place,
-                f"core service {name} is missing",
-                f'Add <service type="{name}" host="{_main_host(tables)}"/>',
-            )
-    for host in tables.hosts.values():
-        if (CREATOR, host.text("name")) not in first:
-            report.fault(
-                host.place,
-                f"host {host.text('name')} has no creator",
-                f'Add <service type="{CREATOR}" host="{host.text("name")}"/> to <core>',
             )
 
 
@@ -158,8 +144,8 @@ def _check_types(tables: Tables, report: Report) -> None:
         _check_needs(component_type, tables, report)
         _check_type_tags(component_type, tables, report)
         class_path = component_type.text("class")
-        if only_here and re.fullmatch(r"\w+(\.\w+)*:\w+", class_path):
-            _check_class(component_type, class_path, report)
+        if only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path):
+            _check_class(component_type, class_path, tables.classes.get(class_path), report)
 
 
 def _check_core_type(component_type: Element, report: Report) -> None:
@@ -226,9 +212,10 @@ def _check_type_tags(component_type: Element, tables: Tables, report: Report) ->
         )
 
 
-def _check_class(component_type: Element, class_path: str, report: Report) -> None:
+def _check_class(component_type: Element, class_path: str, facts: ClassFacts | None, report: Report) -> None:
     wrong = class_path_fault(class_path)
     if wrong is None:
+        check_type_class(component_type, facts, report)
         return
     message, there = wrong
     name = message.rpartition(" ")[2] if message.startswith("no module") else class_path.rpartition(":")[2]
@@ -264,6 +251,7 @@ def _check_resources(tables: Tables, report: Report) -> None:
             is_known(resource, "type", "type of resource", tables.resource_types(), report)
         check_host(resource, tables, report)
         check_parameters(resource, SET_BY_RESOURCE, report)
+        check_class_parameters(resource, SET_BY_RESOURCE, tables, report)
         _check_uses(resource, tables, report)
         _check_driver(resource, tables, report)
         _check_network_id(resource, ids, report)

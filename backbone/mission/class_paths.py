@@ -7,6 +7,8 @@ from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 
+CLASS_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+
 
 def class_path_fault(class_path: str) -> tuple[str, list[str]] | None:
     """Return what is wrong with ``package.module:Class`` on this machine, and the names there are instead.

@@ -1,7 +1,7 @@
 """A mission file as elements that know where they stand.
 
-One parser reads the file (expat, which tells line and column); what is validated afterwards is made
-from its elements, so no second parser can see something else in the same bytes.
+One parser reads the file: expat, which knows the byte at which each tag begins. Validation, checks and editing work on
+its elements, so nothing can see something else in the same bytes.
 
 Rules of this file:
 
@@ -13,13 +13,14 @@ Rules of this file:
 from __future__ import annotations
 
 import bisect
-import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 from xml.parsers import expat
 
+from backbone.mission.declaration.values import decimal, flag
 from backbone.mission.report import Place, Report, told
 
 MAX_BYTES = 1024 * 1024  # chosen: a robot with its behavior is 600 bytes, so this is more than a thousand robots
@@ -28,30 +29,57 @@ MAX_DEPTH = 32  # chosen: the behavior tree of RAM 2002 is 3 deep
 BEGINNING = Place(1, 1)
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_ATTRIBUTE = re.compile(rb"""\s([^\s=<>"'/]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
-_DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
+_ATTRIBUTE = re.compile(rb"""(\s+)([^\s=<>"'/]+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
 @dataclass(slots=True)
 class Attribute:
-    """A value and where its name stands."""
+    """A value and where its name stands.
+
+    Attributes:
+        value: The value.
+        place: Where its name stands.
+        is_written: False if the file leaves it out, and this is its default.
+    """
 
     value: str
     place: Place
+    is_written: bool = True
+
+
+class Span(NamedTuple):
+    """Where an element stands among the bytes of its file.
+
+    Attributes:
+        begin: First byte of its tag.
+        content: First byte behind its tag.
+        close: First byte of its end tag; the same as ``content`` if it has none.
+        end: First byte behind it.
+    """
+
+    begin: int
+    content: int
+    close: int
+    end: int
+
+
+NOWHERE = Span(0, 0, 0, 0)  # of an element that no file holds
 
 
 @dataclass(slots=True)
 class Element:
-    """An element and where its tag begins.
+    """An element and where it stands.
 
-    The reading methods never fail: a value that is missing or illegal is the schema's to report, and
-    reads as empty here.
+    The reading methods never fail: a value that is missing or illegal is reported by the validation, and reads as
+    empty here.
     """
 
     tag: str
     place: Place
     attributes: dict[str, Attribute] = field(default_factory=dict)
     children: list[Element] = field(default_factory=list)
+    span: Span = NOWHERE
 
     def __iter__(self) -> Iterator[Element]:
         """Yield this element and all below it, in the order of the file."""
@@ -72,6 +100,11 @@ class Element:
         found = self.attributes.get(attribute)
         return self.place if found is None else found.place
 
+    def has(self, attribute: str) -> bool:
+        """Say whether the file gives this attribute."""
+        found = self.attributes.get(attribute)
+        return found is not None and found.is_written
+
     def text(self, attribute: str) -> str:
         """Return the value as it stands, empty if there is none."""
         found = self.attributes.get(attribute)
@@ -83,12 +116,41 @@ class Element:
 
     def number(self, attribute: str) -> float | None:
         """Return the value as a number; None if it is none."""
-        value = self.text(attribute).strip()
-        return float(value) if _DECIMAL.fullmatch(value) else None
+        return decimal(self.text(attribute))
 
     def flag(self, attribute: str) -> bool | None:
         """Return the value as true or false; None if it is neither."""
-        return {"true": True, "1": True, "false": False, "0": False}.get(self.text(attribute).strip())
+        return flag(self.text(attribute))
+
+
+class AttributeSpan(NamedTuple):
+    """Where an attribute stands among the bytes of its file.
+
+    Attributes:
+        blanks: First byte of the blanks before it.
+        name: First byte of its name.
+        quote: First byte of its value, which is a quotation mark.
+        end: First byte behind it.
+    """
+
+    blanks: int
+    name: int
+    quote: int
+    end: int
+
+
+def attribute_spans(data: bytes, begin: int, content: int) -> dict[str, AttributeSpan]:
+    """Return where the attributes of a tag stand, by name.
+
+    Args:
+        data: A text that expat has read.
+        begin: First byte of the tag.
+        content: First byte behind it.
+    """
+    return {
+        match[2].decode(): AttributeSpan(match.start(1), match.start(2), match.start(3), match.end())
+        for match in _ATTRIBUTE.finditer(data, begin, content)
+    }
 
 
 def read_bytes(path: Path, report: Report) -> bytes | None:
@@ -111,14 +173,18 @@ def read_bytes(path: Path, report: Report) -> bytes | None:
 
 def parse(data: bytes, report: Report) -> Element | None:
     """Return the root element; None, with a fault, if the bytes are no well-formed, harmless XML."""
-    data = data.removeprefix(_BYTE_ORDER_MARK)
+    lines = _Lines(data)
     try:
         data.decode()
     except UnicodeDecodeError as error:
-        place = _Lines(data).place(error.start)
-        report.fault(place, f"byte 0x{data[error.start]:02x} is no UTF-8", "Save the file in UTF-8.")
+        report.fault(lines.place(error.start), f"byte 0x{data[error.start]:02x} is no UTF-8", "Save the file in UTF-8.")
         return None
-    return _Parse(data, report).root()
+    return _Parse(data, lines, report).root()
+
+
+def _first_byte(data: bytes) -> int:
+    """Return where the text begins: behind the byte order mark."""
+    return len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
 
 
 class _Refused(Exception):
@@ -130,7 +196,7 @@ class _Lines:
 
     def __init__(self, data: bytes) -> None:
         self._data = data
-        self._starts = [0, *(match.end() for match in re.finditer(b"\n", data))]
+        self._starts = [_first_byte(data), *(match.end() for match in re.finditer(b"\n", data))]
 
     def place(self, offset: int) -> Place:
         line = bisect.bisect_right(self._starts, offset)
@@ -141,8 +207,9 @@ class _Lines:
 class _Parse:
     """One run of expat over one file."""
 
-    def __init__(self, data: bytes, report: Report) -> None:
-        self._data, self._report, self._lines = data, report, _Lines(data)
+    def __init__(self, data: bytes, lines: _Lines, report: Report) -> None:
+        self._data, self._report, self._lines = data, report, lines
+        self._first = _first_byte(data)
         self._open: list[Element] = []
         self._root: Element | None = None
         self._count = 0
@@ -156,7 +223,7 @@ class _Parse:
 
     def root(self) -> Element | None:
         try:
-            self._parser.Parse(self._data, True)
+            self._parser.Parse(self._data[self._first :], True)
         except _Refused:
             return None
         except expat.ExpatError as error:
@@ -169,8 +236,11 @@ class _Parse:
             return None
         return self._root
 
+    def _at(self) -> int:
+        return self._first + self._parser.CurrentByteIndex
+
     def _here(self) -> Place:
-        return self._lines.place(self._parser.CurrentByteIndex)
+        return self._lines.place(self._at())
 
     def _declaration(self, _version: str, encoding: str | None, _standalone: int) -> None:
         if encoding is not None and encoding.lower() not in ("utf-8", "us-ascii"):
@@ -178,7 +248,7 @@ class _Parse:
             raise _Refused
 
     def _doctype(self, *_declared: object) -> None:
-        begin = self._data.rfind(b"<!DOCTYPE", 0, self._parser.CurrentByteIndex + 1)
+        begin = self._data.rfind(b"<!DOCTYPE", 0, self._at() + 1)
         self._report.fault(
             self._lines.place(begin),
             "a document type declaration",
@@ -187,8 +257,8 @@ class _Parse:
         raise _Refused
 
     def _start(self, tag: str, values: dict[str, str]) -> None:
-        offset = self._parser.CurrentByteIndex
-        element = Element(tag, self._lines.place(offset))
+        begin = self._at()
+        element = Element(tag, self._lines.place(begin))
         self._count += 1
         if len(self._open) == MAX_DEPTH:
             self._report.fault(element.place, f"elements are nested deeper than {MAX_DEPTH}", "Flatten the tree.")
@@ -196,9 +266,14 @@ class _Parse:
         if self._count > MAX_ELEMENTS:
             self._report.fault(element.place, f"more than {MAX_ELEMENTS} elements", "Split the mission.")
             raise _Refused
-        found = itertools.islice(_ATTRIBUTE.finditer(self._data, offset), len(values))
-        places = {match.group(1).decode(): self._lines.place(match.start(1)) for match in found}
-        element.attributes = {name: Attribute(value, places[name]) for name, value in values.items()}
+        matched = _TAG.match(self._data, begin)
+        if matched is None:
+            raise AssertionError(f"expat found a tag at byte {begin}, where none begins")
+        element.span = Span(begin, matched.end(), matched.end(), matched.end())
+        spans = attribute_spans(self._data, begin, matched.end())
+        element.attributes = {
+            name: Attribute(value, self._lines.place(spans[name].name)) for name, value in values.items()
+        }
         if self._open:
             self._open[-1].children.append(element)
         else:
@@ -207,7 +282,11 @@ class _Parse:
         self._in_text = False
 
     def _end(self, _tag: str) -> None:
-        self._open.pop()
+        element = self._open.pop()
+        begin, content, *_ = element.span
+        if self._data[content - 2 : content] != b"/>":
+            close = self._at()
+            element.span = Span(begin, content, close, self._data.index(b">", close) + 1)
         self._in_text = False
 
     def _text(self, text: str) -> None:

@@ -1,11 +1,11 @@
 """Changes of a mission file's text, made where they are meant and nowhere else.
 
 Pure: bytes in, bytes out. Comments, order and layout of what is not changed stay as they are; what is added looks
-as a person would have written it: one element a line, indented like its neighbors, attributes in the schema's order.
+as a person would have written it: one element a line, indented like its neighbors, attributes in the declared order.
 
 Rules of this file:
 
-* What stands where is expat's to say, as for the reader: a node is numbered by the elements it found.
+* What stands where is the reader's to say: a node is one of the elements it found.
 * A change is made in text, then read again; one after which the text could not be read is refused.
 * Only what can be written down is refused here. Whether names and values fit is the reader's to say.
 """
@@ -13,41 +13,34 @@ Rules of this file:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from xml.parsers import expat
 
-from backbone.errors import Refusal
-from backbone.mission.document import MAX_BYTES, parse
-from backbone.mission.report import MissionInvalid, Report, told, told_names
-from backbone.mission.schema import vocabulary
+from backbone.mission.declaration.vocabulary import vocabulary
+from backbone.mission.document import MAX_BYTES, attribute_spans, parse
+from backbone.mission.outline import EditRefused, Node, Path, outline
+from backbone.mission.report import Report, told, told_names
 
-Path = tuple[int, ...]
-"""Where an element stands: its number among its parent's children, from 0, from the root down; the root's is empty."""
+__all__ = [
+    "EditRefused",
+    "NewElement",
+    "Node",
+    "Path",
+    "add",
+    "move",
+    "outline",
+    "place_for",
+    "remove",
+    "set_attribute",
+]
 
 LINE_LENGTH = 120  # chosen: as mission.xml; longer tags get a second line of attributes
 STEP = "  "  # the indentation of what has no neighbor to copy it from
 
-_ORDER = {
-    "behavior": ("parameter", "arc", "behavior"),
-    "world": ("parameter", "room", "air", "furniture", "ramp", "landmark", "dark", "scout", "target"),
-}
-"""What a person writes first, where the schema allows any order and does not say it."""
-
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_TAG = re.compile(rb"""<(?:[^>"']|"[^"]*"|'[^']*')*>""")
-_ATTRIBUTE = re.compile(rb"""(\s+)([^\s=<>"'/]+)\s*=\s*("[^"]*"|'[^']*')""")
 _WHOLE = re.compile(rb"""<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<(?:[^>"']|"[^"]*"|'[^']*')*>""", re.DOTALL)
 _QUOTED = re.compile(rb"""("[^"]*"|'[^']*')""")
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _LINE_END_COMMENT = re.compile(rb"[ \t]*<!--(?:(?!-->)[^\n])*-->(?=[ \t]*(?:\r?\n|$))")
-
-
-class EditRefused(Refusal):
-    """A change of a mission file that cannot be made; the text is as it was."""
-
-    code = "mission.edit"
-    remedy = "Look at the tree: what may stand where is told in docs/reference/mission-file.md."
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,85 +58,6 @@ class NewElement:
     children: Sequence[NewElement] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
-    """An element of the text, as it is written: nothing is filled in.
-
-    Attributes:
-        path: Where it stands.
-        tag: Its tag.
-        attributes: Its attributes in the order of the text.
-        children: Elements in it.
-        line: Line of its tag, from 1.
-        begin: First byte of its tag.
-        content: First byte behind its tag.
-        close: First byte of its end tag; the same as ``content`` if it has none.
-        end: First byte behind it.
-        is_empty: Whether it is written ``<tag/>``.
-    """
-
-    path: Path
-    tag: str
-    attributes: dict[str, str]
-    children: tuple[Node, ...]
-    line: int
-    begin: int
-    content: int
-    close: int
-    end: int
-    is_empty: bool
-
-    def __iter__(self) -> Iterator[Node]:
-        """Yield this element and all below it, in the order of the text."""
-        yield self
-        for child in self.children:
-            yield from child
-
-    def at(self, path: Path) -> Node:
-        """Return the element at a path.
-
-        Raises:
-            EditRefused: There is none.
-        """
-        node = self
-        for number in path:
-            if not 0 <= number < len(node.children):
-                raise EditRefused(f"no element stands at {'/'.join(map(str, path))}", remedy="Pick another.")
-            node = node.children[number]
-        return node
-
-    def nearest(self, path: Path) -> Path:
-        """Return the path as far down as elements stand there."""
-        node, depth = self, 0
-        while depth < len(path) and path[depth] < len(node.children):
-            node, depth = node.children[path[depth]], depth + 1
-        return path[:depth]
-
-    def all(self, tag: str) -> list[Node]:
-        """Return the children of this tag."""
-        return [child for child in self.children if child.tag == tag]
-
-    def first(self, tag: str) -> Node | None:
-        """Return the first child of this tag, if there is one."""
-        return next((child for child in self.children if child.tag == tag), None)
-
-    def text(self, attribute: str) -> str:
-        """Return the value as it is written, empty if there is none."""
-        return self.attributes.get(attribute, "")
-
-
-def outline(data: bytes) -> Node:
-    """Return the root of a mission file's text.
-
-    Raises:
-        MissionInvalid: It is not well-formed XML, or is hostile; with the reader's faults.
-    """
-    report = Report("mission")
-    if parse(data, report) is None:
-        raise MissionInvalid(report.faults())
-    return _Outline(data).root()
-
-
 # ---------------------------------------------------------------------- changes
 def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> bytes:
     """Return the text with another value; its quotes stay, and a new attribute stands where the schema has it.
@@ -159,18 +73,17 @@ def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> byte
     """
     node = outline(data).at(path)
     _may_have(node.tag, name)
-    spans = _attributes(data, node)
+    spans = attribute_spans(data, node.begin, node.content)
     if value is None:
         if name not in spans:
             return data
-        begin, _value, end = spans[name]
-        return _readable(data[:begin] + data[end:])
+        return _readable(data[: spans[name].blanks] + data[spans[name].end :])
     if name in spans:
-        _begin, begin, end = spans[name]
+        begin = spans[name].quote
         quote = data[begin : begin + 1].decode()
-        return _readable(data[:begin] + _quoted(value, quote) + data[end:])
+        return _readable(data[:begin] + _quoted(value, quote) + data[spans[name].end :])
     order = list(vocabulary()[node.tag].attributes)
-    before = [end for other, (_b, _v, end) in spans.items() if other in order[: order.index(name)]]
+    before = [span.end for other, span in spans.items() if other in order[: order.index(name)]]
     head = node.begin + 1 + len(node.tag.encode())
     at = max(before, default=head)
     text = f"{name}=".encode() + _quoted(value)
@@ -213,7 +126,7 @@ def place_for(parent: Node, tag: str, at: int | None = None) -> int:
     """
     if at is not None:
         return min(max(at, 0), len(parent.children))
-    order = list(_ORDER.get(parent.tag, vocabulary()[parent.tag].children))
+    order = list(vocabulary()[parent.tag].children)
     same = [number for number, child in enumerate(parent.children) if child.tag == tag]
     if same:
         return same[-1] + 1
@@ -438,53 +351,3 @@ def _shifted(text: bytes, old: str, new: str) -> bytes:
 def _stands_apart(data: bytes, node: Node) -> bool:
     """Say whether there is an empty line between the children."""
     return bool(re.search(rb"\n[ \t]*\r?\n", data[node.content : node.close]))
-
-
-def _attributes(data: bytes, node: Node) -> dict[str, tuple[int, int, int]]:
-    """Return for each attribute where the blanks before it, its quotes and what follows it begin."""
-    begin = node.begin + 1 + len(node.tag.encode())
-    return {
-        match[2].decode(): (match.start(1), match.start(3), match.end())
-        for match in _ATTRIBUTE.finditer(data, begin, node.content)
-    }
-
-
-class _Outline:
-    """One run of expat over a text that is known to be well-formed and harmless."""
-
-    def __init__(self, data: bytes) -> None:
-        self._offset = len(_BYTE_ORDER_MARK) if data.startswith(_BYTE_ORDER_MARK) else 0
-        self._data = data
-        self._open: list[tuple[str, dict[str, str], int, int, int]] = []
-        self._children: list[list[Node]] = [[]]
-        self._parser = expat.ParserCreate("utf-8")
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
-
-    def root(self) -> Node:
-        self._parser.Parse(self._data[self._offset :], True)
-        return self._children[0][0]
-
-    def _start(self, tag: str, values: dict[str, str]) -> None:
-        begin = self._offset + self._parser.CurrentByteIndex
-        matched = _TAG.match(self._data, begin)
-        if matched is None:
-            raise AssertionError(f"expat found a tag at byte {begin}, where none begins")
-        self._open.append((tag, values, begin, matched.end(), self._parser.CurrentLineNumber))
-        self._children.append([])
-
-    def _end(self, tag: str) -> None:
-        _tag, values, begin, content, line = self._open.pop()
-        children = self._children.pop()
-        is_empty = self._data[content - 2 : content] == b"/>"
-        close = content if is_empty else self._offset + self._parser.CurrentByteIndex
-        end = content if is_empty else self._data.index(b">", close) + 1
-        number = len(self._children[-1])
-        path = ((*_numbers(self._children), number))[1:]
-        node = Node(path, tag, values, tuple(children), line, begin, content, close, end, is_empty)
-        self._children[-1].append(node)
-
-
-def _numbers(levels: list[list[Node]]) -> list[int]:
-    """Return the number each open element will have among its siblings."""
-    return [len(level) for level in levels[:-1]]

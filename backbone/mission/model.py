@@ -1,49 +1,20 @@
-"""What a checked mission file says. Immutable; made by ``reader.read_mission`` only."""
+"""What a checked mission file says, without a trace of how it was written. Immutable."""
 
 from __future__ import annotations
 
-import ipaddress
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+from backbone.mission.declaration.elements import ArcAttributes, BehaviorAttributes, Host
 
-HUB_PORT = 7447  # Zenoh's own
-
-
-def is_loopback(address: str) -> bool:
-    """Say whether this IP address or name means the machine itself."""
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return address == "localhost"
+__all__ = ["ArcWish", "Behavior", "Component", "CoreService", "Host", "MissionDescription"]
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
-
-
-class Host(_Part):
-    """A machine that may run components.
-
-    Attributes:
-        name: Name used elsewhere in the file.
-        address: IP address or name the hub is reached at; ``127.0.0.1`` for this machine.
-        tags: What it has (``gl``, ``serial``), for placement.
-        port: TCP port of the hub for other machines; of the first host only.
-    """
-
-    name: str
-    address: str
-    tags: tuple[str, ...] = ()
-    port: int = HUB_PORT
-
-    @property
-    def is_loopback(self) -> bool:
-        """True if the address means the machine 'up' is typed on, whatever machine that is."""
-        return is_loopback(self.address)
 
 
 class CoreService(_Part):
@@ -78,48 +49,30 @@ class Component(_Part):
     process: str = ""
 
 
-class ArcWish(_Part):
+class ArcWish(ArcAttributes):
     """The ARC a behavior needs.
 
     Attributes:
-        kind: Component type of the ARC.
         wish: Kind of RC → name.
         features: Kind of RC → features.
-        minimum_runtime_s: Shortest useful time, seconds.
-        maximum_runtime_s: End of extensions, 0: the minimum.
-        period_s: Interval between radio packets, seconds.
-        packet_time_s: Air time of one packet, seconds.
     """
 
-    kind: str
     wish: dict[str, str] = {}
     features: dict[str, tuple[str, ...]] = {}
-    minimum_runtime_s: float
-    maximum_runtime_s: float = 0.0
-    period_s: float
-    packet_time_s: float
 
 
-class Behavior(_Part):
+class Behavior(BehaviorAttributes):
     """A node of the behavior tree.
 
     Attributes:
-        type: Component type.
-        name: Name of the node and of its component.
-        priority: Among its siblings; larger is higher.
         parameters: Values for the class's parameters.
         arc: The ARC it needs, if any.
         children: Nodes its parent starts.
-        process: Name of the process it shares with others; empty: a process of its own.
     """
 
-    type: str
-    name: str
-    priority: int
     parameters: dict[str, Any] = {}
     arc: ArcWish | None = None
     children: tuple[Behavior, ...] = ()
-    process: str = ""
 
 
 class MissionDescription(_Part):

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lxml import etree
-
-from backbone.mission.document import Element
+from backbone.mission.document import Element, parse
 from backbone.mission.report import Report, told
 
 MAX_BYTES = 1024 * 1024  # chosen: as a mission file's; a room of ten thousand boxes fits
@@ -45,15 +43,19 @@ def room_text(mission_file: str, name: str) -> str:
         text = data.decode()
         if "<!DOCTYPE" in text:
             raise RoomInvalid("has a document type declaration", "Remove <!DOCTYPE …> from the room's file")
-        root = etree.fromstring(data, etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False))
-    except (UnicodeDecodeError, etree.XMLSyntaxError) as error:
-        raise RoomInvalid(f"is not well-formed XML: {error}", "Mend the room's file") from error
+    except UnicodeDecodeError as error:
+        raise RoomInvalid(f"is no UTF-8: {error}", "Save the room's file in UTF-8") from error
+    report = Report(name)
+    root = parse(data, report)
+    if root is None:
+        [fault] = report.faults()[:1]
+        raise RoomInvalid(f"cannot be read: {fault.message} in line {fault.line}", "Mend the room's file")
     if root.tag != "mujoco":
         raise RoomInvalid(f"begins with <{root.tag}>, so it is no MJCF", "The room's file must begin with <mujoco>")
-    for element in root.iter(etree.Element):
-        if element.tag == "include" or element.get("file"):
+    for element in root:
+        if element.tag == "include" or element.text("file"):
             raise RoomInvalid(
-                f"needs the file {told(str(element.get('file')))} in line {element.sourceline}",
+                f"needs the file {told(element.text('file'))} in line {element.place.line}",
                 "Write what is in that file into the room's file; only this one travels with the mission",
             )
     return text

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
 
 import msgspec
 
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import Element
 from backbone.mission.report import Report, told, told_names
 from backbone.naming import Subsystem, is_legal
@@ -15,6 +16,7 @@ CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "depen
 """In their order of start. Source: RAM 2002, "Backbone"."""
 
 SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
+SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
 WORLD = "world"  # the parameter that tells it, and the world's own
 NETWORK_ID = "network_id"  # the parameter by which the radio tells robots apart
 
@@ -31,6 +33,7 @@ class Tables:
         by_type: Type → all resources of it, in the order of the file.
         world: The simulated world, if there is one.
         behaviors: Every node of the behavior tree, parents before their children.
+        classes: Class path → what is known of the class.
     """
 
     root: Element
@@ -40,9 +43,10 @@ class Tables:
     by_type: dict[str, list[Element]]
     world: Element | None
     behaviors: list[Element]
+    classes: Mapping[str, ClassFacts] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, root: Element) -> Tables:
+    def of(cls, root: Element, classes: Mapping[str, ClassFacts] | None = None) -> Tables:
         """Return the tables of a mission."""
         behaviors = root.first("behaviors")
         return cls(
@@ -53,7 +57,13 @@ class Tables:
             _by_type(section(root, "resources")),
             root.first("world"),
             [] if behaviors is None else [element for element in behaviors if element.tag == "behavior"],
+            classes or {},
         )
+
+    def facts_of(self, kind: str) -> ClassFacts | None:
+        """Return what is known of the class of this type; None: nothing."""
+        found = self.classes.get(self.types[kind].text("class")) if kind in self.types else None
+        return None if found is None or found.failure else found
 
     def needs(self, kind: str) -> list[str]:
         """Return the kinds of resource an ARC of this kind needs; none if it is no ARC."""
@@ -72,7 +82,7 @@ class Tables:
         return (
             self.belongs_to(name, Subsystem.RESOURCE_POOL)
             and not self.needs(name)
-            and (self.world is None or name != self.world.text("type"))
+            and name != (SIMULATED_WORLD if self.world is None else self.world.text("type"))
         )
 
     def resource_types(self) -> list[str]:

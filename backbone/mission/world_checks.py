@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from itertools import pairwise
 
-from backbone.mission.class_paths import class_path_fault
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
+from backbone.mission.parameter_checks import check_class_parameters
 from backbone.mission.report import Report, told
 from backbone.mission.room_files import check_room_file
 from backbone.mission.tables import (
@@ -23,7 +23,6 @@ from backbone.mission.tables import (
 from backbone.naming import Subsystem, is_legal
 
 BODIES = ("furniture", "ramp", "landmark", "dark", "scout", "target")
-_CLASS_PATH = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")  # what else it may be, the schema refuses
 CARRIER = "carrier"  # the shape of a target that brings robots in
 NEAREST_SET_DOWN_M, FARTHEST_SET_DOWN_M = 0.45, 1.2  # as scout_model.dimensions has them; a test compares
 CARRIER_PLACES = 6  # same
@@ -39,16 +38,11 @@ def check_world(tables: Tables, report: Report) -> None:
     _check_type(world, tables, report)
     check_host(world, tables, report)
     check_parameters(world, (WORLD,), report)
+    check_class_parameters(world, (WORLD,), tables, report)
     bodies = [child for child in world.children if child.tag in BODIES]
     check_unique(bodies, "name", "body", report)
     _check_robots(world, tables, report)
     _check_classes(world, report)
-    for again in world.all("air")[1:]:
-        report.fault(
-            again.place,
-            f"a second <air> in <world>; the first is in line {world.all('air')[0].place.line}",
-            "Join them.",
-        )
     room = world.first("room")
     if room is not None:
         check_room_file(room, report)
@@ -68,7 +62,7 @@ def check_world(tables: Tables, report: Report) -> None:
 
 def _check_type(world: Element, tables: Tables, report: Report) -> None:
     name = world.text("type")
-    if not tables.types or not is_known(world, "type", "component type", tables.types, report):
+    if not is_known(world, "type", "component type", tables.types, report):
         return
     if not tables.belongs_to(name, Subsystem.RESOURCE_POOL) or tables.needs(name):
         report.fault(
@@ -192,7 +186,7 @@ def _check_path(target: Element, report: Report) -> None:
 def _check_classes(world: Element, report: Report) -> None:
     for scout in world.all("scout"):
         class_path = scout.text("class")
-        wrong = class_path_fault(class_path) if _CLASS_PATH.fullmatch(class_path) else None
+        wrong = class_path_fault(class_path) if CLASS_PATH.fullmatch(class_path) else None
         if wrong is not None:
             message, there = wrong
             report.fault(

@@ -1,1 +1,1 @@
-"""Who holds which resource now and next, and why."""
+"""The RC manager: messages, loop, context switch and recovery around ``backbone.scheduling``."""

@@ -23,9 +23,7 @@ from typing import Any
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
 from backbone.naming import Subsystem
-from backbone.rc_manager.decisions import ConnectArc, RevokeArc
 from backbone.rc_manager.messages import (
-    LEASE_S,
     CloseGate,
     Connect,
     Connected,
@@ -34,8 +32,9 @@ from backbone.rc_manager.messages import (
     GateClosed,
     GateOpens,
     OpenGate,
-    RcUse,
 )
+from backbone.scheduling.events import ConnectArc, RevokeArc
+from backbone.scheduling.requests import LEASE_S, RcUse
 
 log = logging.getLogger(__name__)
 

@@ -10,23 +10,18 @@ Who speaks to whom:
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import Annotated
 
 from backbone.errors import Refusal
 from backbone.ranges import (
     FEW,
-    FEW_STREAMS,
     MANY,
-    Address,
     Count,
     Duration,
     Epoch,
     Instant,
     LeaseSeconds,
     Mention,
-    Name,
-    Period,
     Priority,
     Rank,
     RunTime,
@@ -34,11 +29,11 @@ from backbone.ranges import (
     Text,
     Values,
 )
+from backbone.scheduling.requests import Holder, Lease, PathNode, RcUse, SchedulingRequest
 from backbone.wire import Message
 
 ADDRESS = "backbone/rc_manager"
 
-LEASE_S = 2.0  # chosen: outlives a restart of the hub or RC manager (under 1 s), ends an orphan's hold soon
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
 EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
@@ -47,94 +42,6 @@ BEAT_MISSED_S = 1.0  # chosen: three beats
 
 
 # ---------------------------------------------------------------------- what an ARC asks for
-class Usage(Message, frozen=True):
-    """One periodic stream on a sharable RC (RAM 2002, "Sharable Resources": usage parameter).
-
-    Attributes:
-        period_s: Constant interval between requests.
-        packet_time_s: Time one request takes.
-        deadline_s: It must be done this long after its release; 0: the period.
-        jitter_s: Its release may be late by this much.
-        kind: What the requests are, for people (``drive``).
-    """
-
-    period_s: Period
-    packet_time_s: Period
-    deadline_s: Duration = 0.0
-    jitter_s: Period = 0.0
-    kind: Mention = ""
-
-
-class RcUse(Message, frozen=True):
-    """How an ARC uses one RC: exclusively, or by streams on a sharable one.
-
-    Attributes:
-        streams: Its streams; none means exclusive.
-    """
-
-    streams: Annotated[list[Usage], FEW_STREAMS] = []
-
-
-class PathNode(Message, frozen=True):
-    """One node on the way from the root to a decision process."""
-
-    name: Name
-    priority: Priority
-
-
-class SchedulingRequest(Message, frozen=True):
-    """Give my ARC run time (RAM 2002, "The RC Scheduler").
-
-    Attributes:
-        arc: Name of the ARC.
-        owner: Address of its decision process.
-        path: From the mission's root (or the console itself) to the decision process.
-        console: True if the owner is a console: its path is a sibling of the mission's root.
-        alternatives: Sets of RCs that would do, best first: RC name → use.
-        minimum_runtime_s: Shortest useful time, above 0.
-        maximum_runtime_s: End of all extensions, at least the minimum; 0: the minimum.
-        idle: True: it exists but wants no time now.
-        stops_at_once: True: the decision process commands nothing that must be brought to rest, so the end of
-            its slice need not wait for it.
-    """
-
-    arc: Name
-    owner: Address
-    path: Annotated[list[PathNode], FEW]
-    console: bool
-    alternatives: Annotated[list[Annotated[dict[Mention, RcUse], FEW]], MANY]
-    minimum_runtime_s: RunTime
-    maximum_runtime_s: RunTime = 0.0
-    idle: bool = False
-    stops_at_once: bool = False
-
-
-class RequestState(StrEnum):
-    """Where a request is."""
-
-    IDLE = "idle"
-    WAITING = "waiting"
-    CONNECTING = "connecting"
-    RUNNING = "running"
-    REVOKING = "revoking"
-
-
-class Scheduled(Message, frozen=True):
-    """Answer to ``SchedulingRequest``.
-
-    Attributes:
-        rcs: The RCs chosen of the alternatives.
-        state: Running soon (connecting) or waiting.
-        position: Place among the waiting of its group, 1 is next; 0 if it need not wait.
-        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
-        expected_start_s: Mission time of the predicted grant; negative: none can be predicted.
-    """
-
-    rcs: Annotated[list[Mention], FEW]
-    state: RequestState
-    position: Count
-    blockers: Annotated[list[Mention], MANY]
-    expected_start_s: Instant
 
 
 class Withdraw(Message, frozen=True):
@@ -304,15 +211,6 @@ class AskRc(Message, frozen=True):
     """Who holds you?"""
 
 
-class Holder(Message, frozen=True):
-    """One ARC an RC serves."""
-
-    arc: Mention
-    epoch: Epoch
-    since_s: Instant
-    lease_until_s: Instant
-
-
 class RcState(Message, frozen=True):
     """Answer to ``AskRc``: the truth about this resource.
 
@@ -339,23 +237,6 @@ class RcState(Message, frozen=True):
     feedback: Text = ""
 
 
-class Lease(Message, frozen=True):
-    """One renewed hold.
-
-    Attributes:
-        rc: The RC.
-        arc: Who holds it.
-        epoch: Of the connection.
-        rank: Place by user priority among those who hold a sharable RC now, 0 first; negative: as it was. It changes
-            when others come and go, and with every change of priority.
-    """
-
-    rc: Mention
-    arc: Mention
-    epoch: Epoch
-    rank: Rank = -1
-
-
 class Leases(Message, frozen=True):
     """Published by the RC manager every ``RENEW_EVERY_S``: these holds last another ``lease_s`` from the stamp.
 
@@ -378,107 +259,10 @@ class AskSchedule(Message, frozen=True):
     """Who holds what, who waits?"""
 
 
-class RcView(Message, frozen=True):
-    """One RC in the master schedule.
-
-    Attributes:
-        rc: Its name.
-        kind: Its type.
-        state: ``up`` or ``down``.
-        sharable: True if several ARCs may hold it.
-        capacity: Share of its time it can give.
-        holders: Who holds it, with epoch and since when.
-        last_epoch: Largest epoch given so far.
-        next: ARCs that get it, in the order of their predicted starts.
-        until_s: Mission time at which the slice of each holder ends; negative: it is being disconnected.
-        next_s: Mission times of their predicted starts, for each of ``next``.
-    """
-
-    rc: Mention
-    kind: Mention
-    state: Mention
-    sharable: bool
-    capacity: Share
-    holders: Annotated[list[Holder], MANY]
-    last_epoch: Epoch
-    next: Annotated[list[Mention], MANY]
-    until_s: Annotated[list[Instant], MANY] = []
-    next_s: Annotated[list[Instant], MANY] = []
-
-
-class RequestView(Message, frozen=True):
-    """One request in the master schedule.
-
-    Attributes:
-        arc: The ARC.
-        owner: Its decision process.
-        state: Where it is.
-        rcs: Its RCs.
-        since_s: Mission time at which it entered that state.
-        until_s: End of its slice; negative if it holds nothing.
-        expected_start_s: Predicted grant; negative if it runs or none can be predicted.
-        because: One line: why it runs or waits.
-        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
-        minimum_runtime_s: As asked for.
-        priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
-        turns: Grants so far.
-        rule: Rule of SCHEDULING.md that decides it.
-        would_change: What would end this, for people.
-        raised: Levels by which it rose because it waits long.
-    """
-
-    arc: Mention
-    owner: Mention
-    state: RequestState
-    rcs: Annotated[list[Mention], FEW]
-    since_s: Instant
-    until_s: Instant
-    expected_start_s: Instant
-    because: Text
-    blockers: Annotated[list[Mention], MANY]
-    minimum_runtime_s: RunTime
-    priority: Text
-    turns: Count
-    rule: Mention = ""
-    would_change: Text = ""
-    raised: Count = 0
-
-
-class Schedule(Message, frozen=True):
-    """Answer to ``AskSchedule``; also published on every change."""
-
-    at_s: Instant
-    rcs: Annotated[list[RcView], MANY]
-    requests: Annotated[list[RequestView], MANY]
-    groups: Annotated[list[Annotated[list[Mention], MANY]], MANY]
-
-
 class AskWhy(Message, frozen=True):
     """Why does this ARC, decision process or RC wait, run or stand idle?"""
 
     name: Mention
-
-
-class Why(Message, frozen=True):
-    """Answer to ``AskWhy``.
-
-    Attributes:
-        name: What was asked about.
-        state: Where it is.
-        lines: The reasons for people, most important first.
-        rule: Rule of SCHEDULING.md that decides it.
-        blockers: ARCs because of which; of a waiting one: without them it starts as soon as its RCs are up and free.
-        expected_start_s: Predicted grant; negative if none.
-        would_change: What would end the wait, for people.
-    """
-
-    name: Mention
-    state: Mention
-    lines: Annotated[list[Text], MANY]
-    rule: Mention
-    blockers: Annotated[list[Mention], MANY]
-    expected_start_s: Instant
-    would_change: Text
 
 
 class AskAttributes(Message, frozen=True):
@@ -487,84 +271,10 @@ class AskAttributes(Message, frozen=True):
     name: Mention
 
 
-class RequestAttributes(Message, frozen=True):
-    """What one ARC asks for, as it counts now.
-
-    Attributes:
-        arc: The ARC.
-        owner: Address of its decision process.
-        state: Where the request is.
-        uses: RC → how it is used.
-        minimum_runtime_s: Shortest slice.
-        maximum_runtime_s: End of all extensions.
-        path: Names and priorities from the mission's root to the decision process, or of the console alone.
-        console: True if the owner is a console.
-        stops_at_once: True if the end of a slice need not wait for the decision process.
-    """
-
-    arc: Mention
-    owner: Mention
-    state: RequestState
-    uses: Annotated[dict[Mention, RcUse], FEW]
-    minimum_runtime_s: RunTime
-    maximum_runtime_s: RunTime
-    path: Annotated[list[PathNode], FEW]
-    console: bool
-    stops_at_once: bool
-
-
-class Attributes(Message, frozen=True):
-    """Answer to ``AskAttributes``: at least one request."""
-
-    requests: Annotated[list[RequestAttributes], MANY]
-
-
 class TraceLine(Message, frozen=True):
     """Published as an event: one decision, in the trace format of the schedule."""
 
     line: Values
-
-
-class SchedulingRefusal(Refusal):
-    """The request cannot be scheduled, ever; nothing changed."""
-
-    code = "scheduling.refused"
-    remedy = "Change the request."
-
-
-class MissingRuntime(SchedulingRefusal):
-    """The request lacks a usable minimum run time."""
-
-    code = "scheduling.minimum_runtime"
-    remedy = "Give minimum_runtime_s of 1 ms to a day, and maximum_runtime_s of 0 or at least the minimum."
-
-
-class UnknownRc(SchedulingRefusal):
-    """The request names an RC that is not in the mission."""
-
-    code = "scheduling.unknown_rc"
-    remedy = "Use the names of 'scout-backbone status'."
-
-
-class CapacityExceeded(SchedulingRefusal):
-    """The demand does not fit the RC even alone; facts: ``demanded``, ``used``, ``free``."""
-
-    code = "scheduling.capacity"
-    remedy = "Ask for a longer period or fewer streams."
-
-
-class UnknownRequest(SchedulingRefusal):
-    """The RC manager knows no request, node or RC of this name."""
-
-    code = "scheduling.unknown"
-    remedy = "See 'scout-backbone status' for the names that are there."
-
-
-class NotMovable(SchedulingRefusal):
-    """The node cannot stand below that parent; nothing changed."""
-
-    code = "scheduling.not_movable"
-    remedy = "Name a node and a parent by the names of the priority paths that 'scout-backbone status' shows."
 
 
 class FixedRules(Refusal):

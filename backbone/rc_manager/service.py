@@ -33,7 +33,33 @@ from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
 from backbone.rc_manager.credibility import contradiction
-from backbone.rc_manager.decisions import (
+from backbone.rc_manager.messages import (
+    BEAT_MISSED_S,
+    RENEW_EVERY_S,
+    AskAttributes,
+    AskRc,
+    AskRequest,
+    AskSchedule,
+    AskWhy,
+    Beat,
+    ChangeRuntime,
+    CurrentRequest,
+    Done,
+    Extend,
+    FixedRules,
+    Leases,
+    MoveNode,
+    RcManagerQuestion,
+    RcState,
+    SetIdle,
+    SetPriority,
+    TakePath,
+    TraceLine,
+    Withdraw,
+)
+from backbone.rc_manager.recovery import Found, Recovery
+from backbone.rc_manager.trace_file import TraceFile
+from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
     ConnectArc,
@@ -59,41 +85,9 @@ from backbone.rc_manager.decisions import (
     Wanted,
     Woken,
 )
-from backbone.rc_manager.messages import (
-    BEAT_MISSED_S,
-    LEASE_S,
-    RENEW_EVERY_S,
-    AskAttributes,
-    AskRc,
-    AskRequest,
-    AskSchedule,
-    AskWhy,
-    Beat,
-    ChangeRuntime,
-    CurrentRequest,
-    Done,
-    Extend,
-    FixedRules,
-    Lease,
-    Leases,
-    MoveNode,
-    PathNode,
-    RcManagerQuestion,
-    RcState,
-    RcUse,
-    Scheduled,
-    SchedulingRequest,
-    SetIdle,
-    SetPriority,
-    TakePath,
-    TraceLine,
-    UnknownRequest,
-    Withdraw,
-)
-from backbone.rc_manager.roll_call import Found, RollCall
-from backbone.rc_manager.rules import SchedulingRules
-from backbone.rc_manager.schedule_manager import ScheduleManager
-from backbone.rc_manager.trace_file import TraceFile
+from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.schedule_manager import ScheduleManager
 from backbone.wire import Envelope, MalformedMessage, Message
 
 log = logging.getLogger(__name__)
@@ -149,7 +143,7 @@ class RcManager(Component[RcManagerParameters]):
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
-        self._roll_call = RollCall(bus, clock)
+        self._recovery = Recovery(bus, clock)
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
         self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
@@ -162,9 +156,9 @@ class RcManager(Component[RcManagerParameters]):
             self._trace_stopped()
         for record in self.manager.opening_lines():
             self._record(record)
-        found = await self._roll_call.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
+        found = await self._recovery.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
         self._resources = {resource.name: resource for resource in found.resources}
-        self._found = self._believed(await self._roll_call.find(self._resources))
+        self._found = self._believed(await self._recovery.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
     async def serve(self) -> None:
@@ -509,7 +503,7 @@ class RcManager(Component[RcManagerParameters]):
         """Ask a failed RC how it is; not at once, or it and the schedule would try each other without end."""
         try:
             await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
-            while not await self._meet_rc(rc) and rc in await self._roll_call.present():
+            while not await self._meet_rc(rc) and rc in await self._recovery.present():
                 await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
         finally:
             self._failing_rcs.discard(rc)
@@ -561,7 +555,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
-        names = await self._roll_call.present()
+        names = await self._recovery.present()
         for name in [*sorted(self._running_rcs), *self._uses]:
             if name not in names:
                 self._disappeared(name)
@@ -623,7 +617,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _meet_arc(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
-        current = (await self._roll_call.ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
+        current = (await self._recovery.ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._uses or self._requesting[arc]:
             return
         if current.rcs:

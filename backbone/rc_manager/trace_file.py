@@ -11,7 +11,7 @@ import json
 import os
 
 from backbone.atomic_file import write_all
-from backbone.rc_manager.trace import Line
+from backbone.scheduling.trace import Line
 
 
 class TraceFile:

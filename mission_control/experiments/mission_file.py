@@ -28,33 +28,6 @@ WORLD = "world"
 FOR_EVER_S = 3600.0  # chosen: longer than any trial; the target passes once
 PERIOD_S, PACKET_TIME_S = 0.1, 0.002  # mission.xml: ten packets a second of two milliseconds
 
-_TYPES = {
-    "nameserver": ("backbone.nameserver.service:Nameserver", "backbone", ()),
-    "component_database": ("backbone.component_database.service:ComponentDatabase", "backbone", ()),
-    "placer": ("backbone.placer.service:Placer", "backbone", ()),
-    "creator": ("backbone.creator.service:Creator", "backbone", ()),
-    "dependency_database": ("backbone.dependency_database.service:DependencyDatabase", "backbone", ()),
-    "rc_manager": ("backbone.rc_manager.service:RcManager", "backbone", ()),
-    "scout": ("resource_pool.rcs.scout:Scout", "resource_pool", ()),
-    "command_radio": ("resource_pool.rcs.command_radio:CommandRadio", "resource_pool", ()),
-    "video_frequency": ("resource_pool.rcs.video_frequency:VideoFrequency", "resource_pool", ()),
-    "framegrabber": ("resource_pool.rcs.framegrabber:Framegrabber", "resource_pool", ()),
-    "video_drive": (
-        "resource_pool.arcs.video_drive:VideoDriveArc",
-        "resource_pool",
-        ("scout", "command_radio", "video_frequency"),
-    ),
-    "capture": (
-        "resource_pool.arcs.capture:CaptureArc",
-        "resource_pool",
-        ("scout", "command_radio", "video_frequency", "framegrabber"),
-    ),
-    "simulated_world": ("resource_pool.simulated_world:SimulatedWorld", "resource_pool", ()),
-    "watch_for_motion": ("mission_control.behaviors.watch_for_motion:WatchForMotion", "mission_control", ()),
-}
-_CORE = ("nameserver", "component_database", "placer", "creator", "dependency_database", "rc_manager")
-_USES = {"scout": "command_radio", "framegrabber": "video_frequency"}
-
 
 def watcher_of(robot: str) -> str:
     """Return the name of the behavior that watches through this Scout."""
@@ -96,18 +69,8 @@ def _lines(condition: Condition) -> Iterator[str]:
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield f"<!-- {condition.title()}, policy {condition.policy}. -->"
     yield f'<mission name="surveillance" priority="{MISSION_PRIORITY}">'
-    yield '  <hosts><host name="base" address="127.0.0.1"/></hosts>'
-    yield "  <core>"
-    for service in _CORE:
-        if service == "rc_manager" and condition.policy == "adaptive":
-            yield '    <service type="rc_manager" host="base"><parameter name="discipline" value="time"/></service>'
-        else:
-            yield f'    <service type="{service}" host="base"/>'
-    yield "  </core>"
-    yield "  <types>"
-    for name, (class_path, subsystem, needs) in _TYPES.items():
-        yield from _type(name, class_path, subsystem, needs)
-    yield "  </types>"
+    if condition.policy == "adaptive":
+        yield '  <core><service type="rc_manager"><parameter name="discipline" value="time"/></service></core>'
     yield "  <resources>"
     yield from _resources(condition)
     yield "  </resources>"
@@ -117,21 +80,6 @@ def _lines(condition: Condition) -> Iterator[str]:
         yield from _watcher(condition, robot, shortest_view_s(condition.passage, place))
     yield "  </behaviors>"
     yield "</mission>"
-
-
-def _type(name: str, class_path: str, subsystem: str, needs: tuple[str, ...]) -> Iterator[str]:
-    attributes: dict[str, Any] = {"name": name, "class": class_path, "subsystem": subsystem}
-    if name in _CORE:
-        attributes |= {"core": "true", "multiplicity": "many" if name == "creator" else "one"}
-    if name in _USES:
-        attributes["uses"] = _USES[name]
-    if needs:
-        attributes["restart"] = "false"
-    yield f"    {_tag('type', attributes, closed=not needs)}"
-    for needed in needs:
-        yield f'      <needs type="{needed}"/>'
-    if needs:
-        yield "    </type>"
 
 
 def _resources(condition: Condition) -> Iterator[str]:

@@ -42,30 +42,8 @@ LOOKED_AT_EVERY_S = 0.5  # chosen: when a trial is over is not measured finer
 COMES_TO_REST_S = 1.0  # chosen: a body that was stopped sways for less
 ROBOT, SERVO, WORLD = "scout1", "servo", "world"
 
-_CORE = {
-    "nameserver": "nameserver.service:Nameserver",
-    "component_database": "component_database.service:ComponentDatabase",
-    "placer": "placer.service:Placer",
-    "creator": "creator.service:Creator",
-    "dependency_database": "dependency_database.service:DependencyDatabase",
-    "rc_manager": "rc_manager.service:RcManager",
-}
-_REST = f"""
-    <type name="scout" class="resource_pool.rcs.scout:Scout" subsystem="resource_pool" uses="command_radio"/>
-    <type name="command_radio" class="resource_pool.rcs.command_radio:CommandRadio" subsystem="resource_pool"/>
-    <type name="video_frequency" class="resource_pool.rcs.video_frequency:VideoFrequency" subsystem="resource_pool"/>
-    <type name="framegrabber" class="resource_pool.rcs.framegrabber:Framegrabber" subsystem="resource_pool"
-          uses="video_frequency"/>
-    <type name="capture" class="resource_pool.arcs.capture:CaptureArc" subsystem="resource_pool" restart="false">
-      <needs type="scout"/>
-      <needs type="command_radio"/>
-      <needs type="video_frequency"/>
-      <needs type="framegrabber"/>
-    </type>
-    <type name="simulated_world" class="resource_pool.simulated_world:SimulatedWorld" subsystem="resource_pool"/>
-    <type name="servo_to_target" class="mission_control.behaviors.servo_to_target:ServoToTarget"
-          subsystem="mission_control"/>
-  </types>
+_MISSION = f"""<?xml version="1.0" encoding="UTF-8"?>
+<mission name="servoing" priority="10">
   <resources>
     <resource type="command_radio" name="radio" sharable="true" capacity="1.0" driver="simulated"/>
     <resource type="video_frequency" name="video1" connect-s="0.3" driver="simulated"/>
@@ -259,17 +237,7 @@ async def _pose(running: RunningMission) -> Pose:
 
 def mission_text() -> str:
     """Return the mission file of all trials, with the robot in the middle of the starts."""
-    services = "".join(f'    <service type="{service}" host="base"/>\n' for service in _CORE)
-    types = "".join(
-        f'    <type name="{name}" class="backbone.{where}" subsystem="backbone" core="true"'
-        f' multiplicity="{"many" if name == "creator" else "one"}"/>\n'
-        for name, where in _CORE.items()
-    )
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n<mission name="servoing" priority="10">\n'
-        '  <hosts><host name="base" address="127.0.0.1"/></hosts>\n'
-        f"  <core>\n{services}  </core>\n  <types>\n{types.rstrip()}{_REST}"
-    )
+    return _MISSION
 
 
 @lru_cache(maxsize=1)

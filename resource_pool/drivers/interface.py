@@ -197,3 +197,13 @@ def build_driver(kind: str, name: str, site: DriverSite) -> Any:
         raise UnknownDriver(f"{site.resource}: {path}: {error}") from error
     site.options(getattr(driver_class, "options_type", NoOptions))
     return driver_class(site)
+
+
+def options_of_drivers(kind: str) -> dict[str, type[msgspec.Struct]]:
+    """Return for each built-in driver of a kind the struct of its options; imports their modules."""
+    found: dict[str, type[msgspec.Struct]] = {}
+    for name, path in BUILT_IN.get(kind, {}).items():
+        module_name, _, class_name = path.partition(":")
+        driver_class = getattr(importlib.import_module(module_name), class_name)
+        found[name] = getattr(driver_class, "options_type", NoOptions)
+    return found

@@ -12,8 +12,8 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
-from backbone.rc_manager.decisions import Event, Record
 from backbone.rc_manager.service import RcManager
+from backbone.scheduling.events import Event, Record
 from resource_pool.aggregate_resource_controller import AggregateResourceController
 from resource_pool.arcs.capture import CaptureArc
 from resource_pool.arcs.drive import DriveArc

@@ -23,14 +23,11 @@ from backbone.rc_manager.messages import (
     Extend,
     Leases,
     OpenGate,
-    PathNode,
     RcState,
-    RcUse,
-    SchedulingRequest,
     SetPriority,
     TakePath,
-    Usage,
 )
+from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
 from backbone.wire import Envelope, Message, Reader, write
 from resource_pool.simulation.audit import Audit
 from resource_pool.simulation.supervised_shape import SupervisedShape

@@ -29,8 +29,8 @@ import math
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field
 
-from backbone.rc_manager.messages import LEASE_S
-from backbone.rc_manager.priority import higher
+from backbone.scheduling.priority import higher
+from backbone.scheduling.requests import LEASE_S
 from resource_pool.simulation.audit import Happening
 from resource_pool.simulation.faults import LONGEST_DELAY_S, LONGEST_HANG_S
 from resource_pool.simulation.shape import MissionShape

@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 from backbone.dependency_database.messages import Resource
-from backbone.rc_manager.messages import Usage
+from backbone.scheduling.requests import Usage
 
 MISSION = "simulated"
 MOST_OWNERS = 8

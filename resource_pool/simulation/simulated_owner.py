@@ -19,7 +19,7 @@ from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.rc_manager.messages import PathNode
+from backbone.scheduling.requests import PathNode
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import (
     ArcClient,

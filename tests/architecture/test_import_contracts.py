@@ -28,6 +28,7 @@ PLANTED = [
     ("one-door", "mission_control/planted.py", "import scout_model.description"),
     ("core-services", "backbone/placer/planted.py", "from backbone.nameserver import service"),
     ("core-services", "backbone/rc_manager/planted.py", "import backbone.creator"),
+    ("scheduling", "backbone/scheduling/planted.py", "import backbone.rc_manager.service"),
     ("zenoh", "backbone/bus/planted.py", "import zenoh"),
     ("zenoh", "resource_pool/planted.py", "from zenoh.handlers import Callback"),
     ("mujoco", "resource_pool/planted.py", "import mujoco"),

@@ -16,7 +16,8 @@ from backbone.component.messages import ComponentState, LifeState
 from backbone.errors import HubUnreachable
 from backbone.mission_picture import MissionPicture
 from backbone.moments import NoMoment
-from backbone.rc_manager.messages import RcView, RequestState, RequestView, Schedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from ui_console.cli import app as console_app
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from backbone.bring_up import CORE_POLICY
-from backbone.rc_manager.messages import LEASE_S, RENEW_EVERY_S
+from backbone.rc_manager.messages import RENEW_EVERY_S
+from backbone.scheduling.requests import LEASE_S
 
 START_S = 0.6  # from a SIGKILL until a new RC manager is ready, on a busy machine, pause not counted
 

@@ -21,7 +21,7 @@ from backbone.dry_run_screen import bars, screen
 from backbone.mission.model import ArcWish, Behavior, CoreService, Host, MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import RcUse, Usage
+from backbone.scheduling.requests import RcUse, Usage
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 
@@ -234,7 +234,9 @@ def test_wrong_options_are_wrong_usage(check: Callable[..., Any], words: tuple[s
 def test_a_mission_that_cannot_come_up_exits_with_3(tmp_path: Path) -> None:
     text = MISSION_XML.read_text()
     file = tmp_path / "mission.xml"
-    heavy = text.replace('name="watch_for_motion" class', 'name="watch_for_motion" tags="gpu" class')
+    watch = "mission_control.behaviors.watch_for_motion:WatchForMotion"
+    own = f'<type name="watch_for_motion" class="{watch}" subsystem="mission_control" tags="gpu"/>'
+    heavy = text.replace("  <resources>", f"  <types>{own}</types>\n  <resources>")
     assert heavy != text
     file.write_text(heavy)
     assert CliRunner().invoke(app, ["check", str(file), "--dry-run"]).exit_code == 3

@@ -21,7 +21,8 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
 from backbone.wire import Message
 
 CREATOR = "backbone/creator-base"

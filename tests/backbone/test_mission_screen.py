@@ -10,7 +10,8 @@ from rich.console import Console
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.mission_picture import MissionPicture
 from backbone.mission_screen import live_screen, screen
-from backbone.rc_manager.messages import Holder, RcView, RequestState, RequestView, Schedule
+from backbone.scheduling.requests import Holder, RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 
 RUNNING = RequestView(
     "watch1-capture", "mission_control/watch1", RequestState.RUNNING, ["scout1"], 3.0, 8.0, -1.0, "", [], 5.0, "m:1", 1

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import ComponentState, LifeState
 from backbone.people import CONSOLES_KEPT, People, screens_of
-from backbone.rc_manager.messages import RequestState, RequestView, Schedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RequestView, Schedule
 
 NAMES = st.from_regex(r"[a-z][a-z0-9_-]{0,12}", fullmatch=True)
 

@@ -24,7 +24,8 @@ import zenoh
 from backbone.component.messages import SetParameter, Stop
 from backbone.creator.messages import Spawn
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
 from backbone.wire import WIRE_VERSION, Envelope, Message, Reader, Refused, write
 from resource_pool.messages import AskStop, CommandScout, Drive, LiftStop, StopState
 

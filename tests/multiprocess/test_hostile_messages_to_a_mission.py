@@ -18,7 +18,8 @@ from running_mission import RunningMission, mission_up
 
 from backbone.bus.zenoh_bus import client_config
 from backbone.keys import Conversation, key
-from backbone.rc_manager.messages import Connect, Disconnect, RcUse
+from backbone.rc_manager.messages import Connect, Disconnect
+from backbone.scheduling.requests import RcUse
 from backbone.wire import WIRE_VERSION, MalformedMessage, OversizedMessage, Reader, Refused, schema_of
 from resource_pool.messages import ImpossibleUse
 

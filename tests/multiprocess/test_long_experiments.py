@@ -40,7 +40,9 @@ from backbone.naming import Subsystem
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, Start, Started, StopComponent
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskRc, AskSchedule, AskWhy, Holder, RcState, RequestState, Schedule, Why
+from backbone.rc_manager.messages import AskRc, AskSchedule, AskWhy, RcState
+from backbone.scheduling.requests import Holder, RequestState
+from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope
 from resource_pool.messages import RadioPacket
 from scout_model import radio_link

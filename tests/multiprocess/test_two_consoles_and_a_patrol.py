@@ -36,14 +36,12 @@ PATROLS = """<behavior type="patrol" name="patrol" priority="5">
       <parameter name="waypoints" value="4,1.4 4.4,1.4 4.4,1.8 4,1.8"/>
       <parameter name="localizer" value="world"/>
     </behavior>"""
-TYPE = '<type name="surveillance"'
-PATROL_TYPE = f'<type name="patrol" class="mission_control.behaviors.patrol:Patrol" subsystem="mission_control"/>{TYPE}'
 
 
 @pytest.fixture(scope="module")
 def mission() -> Iterator[RunningMission]:
     assert TREE is not None
-    with mission_up(change={TREE.group(): PATROLS, TYPE: PATROL_TYPE}) as running:
+    with mission_up(change={TREE.group(): PATROLS}) as running:
         yield running
 
 

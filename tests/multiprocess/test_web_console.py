@@ -10,22 +10,22 @@ import os
 import re
 import socket
 import stat
-import subprocess
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import pytest
 import web_browser
-from running_mission import BIN, MISSION_XML, RunningMission, mission_up
+from running_mission import MISSION_XML, mission_up
+from served_page import Served, serving
 from web_browser import Cable, Finger, assert_no_sideways_scroll
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
 from backbone.bus.interface import Bus
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
 from resource_pool.messages import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
@@ -36,46 +36,6 @@ WORLD = "resource_pool/world"
 SECOND_WATCHER = re.search(
     r'<behavior type="watch_for_motion" name="watch-scout2".*?</behavior>', MISSION_XML.read_text(), re.DOTALL
 )
-
-
-@dataclass
-class Served:
-    """A mission with its web console.
-
-    Attributes:
-        mission: The mission.
-        port: Where the page is served.
-        token: What opens it.
-        process: The server's.
-    """
-
-    mission: RunningMission
-    port: int
-    token: str
-    process: subprocess.Popen[str]
-
-
-@contextlib.contextmanager
-def serving(mission: RunningMission, port: int = 0) -> Iterator[Served]:
-    """Serve the mission's console until the block ends."""
-    process = subprocess.Popen(
-        [str(BIN / "scout-console"), "serve", "--port", str(port), "--mission", mission.name],
-        env=mission.environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", process.stdout.readline())
-        assert found is not None
-        yield Served(mission, int(found[1]), found[2], process)
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.wait(10)
-        assert process.stdout is not None
-        process.stdout.close()
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +104,8 @@ class Program:
     async def drive(self) -> None:
         with contextlib.suppress(ConnectionClosed):
             while True:
-                await self.say(do="drive", forward=0, right=1, speed_rad_s=6)
+                moment = self.view["own"]["moment"]
+                await self.say(do="drive", moment=moment, forward=0, right=1, speed_rad_s=6)
                 await asyncio.sleep(0.05)
 
     async def wait(self, is_so: Callable[[], Any], what: str, within_s: float = WITHIN_S) -> None:

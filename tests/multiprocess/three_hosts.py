@@ -205,10 +205,6 @@ def mission_text(hosts: dict[str, NetworkHost]) -> str:
     assert base in text
     others = "".join(f'\n    <host name="{n}" address="{hosts[n].address}" tags="outdoors"/>' for n in ("near", "far"))
     text = text.replace(base, base.replace("127.0.0.1", hosts["base"].address) + others)
-    creator = '<service type="creator" host="base"/>'
-    text = text.replace(
-        creator, creator + "".join(f'\n    <service type="creator" host="{n}"/>' for n in ("near", "far"))
-    )
     for robot, host in (("scout1", "near"), ("scout2", "far")):
         own = f'name="{robot}" features="camera" driver="simulated" process="hardware"'
         assert own in text

@@ -19,8 +19,8 @@ from backbone.dependency_database.messages import Resource
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import PathNode
 from backbone.rc_manager.service import RcManager
+from backbone.scheduling.requests import PathNode
 from backbone.wire import Envelope, Message
 from resource_pool.aggregate_resource_controller import AggregateResourceController
 from resource_pool.arc_client import ArcClient, claim_parameters

@@ -15,7 +15,8 @@ from pool_on_local_network import Pool, a_pool
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import Connect, Connected, RcUse
+from backbone.rc_manager.messages import Connect, Connected
+from backbone.scheduling.requests import RcUse
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import SimulatedRadio
 from resource_pool.drivers.simulated_video import SimulatedFramegrabber

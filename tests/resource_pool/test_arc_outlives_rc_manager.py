@@ -11,16 +11,8 @@ from backbone.bus.clock import run_virtual
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import (
-    LEASE_S,
-    AskRequest,
-    CurrentRequest,
-    GateOpens,
-    Lease,
-    Leases,
-    MissingRuntime,
-    OpenGate,
-)
+from backbone.rc_manager.messages import AskRequest, CurrentRequest, GateOpens, Leases, OpenGate
+from backbone.scheduling.requests import LEASE_S, Lease, MissingRuntime
 from resource_pool.arc_client import ArcClient
 from resource_pool.messages import COMMAND_TIMEOUT_S, Resumed, Suspended, SwappedOut
 

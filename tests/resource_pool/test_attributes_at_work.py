@@ -16,13 +16,8 @@ from backbone.component.component import WrongParameter
 from backbone.keys import Conversation
 from backbone.nameserver.messages import UnknownName
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import (
-    FixedRules,
-    MissingRuntime,
-    NotMovable,
-    PathNode,
-    TraceLine,
-)
+from backbone.rc_manager.messages import FixedRules, TraceLine
+from backbone.scheduling.requests import MissingRuntime, NotMovable, PathNode
 from resource_pool.messages import NeedsRestart
 
 ROBOTS = ["scout1", "scout2", "radio"]

@@ -20,7 +20,8 @@ from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from backbone.ranges import LONGEST_LEASE_S
-from backbone.rc_manager.messages import Connect, Connected, RcUse, Usage
+from backbone.rc_manager.messages import Connect, Connected
+from backbone.scheduling.requests import RcUse, Usage
 from resource_pool.arc_client import (
     EmergencyStopped,
     StopState,

@@ -10,7 +10,8 @@ from pool_on_local_network import a_pool
 from backbone.bus.clock import run_virtual
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import Connect, Connected, RcUse
+from backbone.rc_manager.messages import Connect, Connected
+from backbone.scheduling.requests import RcUse
 from resource_pool.messages import Applied, Frame, Tune
 
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from backbone.rc_manager.messages import Usage
-from backbone.rc_manager.radio_admission import admissible, stream, worst_response_us
+from backbone.scheduling.requests import Usage
+from backbone.scheduling.response_time import admissible, stream, worst_response_us
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 
 PERIODS_MS = st.sampled_from([10, 20, 25, 40, 50, 80, 100])

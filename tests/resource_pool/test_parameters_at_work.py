@@ -12,7 +12,8 @@ from backbone.component.component import WrongParameter
 from backbone.component.messages import AskParameters, Parameters, SetParameter
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import PathNode, RcState, Usage
+from backbone.rc_manager.messages import RcState
+from backbone.scheduling.requests import PathNode, Usage
 from resource_pool.arc_client import claim_parameters
 from resource_pool.drivers.interface import DriverSite, Picture, UnknownDriver
 from resource_pool.messages import NeedsRestart

@@ -9,16 +9,8 @@ from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import run_virtual
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import (
-    AskRc,
-    Connect,
-    Connected,
-    Disconnect,
-    Disconnected,
-    RcState,
-    RcUse,
-    most_epoch,
-)
+from backbone.rc_manager.messages import AskRc, Connect, Connected, Disconnect, Disconnected, RcState, most_epoch
+from backbone.scheduling.requests import RcUse
 from resource_pool.messages import ImpossibleUse
 
 GRABBER = address(Subsystem.RESOURCE_POOL, "grabber")

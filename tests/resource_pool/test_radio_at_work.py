@@ -13,17 +13,8 @@ from backbone.bus.clock import run_virtual
 from backbone.component.messages import AskStatistics, Statistics, StoryEvent
 from backbone.keys import Conversation
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import (
-    Connect,
-    Connected,
-    Disconnect,
-    Disconnected,
-    Lease,
-    Leases,
-    RcUse,
-    StaleEpoch,
-    Usage,
-)
+from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, Leases, StaleEpoch
+from backbone.scheduling.requests import Lease, RcUse, Usage
 from resource_pool.messages import LoadPacket, NoTurnSoon, PacketLoaded
 
 RADIO = "resource_pool/radio"

@@ -9,7 +9,8 @@ from pool_on_local_network import Pool, a_pool
 
 from backbone.bus.clock import run_virtual
 from backbone.component.component import WrongParameter
-from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, RcUse, StaleEpoch
+from backbone.rc_manager.messages import Connect, Connected, Disconnect, Disconnected, StaleEpoch
+from backbone.scheduling.requests import RcUse
 from resource_pool.drivers.interface import UnknownDriver
 from resource_pool.messages import Applied
 from resource_pool.rcs.scout import Scout

@@ -27,10 +27,9 @@ from backbone.rc_manager.messages import (
     GateOpens,
     OpenGate,
     RcState,
-    RcUse,
     StaleEpoch,
-    Usage,
 )
+from backbone.scheduling.requests import RcUse, Usage
 from backbone.wire import Envelope
 from resource_pool.messages import (
     Accepted,

@@ -22,9 +22,8 @@ from backbone.rc_manager.messages import (
     GateOpens,
     OpenGate,
     RcState,
-    RcUse,
-    Usage,
 )
+from backbone.scheduling.requests import RcUse, Usage
 from backbone.wire import Message
 from resource_pool.messages import Applied, CommandScout, Drive, LoadPacket, NotFromYou, PacketLoaded, Tune
 from scout_model.radio_link import encode_drive, encode_safe

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from backbone.dependency_database.messages import Resource
-from backbone.rc_manager.messages import Usage
+from backbone.scheduling.requests import Usage
 from resource_pool.simulation.audit import Happening
 from resource_pool.simulation.laws import Broken, first_broken, story_of
 from resource_pool.simulation.shape import MissionShape, OwnerShape, draw_shape

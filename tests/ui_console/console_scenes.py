@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.creator.messages import HostLoad
-from backbone.rc_manager.messages import Holder, Lease, Leases, RcView, RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.requests import Holder, Lease, RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from resource_pool.arc_client import StopState
 from ui_console.console_events import (
     Asked,

@@ -15,7 +15,9 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RequestView, Schedule
 from backbone.wire import Envelope, Message
 from ui_console.consent import CONSENT_WITHIN_S, AskConsent, Consent, NotAnOperator
 from ui_console.console_model import ConsoleModel

@@ -19,7 +19,9 @@ from backbone.mission_picture import LAUNCHER
 from backbone.naming import Subsystem
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Lease, Leases, Schedule
+from backbone.rc_manager.messages import AskSchedule, Leases
+from backbone.scheduling.requests import Lease
+from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch

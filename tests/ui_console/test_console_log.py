@@ -59,3 +59,14 @@ def test_the_table_is_searched_as_the_command_searches(asked: dict[str, Any], fo
 def test_a_row_says_how_much_it_matters_and_who_did_it() -> None:
     [row] = model(ActHeard(20.0, STOPPED, CONSOLE)).log()
     assert (row.level, row.person) == ("alarm", "ben")
+
+
+@given(st.lists(st.integers(0, 30), unique=True), st.lists(st.integers(0, 30), unique=True), st.integers(0, 40))
+def test_what_was_found_is_followed_by_what_was_heard_since_once_and_in_order(
+    found: list[int], heard: list[int], count: int
+) -> None:
+    shown = model(*[StoryHeard(70.0, event(float(at_s))) for at_s in heard])
+    rows = shown.team.log(count, AskLog(), [event(float(at_s)) for at_s in sorted(found)])
+    since = max(found, default=0)
+    wanted = sorted({*found, *(at_s for at_s in heard if at_s >= since)})
+    assert [row.at_s for row in rows] == (wanted[-count:] if count else [])

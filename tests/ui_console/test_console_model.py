@@ -26,7 +26,8 @@ from hypothesis import strategies as st
 from backbone.component.messages import LifeState, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.operators import OperatorActed, OperatorAction
-from backbone.rc_manager.messages import RequestState, Schedule, Why
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.console_events import (
     ActHeard,

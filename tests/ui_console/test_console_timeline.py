@@ -8,7 +8,8 @@ from console_scenes import SCHEDULE, rc, request
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backbone.rc_manager.messages import Holder, RequestState, Schedule
+from backbone.scheduling.requests import Holder, RequestState
+from backbone.scheduling.views import Schedule
 from ui_console.timeline import HISTORY_S, Timeline
 from ui_console.views import Certainty, SliceView
 

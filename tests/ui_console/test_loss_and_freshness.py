@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 from console_scenes import ASK, GRANT, SCHEDULE, STOP, held_model, model
+from screen_text import screen_text
+from written_session import WrittenSession
 
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.consent import Consent, Settled, Sought, Topic
@@ -15,9 +17,14 @@ from ui_console.console_events import (
     LetGoNeeded,
     LinkHeard,
     Lost,
+    MomentBegan,
     ScheduleHeard,
     StopHeard,
 )
+from ui_console.feed import LINK_FRESH_S
+from ui_console.profile import Profile
+from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.display import LINK_LOOK_S
 from ui_console.views import AlarmKind, LostView
 
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
@@ -55,6 +62,24 @@ def test_whose_turn_is_over_has_lost_nothing() -> None:
 
 
 # ---------------------------------------------------------------------- a link that is down
+WITHIN_S = 1.0
+DRAWN_S = 0.1  # of a busy machine's screen
+
+
+def test_what_is_not_heard_counts_as_old_early_enough_to_be_drawn_within_a_second() -> None:
+    assert LINK_FRESH_S + LINK_LOOK_S + DRAWN_S <= WITHIN_S
+
+
+@pytest.mark.parametrize("profile", list(Profile))
+async def test_a_screen_says_at_the_next_look_that_its_link_is_down(profile: Profile) -> None:
+    session = WrittenSession(shown=held_model())
+    async with ConsoleApp(session, profile=profile).run_test(size=(80, 24)) as pilot:
+        assert "NO LINK" not in screen_text(pilot.app)
+        session.model.apply(LinkHeard(12.0, False))
+        await pilot.pause(2 * LINK_LOOK_S)
+        assert "NO LINK" in screen_text(pilot.app)
+
+
 @pytest.mark.parametrize("word", [LinkHeard(12.5, False), None])
 def test_what_is_shown_is_never_older_than_a_second_without_saying_so(word: LinkHeard | None) -> None:
     """The link says that it is down, or says nothing any more."""
@@ -88,6 +113,15 @@ def test_what_has_to_be_let_go_is_said_only_while_a_robot_is_held() -> None:
     shown.apply(LetGoNeeded(13.0, True))
     shown.apply(GivenBack(14.0, "released", True))
     assert not shown.own(14.0).must_let_go
+
+
+def test_each_moment_has_a_number_of_its_own_that_no_later_grant_has_again() -> None:
+    shown = held_model()
+    seen = [shown.own(11.0).moment]
+    for event in (MomentBegan(12.0), GivenBack(13.0, "released", True), MomentBegan(14.0)):
+        shown.apply(event)
+        seen.append(shown.own(14.0).moment)
+    assert seen == [seen[0], seen[0] + 1, seen[0] + 1, seen[0] + 2]
 
 
 def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_takes() -> None:

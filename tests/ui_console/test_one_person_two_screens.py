@@ -17,7 +17,9 @@ from backbone.component.launch import Launch
 from backbone.component.messages import ComponentState
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, AskWhy, Holder, RequestState, Schedule, Why
+from backbone.rc_manager.messages import AskSchedule, AskWhy
+from backbone.scheduling.requests import Holder, RequestState
+from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope, Message
 from ui_console.console_events import ComponentsListed, Lost, ScheduleHeard
 from ui_console.console_model import ConsoleModel

@@ -17,6 +17,8 @@ from textual.widgets import Input
 from written_session import WrittenSession, settle
 
 from backbone.component.messages import StoryEvent
+from backbone.errors import Refusal
+from backbone.mission_log import AskLog, Log
 from ui_console.consent import Consent, Settled, Sought
 from ui_console.console_events import (
     Attention,
@@ -34,6 +36,7 @@ from ui_console.console_events import (
     StoryHeard,
 )
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.feed import LogAway
 from ui_console.profile import Profile
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
 from ui_console.terminal.keys import DRIVES
@@ -230,28 +233,54 @@ async def test_tab_goes_through_all_tables_and_back() -> None:
         assert screen.chosen is PanelName.LOG
 
 
-async def test_the_log_is_searched_by_words_and_by_fields() -> None:
-    story = [
-        StoryHeard(9.0, StoryEvent(9.0, "ui_console/console-1", f"anna tells {n}", "scout2", "")) for n in range(3)
-    ]
-    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, *story))
+async def test_the_log_of_the_whole_mission_is_searched_and_followed() -> None:
+    def event(at_s: float, what: str) -> StoryEvent:
+        return StoryEvent(at_s, "ui_console/console-1", what, "scout2", "")
+
+    session = WrittenSession(*TEAM_EVENTS)
+    session.log = Log([event(0.5, "tells of long ago"), event(9.0, "tells again")])
+    app = ConsoleApp(session)
     async with app.run_test(size=SIZE, notifications=True) as pilot:
         await pilot.press("slash")
-        await pilot.press(*"robot", "colon", *"scout2 ", *"tells 1", "enter")
+        await pilot.press(*"robot", "colon", *"scout2 ", *"tells", "enter")
         await settle(pilot)
+        assert session.wanted == [("search", AskLog(robot="scout2", text="tells"))]
         told = screen_text(app)
-        assert "log: robot:scout2 tells 1" in told
-        assert "anna tells 1" in told
-        assert "anna tells 2" not in told
+        assert "log: robot:scout2 tells (2 events)" in told
+        assert "tells of long ago" in told
         assert "saw motion" not in told
-        await pilot.press("slash")
-        await pilot.press(*"since", "colon", *"soon", "enter")
-        await settle(pilot)
-        await pilot.pause()
-        assert "no number of mission seconds" in screen_text(app)
+        for heard in (event(9.0, "tells again"), event(11.0, "tells news"), event(11.5, "is silent")):
+            session.model.apply(StoryHeard(12.0, heard))
+        app.redraw()
+        told = screen_text(app)
+        assert told.count("tells again") == 1, "told and heard"
+        assert "tells news" in told
+        assert "is silent" not in told
         await pilot.press("slash", "delete", "enter")
         await settle(pilot)
         assert "saw motion" in screen_text(app)
+
+
+@pytest.mark.parametrize(
+    ("line", "refusal", "words"),
+    [
+        ("since:soon", None, "'soon' is no moment"),
+        ("smoke", LogAway("the launcher, which keeps the log, did not answer"), "did not answer"),
+    ],
+)
+async def test_a_search_that_fails_says_why_and_leaves_the_log_as_it_was(
+    line: str, refusal: Refusal | None, words: str
+) -> None:
+    session = WrittenSession(*TEAM_EVENTS)
+    session.log = refusal or Log([])
+    app = ConsoleApp(session)
+    async with app.run_test(size=SIZE, notifications=True) as pilot:
+        await pilot.press("slash")
+        await pilot.press(*("colon" if one == ":" else one for one in line), "enter")
+        await settle(pilot)
+        await pilot.pause()
+        assert words in screen_text(app)
+        assert app.chosen is not PanelName.LOG
 
 
 async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:

@@ -33,6 +33,9 @@ DIALOGS: dict[str, list[str]] = {
 }
 """What is in front, and the keys that bring it there."""
 
+NO_ROBOTS = {"links": 5, "parameters": 6, "log": 8}
+"""Tables whose rows are no robots, and how many tables after the robots they come."""
+
 
 def stopped_model() -> ConsoleModel:
     """Return one that holds scout1, which anna has stopped."""
@@ -178,6 +181,19 @@ async def test_where_no_robot_is_stopped_lifting_says_so() -> None:
         await pilot.pause()
         assert "no robot is stopped" in screen_text(pilot.app)
     assert session.wanted == []
+
+
+@pytest.mark.parametrize("name", [*NO_ROBOTS, "keys"])
+async def test_a_robot_that_the_cursor_was_moved_to_is_meant_in_every_table_and_dialog(name: str) -> None:
+    session = WrittenSession(*TEAM_EVENTS, ScheduleHeard(8.0, SCHEDULE))
+    async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
+        await pilot.press(*["shift+tab"] * 3, "right_square_bracket")
+        await pilot.press(*["tab"] * NO_ROBOTS.get(name, 0), *DIALOGS.get(name, []))
+        await settle(pilot)
+        assert name == "keys" or "STOP scout2" in screen_text(pilot.app)
+        await pilot.press("x")
+        await settle(pilot)
+    assert session.wanted == ["stop", ("stop robot", "scout2")]
 
 
 def test_a_stop_is_for_the_robot_in_hand_then_for_the_row_then_for_the_one_wanted() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,10 @@ from console_scenes import model
 from numpy.typing import NDArray
 from textual.pilot import Pilot
 
+from backbone.errors import Refusal
+from backbone.log_question import LogQuestion
+from backbone.mission_log import AskLog, Log
+from backbone.moments import Now
 from ui_console.console_events import ConsoleEvent
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
@@ -25,6 +30,7 @@ class WrittenSession:
         self.is_closed = False
         self.shown: NDArray[np.uint8] | None = None
         self.is_sure = True
+        self.log: Log | Refusal = Log([])
 
     def picture(self) -> NDArray[np.uint8] | None:
         return self.shown
@@ -91,6 +97,13 @@ class WrittenSession:
     async def why(self, name: str) -> list[str]:
         self.wanted.append(("why", name))
         return [f"{name}: waiting", "  watch1 has its minimum run time"]
+
+    async def search_log(self, question: LogQuestion) -> tuple[AskLog, Log]:
+        asked = question.asked(Now(self.now_s(), datetime(2026, 5, 4, 14, 10)))
+        self.wanted.append(("search", asked))
+        if isinstance(self.log, Refusal):
+            raise self.log
+        return asked, self.log
 
     async def ask_parameters(self, name: str) -> bool:
         self.wanted.append(("ask", name))

@@ -12,9 +12,9 @@ from enum import StrEnum
 from functools import lru_cache
 from importlib import resources
 
-import msgspec
-
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Node, outline
+from backbone.mission.shipped_types import shipped_text
 from backbone.naming import Subsystem
 
 
@@ -27,44 +27,6 @@ class Role(StrEnum):
     WORLD = "world"
     SERVICE = "service"
     CONSOLE = "console"
-
-
-class ParameterFacts(msgspec.Struct, frozen=True):
-    """A parameter of a class.
-
-    Attributes:
-        name: Its name.
-        type: What it takes: number, integer, string, boolean, or JSON's word for it.
-        default: As JSON; empty: it must be given.
-        span: Its legal range, as ``above 0, at most 1``; empty: any.
-        doc: What it means.
-    """
-
-    name: str
-    type: str
-    default: str
-    span: str
-    doc: str
-
-    @property
-    def told(self) -> str:
-        """Type, default and range on one line."""
-        given = f"default {self.default}" if self.default else "required"
-        return ", ".join(part for part in (self.type, self.span, given) if part)
-
-
-class ClassFacts(msgspec.Struct, frozen=True):
-    """What a class says of itself.
-
-    Attributes:
-        doc: Its documentation.
-        parameters: What it can be given in a mission file.
-        failure: Why nothing can be said; empty: all is said.
-    """
-
-    doc: str = ""
-    parameters: tuple[ParameterFacts, ...] = ()
-    failure: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,27 +53,27 @@ class TypeEntry:
 
 
 def stock() -> Node:
-    """Return the project's own list, as a mission without services and behaviors."""
-    return outline(_stock_text())
+    """Return the project's own types, as a mission that has nothing else."""
+    return outline(shipped_text())
 
 
 def new_text() -> bytes:
-    """Return the text a new mission begins with: one host, the core services and their types."""
+    """Return the text a new mission begins with: one host."""
     return resources.files("ui_console.design").joinpath("new.xml").read_bytes()
 
 
 def stock_type(name: str) -> Node | None:
     """Return the type of this name from the project's own list."""
-    return _by_name("types").get(name)
+    return _types().get(name)
 
 
 def stock_resource(kind: str) -> Node | None:
     """Return the first shape of a resource of this type."""
-    return next((one for one in _by_name("resources").values() if one.text("type") == kind), None)
+    return next((one for one in _shapes() if one.text("type") == kind), None)
 
 
 def entries(mission: Node) -> list[TypeEntry]:
-    """Return every type that is at hand: the file's own in its order, then those it could take from the project.
+    """Return every type that is at hand: the file's own in its order, then those of the project.
 
     Args:
         mission: The designed file.
@@ -121,7 +83,7 @@ def entries(mission: Node) -> list[TypeEntry]:
     names = {one.text("name") for one in declared}
     world = mission.first("world")
     world_type = (world.text("type") if world is not None else "") or "simulated_world"
-    known = _by_name("types")
+    known = _types()
     own = [_entry(one, world_type, is_stock=one.text("name") in known, is_declared=True) for one in declared]
     rest = [
         _entry(one, world_type, is_stock=True, is_declared=False) for name, one in known.items() if name not in names
@@ -131,7 +93,7 @@ def entries(mission: Node) -> list[TypeEntry]:
 
 def stock_classes() -> list[str]:
     """Return the class paths of the project's own types."""
-    return [one.text("class") for one in _by_name("types").values()]
+    return [one.text("class") for one in _types().values()]
 
 
 def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
@@ -162,14 +124,16 @@ def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
 
 
 @lru_cache(maxsize=1)
-def _stock_text() -> bytes:
-    return resources.files("ui_console.design").joinpath("stock.xml").read_bytes()
-
-
-@lru_cache(maxsize=2)
-def _by_name(section: str) -> dict[str, Node]:
-    found = stock().first(section)
+def _types() -> dict[str, Node]:
+    found = stock().first("types")
     return {} if found is None else {one.text("name"): one for one in found.children}
+
+
+@lru_cache(maxsize=1)
+def _shapes() -> tuple[Node, ...]:
+    shapes = outline(resources.files("ui_console.design").joinpath("stock.xml").read_bytes())
+    found = shapes.first("resources")
+    return () if found is None else found.children
 
 
 def _entry(declared: Node, world_type: str, *, is_stock: bool, is_declared: bool) -> TypeEntry:

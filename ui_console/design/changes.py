@@ -12,8 +12,8 @@ from typing import assert_never
 
 import msgspec
 
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Path
-from ui_console.design.catalogue import ClassFacts
 from ui_console.design.commands import DesignRefused, Move, Remove
 from ui_console.design.draft import Draft
 from ui_console.design.following import follower

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import bisect
 import contextlib
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path as FilePath
 
 from backbone.atomic_file import remove_leftover
 from backbone.dry_run import DryRun, dry_run
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import read_bytes
 from backbone.mission.edit import Node, Path, outline, set_attribute
 from backbone.mission.model import MissionDescription
@@ -37,6 +39,7 @@ class Draft:
         past: Earlier texts, the last one last.
         future: Texts that were undone, the next one last.
         saved: What the file holds, as far as is known; None: nothing.
+        classes: What is known of the classes of its own types, whose parameters are judged by that.
     """
 
     source: str
@@ -44,6 +47,7 @@ class Draft:
     past: tuple[Step, ...] = ()
     future: tuple[Step, ...] = ()
     saved: bytes | None = None
+    classes: Mapping[str, ClassFacts] = field(default_factory=dict)
 
     @classmethod
     def new(cls, source: str) -> Draft:
@@ -91,13 +95,13 @@ class Draft:
     @cached_property
     def _read(self) -> MissionDescription | tuple[Fault, ...]:
         try:
-            return read_mission_bytes(self.text, self.source)
+            return read_mission_bytes(self.text, self.source, self.classes)
         except MissionInvalid as invalid:
             return invalid.faults
 
     @property
     def problems(self) -> tuple[Fault, ...]:
-        """What ``scout-backbone check`` would say; none: it would say that all is fine."""
+        """What ``scout-backbone check`` would say, but for classes that nobody has looked up; none: all is fine."""
         return self._read if isinstance(self._read, tuple) else ()
 
     @property
@@ -152,6 +156,10 @@ class Draft:
         if not self.future:
             raise NothingToUndo("there is nothing to do again")
         return replace(self, step=self.future[-1], past=(*self.past, self.step), future=self.future[:-1])
+
+    def knowing(self, classes: Mapping[str, ClassFacts]) -> Draft:
+        """Return the same draft, with parameters judged by what these classes say of themselves."""
+        return replace(self, classes=classes)
 
     def kept(self, source: str) -> Draft:
         """Return the same draft, saved under this path."""

@@ -105,20 +105,28 @@ def _section(text: bytes, tag: str) -> tuple[bytes, Path]:
 
 
 def _add_type(text: bytes, name: str) -> Step:
+    """Write a shipped type into the file, which may then change it."""
     text, section = _section(text, "types")
     for declared in outline(text).at(section).all("type"):
         if declared.text("name") == name:
             return Step(text, declared.path)
     known = stock_type(name)
     if known is None:
-        raise DesignRefused(
-            f"no type {told(name)} is declared, and the project brings none along",
-            remedy="Add a <type> with its class first.",
-        )
-    for other in dict.fromkeys([*known.text("uses").split(), *(needed.text("type") for needed in known.all("needs"))]):
-        if stock_type(other) is not None:
-            text = _add_type(text, other).text
+        raise _no_type(name)
     return _add(text, section, _copy(known))
+
+
+def _must_have_type(text: bytes, name: str) -> None:
+    """Refuse a type that neither the file nor the project declares."""
+    if stock_type(name) is None and name not in {one.text("name") for one in outline(text) if one.tag == "type"}:
+        raise _no_type(name)
+
+
+def _no_type(name: str) -> DesignRefused:
+    return DesignRefused(
+        f"no type {told(name)} is declared, and the project brings none along",
+        remedy="Add a <type> with its class first.",
+    )
 
 
 def _copy(node: Node) -> NewElement:
@@ -130,10 +138,9 @@ def _add_behavior(text: bytes, command: AddBehavior) -> Step:
     parent = command.parent
     if outline(text).at(parent).tag == "mission":
         text, parent = _section(text, "behaviors")
-    marked = _Marked(text, parent)
-    text = _add_type(marked.text, command.type).text
+    _must_have_type(text, command.type)
     values = {"type": command.type, "name": command.name, "priority": str(command.priority)}
-    return _add(text, marked.now(text), NewElement("behavior", values))
+    return _add(text, parent, NewElement("behavior", values))
 
 
 class _Marked:
@@ -153,9 +160,8 @@ def _claim(text: bytes, command: Claim) -> Step:
     node = outline(text).at(command.behavior)
     if node.tag != "behavior":
         raise DesignRefused(f"a <{node.tag}> claims no ARC", remedy="Pick a behavior.")
-    marked = _Marked(text, command.behavior)
-    text = _add_type(text, command.kind).text
-    path = marked.now(text)
+    path = command.behavior
+    _must_have_type(text, command.kind)
     arc = outline(text).at(path).first("arc")
     if arc is not None:
         text = set_attribute(text, arc.path, "kind", command.kind)
@@ -166,7 +172,7 @@ def _claim(text: bytes, command: Claim) -> Step:
 
 def _add_resource(text: bytes, kind: str, name: str) -> Step:
     _free(outline(text), "resource", name)
-    text = _add_type(text, kind).text
+    _must_have_type(text, kind)
     text, section = _section(text, "resources")
     root = outline(text)
     shape = stock_resource(kind)
@@ -190,8 +196,6 @@ def _add_resource(text: bytes, kind: str, name: str) -> Step:
 
 
 def _add_world(text: bytes, command: AddWorld) -> Step:
-    marked = _Marked(text, ())
-    text = _add_type(marked.text, "simulated_world").text
     room = NewElement("room", {"width-m": command.width_m, "depth-m": command.depth_m})
     step = _add(text, (), NewElement("world", {"name": "world", "type": "simulated_world"}, [room]))
     return Step(_with_bodies(step.text), step.touched)

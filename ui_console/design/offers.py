@@ -9,9 +9,9 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import NewElement, Node, Path
 from backbone.mission.report import told, told_names
-from backbone.mission.schema import vocabulary
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
 from ui_console.design.commands import (
     Add,
@@ -135,7 +135,9 @@ def _offers(mission: Node, node: Node) -> list[Offer]:
     match node.tag:
         case "mission":
             missing = [] if mission.first("world") is not None else [_world()]
-            return [*_behaviors(mission, node), *_resources(mission), *missing]
+            sections = [tag for tag in ("types", "core", "hosts") if mission.first(tag) is None]
+            bare = [offer for tag in sections for offer in _generic(mission, node, tag)]
+            return [*_behaviors(mission, node), *_resources(mission), *missing, *bare]
         case "behaviors":
             return _behaviors(mission, node)
         case "behavior":
@@ -164,9 +166,10 @@ def _of(mission: Node, role: Role) -> list[TypeEntry]:
 
 def _behaviors(mission: Node, node: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
+        rules = vocabulary()["behavior"].attributes
         asks = (
-            Asked("name", "Name of the behavior.", free_name(mission, entry.name.replace("_", "-"))),
-            Asked("priority", "Its priority among its siblings, a whole number; larger is higher.", "1"),
+            Asked("name", rules["name"].documentation, free_name(mission, entry.name.replace("_", "-"))),
+            Asked("priority", rules["priority"].documentation, "1"),
         )
         return Offer(f"behavior {entry.name}", entry.class_path, asks, lambda given: build(entry, given))
 
@@ -211,7 +214,7 @@ def _resources(mission: Node) -> list[Offer]:
     def offer(entry: TypeEntry) -> Offer:
         shape = stock_resource(entry.name)
         name = shape.text("name") if shape is not None else entry.name
-        asks = (Asked("name", "Name of the resource and of its controller.", free_name(mission, name)),)
+        asks = (Asked("name", vocabulary()["resource"].attributes["name"].documentation, free_name(mission, name)),)
         return Offer(f"resource {entry.name}", entry.class_path, asks, lambda given: AddResource(entry.name, given[0]))
 
     return [offer(entry) for entry in _of(mission, Role.RESOURCE)]
@@ -259,7 +262,7 @@ def _generic(mission: Node, node: Node, tag: str) -> list[Offer]:
             name,
             rule.attributes[name].documentation,
             free_name(mission, tag) if name == "name" and tag not in ("uses", "parameter") else "",
-            choices(mission, new, name, rule.attributes[name].type),
+            choices(mission, new, name, rule.attributes[name].words),
         )
         for name in required
     ]

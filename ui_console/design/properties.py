@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from backbone.mission.class_facts import ClassFacts
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
-from backbone.mission.schema import enumerations, vocabulary
-from ui_console.design.catalogue import ClassFacts, Role, entries
+from ui_console.design.catalogue import Role, entries
 from ui_console.design.commands import Command, Rename, SetParameter, SetValue
 
 HAVE_PARAMETERS = ("behavior", "resource", "world")
@@ -73,14 +74,14 @@ def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> li
             one.required,
             is_parameter=False,
             doc=one.documentation,
-            choices=choices(mission, node, name, one.type),
+            choices=choices(mission, node, name, one.words),
         )
         for name, one in rule.attributes.items()
     ]
     return found + (_parameters(mission, node, facts) if node.tag in HAVE_PARAMETERS else [])
 
 
-def choices(mission: Node, node: Node, attribute: str, simple_type: str = "") -> tuple[str, ...]:
+def choices(mission: Node, node: Node, attribute: str, words: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the values of an attribute that make sense where it stands; none if they cannot be listed."""
     match node.tag, attribute:
         case (_, "host"):
@@ -103,7 +104,7 @@ def choices(mission: Node, node: Node, attribute: str, simple_type: str = "") ->
             targets = [] if world is None else world.all("target")
             return tuple(one.text("name") for one in targets if one.text("shape") == "carrier")
         case _:
-            return ("true", "false") if simple_type == "xs:boolean" else tuple(enumerations().get(simple_type, ()))
+            return words
 
 
 def class_of(mission: Node, node: Node) -> str:
@@ -122,7 +123,7 @@ def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> l
             not one.default,
             is_parameter=True,
             doc=" ".join(part for part in (one.doc, f"({one.told})") if part),
-            choices=("true", "false") if one.type == "boolean" else (),
+            choices=one.words,
         )
         for one in known
     ]

@@ -13,9 +13,10 @@ from typing import Any, assert_never
 import msgspec
 
 from backbone.errors import Refusal
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
-from ui_console.design.catalogue import ClassFacts, entries, stock_classes
+from ui_console.design.catalogue import entries, stock_classes
 from ui_console.design.changes import ChangedMeanwhile, MustAsk, changed, question, sections, sibling_file, touched_by
 from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
@@ -250,6 +251,7 @@ class DesignRoom:
 
     async def _known(self, facts: dict[str, ClassFacts]) -> None:
         self._facts = {**self._facts, **facts}
+        self.draft = self.draft.knowing(self._facts)
         self._told = await asyncio.to_thread(sections, self.draft, self._facts)
         for guest in self.guests:
             self._tell(guest)

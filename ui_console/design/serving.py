@@ -13,6 +13,7 @@ from ui_console.design.server import DesignServer, begin
 from ui_console.joining import end_server_on_signals
 from ui_console.web.door import Doorkeeper, Pass
 from ui_console.web.serving import Site
+from ui_console.web.token_file import TokenFile
 
 
 async def serve_designer(file: str, passes: Mapping[str, Pass], site: Site) -> int:
@@ -36,6 +37,8 @@ async def serve_designer(file: str, passes: Mapping[str, Pass], site: Site) -> i
         say(f"goes on with what was not saved, from {kept.path}")
     end = asyncio.Event()
     interrupted = end_server_on_signals(lambda _signal: end.set())
+    tokens = TokenFile.of_design(file, site.port) if site.port else None
+    passes = site.passes_with(tokens, passes)
     server = DesignServer(DesignRoom(draft, kept, look_up), Doorkeeper(passes))
-    await server.run(site.host, site.port, lambda port: site.print_addresses(port, passes), end, encryption)
+    await server.run(site.host, site.port, lambda port: site.opened(port, tokens, passes), end, encryption)
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE

@@ -10,11 +10,12 @@ from collections.abc import Mapping
 import msgspec
 
 from backbone.dry_run import DryRun
+from backbone.mission.class_facts import ClassFacts
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
-from backbone.mission.schema import vocabulary
-from backbone.rc_manager.rehearsal import Run
+from backbone.scheduling.rehearsal import Run
 from backbone.spoken import counted
-from ui_console.design.catalogue import ClassFacts, Role, TypeEntry, description, entries
+from ui_console.design.catalogue import Role, TypeEntry, description, entries
 from ui_console.design.draft import Draft
 from ui_console.design.offers import Offer, offers
 from ui_console.design.properties import class_of, properties
@@ -22,8 +23,6 @@ from ui_console.design.properties import class_of, properties
 ROLES_ADDED = (Role.BEHAVIOR, Role.ARC, Role.RESOURCE)
 GROUPS = {Role.BEHAVIOR: "behaviors", Role.ARC: "ARCs", Role.RESOURCE: "resources"}
 WISHES, ROOM = "wishes", "the room"
-OF_THE_WORLD = ("room", "furniture", "ramp", "landmark", "dark", "air", "target", "scout")
-"""What stands in a world, in the order in which a room is thought of."""
 
 
 class ElementRow(msgspec.Struct, frozen=True):
@@ -232,7 +231,8 @@ def palette(mission: Node, facts: Mapping[str, ClassFacts]) -> list[PaletteRow]:
         PaletteRow(f"wish {kind}", WISHES, kind, "wish", "", is_known=True, doc=(vocabulary()["wish"].documentation,))
         for kind in dict.fromkeys(need for entry in at_hand if entry.role is Role.ARC for need in entry.needs)
     ]
-    tags = (*(() if mission.first("world") is not None else ("world",)), *OF_THE_WORLD)
+    inside = [tag for tag in vocabulary()["world"].children if tag != "parameter"]
+    tags = inside if mission.first("world") is not None else ["world", *inside]
     return found + [
         PaletteRow(tag, ROOM, tag, tag, "", is_known=True, doc=(vocabulary()[tag].documentation,)) for tag in tags
     ]

@@ -12,13 +12,14 @@ from textual.events import AppBlur, AppFocus, Key, MouseDown
 from textual.widgets import Input
 
 from backbone.cli import ExitCode
+from backbone.errors import Refusal
 from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
 from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.keys import keys_help, stop_meant
 from ui_console.terminal.lines import robot_rows
-from ui_console.terminal.log_search import SEARCH_HELP, WrongSearch, read_search
+from ui_console.terminal.log_search import SEARCH_HELP, Found, read_search
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.widgets import DrivePad, Panel
 from ui_console.views import AlarmView
@@ -268,16 +269,19 @@ class ConsoleApp(ConsoleDisplay):
         self.redraw()
 
     def action_search(self) -> None:
-        """Show only what fits in the log."""
-        self._open(Question("search the log", self._search, SEARCH_HELP), self._searched)
+        """Show what the mission's log has of something, however long ago, and what comes of it from now on."""
+        before = self._found.line if self._found is not None else ""
+        self._open(Question("search the log", before, SEARCH_HELP), self._search)
 
-    def _searched(self, line: str) -> None:
+    @work(group="search", exclusive=True)
+    async def _search(self, line: str) -> None:
+        question = read_search(line)
         try:
-            read_search(line)
-        except WrongSearch as wrong:
-            self.notify(str(wrong), severity="warning", markup=False)
+            found = Found(" ".join(line.split()), *await self._session.search_log(question)) if question else None
+        except Refusal as refusal:
+            self.notify(f"{refusal.detail}. {refusal.remedy}", severity="warning", markup=False)
             return
-        self._search = " ".join(line.split())
+        self._found = found
         self.chosen = self._turn = PanelName.LOG
         self.redraw()
 

@@ -16,7 +16,6 @@ from textual.events import Resize, Unmount
 from textual.screen import Screen
 from textual.widgets import Static
 
-from ui_console.console_model import LOG_SHOWN
 from ui_console.profile import Profile
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion
@@ -24,7 +23,7 @@ from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, has, hints, robot_meant
 from ui_console.terminal.lines import Row
-from ui_console.terminal.log_search import read_search
+from ui_console.terminal.log_search import FOUND_SHOWN, Found
 from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
@@ -33,6 +32,7 @@ from ui_console.views import ConsoleView
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures
 MONITOR_EVERY_S = 1.0  # measured: 1.6 % of a core, twice a second 2.5 % (bench/console.py)
+LINK_LOOK_S = 0.1  # chosen: with ``LINK_FRESH_S`` less than the second after which nothing old looks fresh
 SPEED_RAD_S = 4.0  # chosen: a walk
 NARROW_COLUMNS = 70  # chosen: below, picture and tables beside each other are both too small
 
@@ -104,7 +104,7 @@ class ConsoleDisplay(EndingApp):
         self.speed_rad_s = SPEED_RAD_S
         self.chosen = PanelName.ROBOTS
         self._turn = PanelName.SCHEDULE
-        self._search = ""
+        self._found: Found | None = None
         self._view: ConsoleView | None = None
 
     @property
@@ -139,8 +139,7 @@ class ConsoleDisplay(EndingApp):
         self.set_interval(every_s, self.redraw)
         if self.profile is Profile.TERMINAL:
             self.set_interval(REDRAW_EVERY_S, self.redraw_video)
-        if self.profile is Profile.MONITOR:
-            self.set_interval(TABLES_EVERY_S, self.redraw_if_cut)
+        self.set_interval(LINK_LOOK_S, self.redraw_if_cut)
 
     def on_resize(self, _event: Resize) -> None:
         """Show as much as fits now."""
@@ -161,8 +160,8 @@ class ConsoleDisplay(EndingApp):
         for name in FIXED:
             self._show(name, main.query_one(f"#{name}", Panel), view)
         turn = main.query_one("#turn", Panel)
-        is_searched = self._turn is PanelName.LOG and bool(self._search)
-        turn.border_title = Text(f"log: {self._search}" if is_searched else self._turn)
+        found = self._found if self._turn is PanelName.LOG else None
+        turn.border_title = Text(found.title if found is not None else self._turn)
         self._show(self._turn, turn, view)
         keys = hints(view, self.profile, self._robot_meant())
         main.query_one(KeyLine).show(keys, rows=1 if self.size.width >= NARROW_COLUMNS else 2)
@@ -208,9 +207,10 @@ class ConsoleDisplay(EndingApp):
     def _show(self, name: PanelName, panel: Panel, view: ConsoleView) -> None:
         is_chosen = name is self.chosen
         panel.set_class(is_chosen, "-chosen")
-        if name is PanelName.LOG and self._search:
-            found = self._session.model.team.log(LOG_SHOWN, read_search(self._search))
-            view = msgspec.structs.replace(view, log=found)
+        if name is PanelName.LOG and self._found is not None:
+            found = self._found
+            log = self._session.model.team.log(FOUND_SHOWN, found.asked, found.log.events)
+            view = msgspec.structs.replace(view, log=log)
         rows = table_rows(name, view, panel.content_size.width)
         panel.show_rows(rows, is_chosen=is_chosen, nothing=NOTHING[name])
 
@@ -226,10 +226,12 @@ class ConsoleDisplay(EndingApp):
         names = [robot.robot for robot in self._view.robots] if self._view is not None else []
         model, panel = self._session.model, self._panel()
         dialog = self.screen.subject if isinstance(self.screen, Dialog) else ""
-        placed, shown = dialog or _subject_of(panel.placed), _subject_of(panel.row)
+        robots = self.screen_stack[0].query_one(f"#{PanelName.ROBOTS}", Panel)
+        placed = (dialog, _subject_of(panel.placed), _subject_of(robots.placed))
+        shown = _subject_of(panel.row)
         return {
             "held": model.robot if model.held is not None else "",
-            "placed": placed if placed in names else "",
+            "placed": next((robot for robot in placed if robot in names), ""),
             "wanted": model.robot,
             "shown": shown if shown in names else names[0] if len(names) == 1 else "",
         }

@@ -54,7 +54,11 @@ KEYS = [
     Binding("K", "acknowledge_all", "all alarms were seen"),
     Binding("i", "ask_parameters", "show the row's parameters"),
     Binding("e", "edit", "change the parameter under the cursor"),
-    Binding("slash", "search", "search the log: words, a robot, a person, a level, since when"),
+    Binding(
+        "slash",
+        "search",
+        "search the mission's log: words, a robot, a person, a level, a time",
+    ),
     Binding("v", "bare", "picture alone, and back"),
     Binding("question_mark,f1", "keys", "these keys"),
     Binding("q,alt+q", "quit", "give the robot back and leave"),

@@ -1,65 +1,63 @@
-"""What an operator types to find something in the log: words, and fields by name.
+"""What an operator types to find something in the log, and what was found.
 
 Pure: a line in, a question out. Words that belong together need no quotes: all that is no field is one text.
 """
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
-import msgspec
+from dataclasses import dataclass, fields
 
 from backbone.component.messages import LogLevel
-from backbone.errors import Refusal
-from backbone.mission_log import AskLog
+from backbone.log_question import LogQuestion
+from backbone.mission_log import AskLog, Log
+from backbone.spoken import counted
 
-SEARCH_HELP = f"words, and robot:NAME person:NAME level:{'|'.join(LogLevel)} since:SECONDS; nothing: all"
-
-
-class WrongSearch(Refusal):
-    """What was typed is no question."""
-
-    code = "console.wrong_search"
-    remedy = f"Type {SEARCH_HELP}."
+SEARCH_HELP = f"words, and robot:NAME person:NAME level:{'|'.join(LogLevel)} since:5m until:14:05; nothing: all"
+FOUND_SHOWN = 300  # chosen: more than a person pages through; a narrower search shows the rest
+_FIELDS = {field.name for field in fields(LogQuestion)} - {"text"}
 
 
-def read_search(line: str) -> AskLog | None:
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        line: As typed.
+        asked: The question.
+        log: The launcher's answer.
+    """
+
+    line: str
+    asked: AskLog
+    log: Log
+
+    @property
+    def title(self) -> str:
+        """What stands over the table.
+
+        Example:
+            >>> Found("robot:scout1", AskLog(robot="scout1"), Log([])).title
+            'log: robot:scout1 (0 events)'
+        """
+        count = len(self.log.events) + self.log.left_out
+        newest = f", the newest {FOUND_SHOWN}" if count > FOUND_SHOWN else ""
+        return f"log: {self.line} ({counted(count, 'event')}{newest})"
+
+
+def read_search(line: str) -> LogQuestion | None:
     """Return what was asked for; None: all.
-
-    Raises:
-        WrongSearch: A field has a value that it cannot have.
 
     Example:
         >>> asked = read_search("person:anna was stopped")
         >>> asked.person, asked.text
         ('anna', 'was stopped')
     """
-    fields: dict[str, Any] = {}
+    given: dict[str, str] = {}
     words = []
     for word in line.split():
         name, colon, value = word.partition(":")
-        if colon and value and name in ("robot", "person", "level", "since"):
-            fields |= _field(name, value)
+        if colon and value and name in _FIELDS:
+            given[name] = value
         else:
             words.append(word)
-    if words:
-        fields["text"] = " ".join(words)
-    if not fields:
-        return None
-    try:
-        return msgspec.convert(msgspec.to_builtins(AskLog(**fields)), AskLog)
-    except msgspec.ValidationError as error:
-        raise WrongSearch(str(error)) from error
-
-
-def _field(name: str, value: str) -> dict[str, Any]:
-    if name != "since":
-        return {name: value}
-    try:
-        since_s = float(value)
-    except ValueError:
-        since_s = math.nan
-    if not math.isfinite(since_s):
-        raise WrongSearch(f"since: {value} is no number of mission seconds")
-    return {"since_s": since_s}
+    return LogQuestion(" ".join(words), **given) if words or given else None

@@ -6,6 +6,7 @@ import asyncio
 import os
 import sys
 from collections.abc import Callable, Coroutine, Mapping
+from datetime import datetime
 from typing import Any, assert_never
 
 import numpy as np
@@ -14,6 +15,9 @@ from textual import pilot as textual_pilot
 
 from backbone.cli import ExitCode
 from backbone.component.messages import LifeState
+from backbone.log_question import LogQuestion
+from backbone.mission_log import AskLog, Log
+from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.console_events import ConsoleEvent
 from ui_console.console_model import ConsoleModel
@@ -245,6 +249,12 @@ class TerminalSession:
     async def why(self, name: str) -> list[str]:
         """Return why it is as it is."""
         return await self._ready_console().why(name)
+
+    async def search_log(self, question: LogQuestion) -> tuple[AskLog, Log]:
+        """Return what the mission's log has of this; see ``Session``."""
+        console = self._ready_console()
+        asked = question.asked(Now(self.now_s(), datetime.now(), console.clock.rate))
+        return asked, await console.feed.search_log(asked)
 
     async def ask_parameters(self, name: str) -> bool:
         """Have its parameters told."""

@@ -7,6 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from backbone.log_question import LogQuestion
+from backbone.mission_log import AskLog, Log
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
 
@@ -80,6 +82,13 @@ class Session(Protocol):
 
     async def why(self, name: str) -> list[str]:
         """Return why it is as it is."""
+
+    async def search_log(self, question: LogQuestion) -> tuple[AskLog, Log]:
+        """Return what the mission's log has of this, and what was asked for that.
+
+        Raises:
+            Refusal: The question has no answer, or the launcher gives none.
+        """
 
     async def ask_parameters(self, name: str) -> bool:
         """Have its parameters told; return whether they were."""

@@ -5,12 +5,15 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
+from datetime import datetime
 from typing import Any, Protocol, assert_never
 
 import msgspec
 
 from backbone.bus.interface import Clock
-from backbone.errors import LinkError, Refusal
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.log_question import LogQuestion
+from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.consent_answers import ConsentAnswers
 from ui_console.console_events import (
@@ -28,6 +31,7 @@ from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
 from ui_console.views import view_json
 from ui_console.web.door import Welcome
+from ui_console.web.found_log import FoundLog
 from ui_console.web.outbox import Outbox
 from ui_console.web.protocol import (
     Acknowledge,
@@ -42,6 +46,8 @@ from ui_console.web.protocol import (
     LetGo,
     LiftStop,
     MayI,
+    MoreLog,
+    SearchLog,
     SetParameter,
     Steer,
     StopAll,
@@ -58,8 +64,8 @@ LATENCY_STEP = (
     0.2  # chosen: weight of the newest picture in the latency shown: it follows within a second and is readable
 )
 
-AtWork = AskWhy | AskParameters | SetParameter | StopRobot | StopAll | LiftStop | TakeOver | LetGo
-Asked = AskWhy | AskParameters | SetParameter
+Asked = AskWhy | AskParameters | SetParameter | SearchLog
+AtWork = Asked | StopRobot | StopAll | LiftStop | TakeOver | LetGo
 
 
 class Hands(Protocol):
@@ -100,6 +106,7 @@ class Operator:
         self._console: Teleoperation | None = None
         self._life: asyncio.Task[None] | None = None
         self._claiming = asyncio.Lock()
+        self._found: FoundLog | None = None
         self._latency_s: dict[str, float] = {}
         self._work: dict[bytes, asyncio.Task[None]] = {}
 
@@ -107,14 +114,13 @@ class Operator:
     def obey(self, intent: Intent) -> None:
         """Do what the browser asks; what takes time goes on beside."""
         match intent:
-            case Steer(forward, right, speed_rad_s):
-                self._with_robot(
-                    lambda console: console.hold(drive_by_stick(forward, right, speed_rad_s), STICK_LASTS_S)
-                )
+            case Steer(moment, forward, right, speed_rad_s):
+                drive = drive_by_stick(forward, right, speed_rad_s)
+                self._by_press(moment, lambda console: console.hold(drive, STICK_LASTS_S))
             case StopWheels():
                 self.stop()
-            case JumpOnce():
-                self._with_robot(Teleoperation.jump)
+            case JumpOnce(moment):
+                self._by_press(moment, Teleoperation.jump)
             case Drawn(robot, number):
                 self._drawn(robot, number)
             case Watch(robots):
@@ -122,6 +128,8 @@ class Operator:
                 self._hands.watching_changed()
             case Acknowledge(key):
                 self._acknowledge(key)
+            case MoreLog(number, first):
+                self._hand_out(number, first)
             case Here(is_there):
                 self._attend(is_there)
             case MayI(why):
@@ -131,9 +139,9 @@ class Operator:
             case DismissLost():
                 self.model.dismiss_lost()
                 self.refresh(self._hands.clock.now_s())
-            case TakeOver() | LetGo() | StopRobot() | StopAll() | LiftStop() | AskWhy() | AskParameters():
+            case TakeOver() | LetGo() | StopRobot() | StopAll() | LiftStop():
                 self._begin(intent)
-            case SetParameter():
+            case AskWhy() | AskParameters() | SetParameter() | SearchLog():
                 self._begin(intent)
             case _:
                 assert_never(intent)
@@ -199,6 +207,11 @@ class Operator:
         if self._console is not None and self._console.is_ready:
             act(self._console)
 
+    def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
+        """Do what moves the robot unless the press is from an earlier moment, however late the page's word came."""
+        if moment == self.model.moment:
+            self._with_robot(act)
+
     def _drawn(self, robot: str, number: int) -> None:
         captured_s = self.outbox.drawn(robot, number)
         self.news.set()
@@ -254,12 +267,33 @@ class Operator:
                 self._answer({"why": name, "lines": await observer.why(name)})
             case AskParameters(name):
                 self._answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
+            case SearchLog():
+                await self._search(intent)
             case SetParameter(name, parameter, value):
                 is_set = await observer.set_parameter(name, parameter, value, user)
                 self._answer({"set": name, "parameter": parameter, "done": is_set})
             case _:
                 assert_never(intent)
         self.refresh(self._hands.clock.now_s())
+
+    async def _search(self, wanted: SearchLog) -> None:
+        """Find something in the mission's log; the page fetches the rest of it part by part."""
+        clock = self._hands.clock
+        now = Now(clock.now_s(), datetime.now(), clock.rate)
+        question = LogQuestion(wanted.text, wanted.robot, wanted.person, wanted.level, wanted.since, wanted.until)
+        try:
+            found = await self._hands.observer.feed.search_log(question.asked(now))
+        except Refusal as refusal:
+            refused = {"code": code_of(refusal), "refused": refusal.detail, "remedy": refusal.remedy}
+            self._answer({"log": {"number": wanted.number, **refused}})
+            return
+        self._found = FoundLog(wanted.number, found, now)
+        self._hand_out(wanted.number, 0)
+
+    def _hand_out(self, number: int, first: int) -> None:
+        """Send some of what was found, unless the page means an earlier search."""
+        if self._found is not None and self._found.number == number:
+            self._answer({"log": self._found.part(first)})
 
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from backbone.log_question import LONGEST_WORDS
 from backbone.ranges import EXACT
 from ui_console.consent import MAX_WHY
 from ui_console.web.door import Beat, Hello, ShortText
@@ -16,12 +17,18 @@ from ui_console.web.door import Beat, Hello, ShortText
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
 
+Numbered = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
 class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="drive"):
-    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be said again meanwhile."""
+    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be said again meanwhile.
 
+    Attributes:
+        moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
+    """
+
+    moment: Numbered
     forward: Share
     right: Share
     speed_rad_s: Annotated[float, msgspec.Meta(ge=0.0, le=MOST_RAD_S)]
@@ -32,7 +39,13 @@ class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fi
 
 
 class JumpOnce(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="jump"):
-    """Jump."""
+    """Jump.
+
+    Attributes:
+        moment: As in ``Steer``.
+    """
+
+    moment: Numbered
 
 
 class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="take"):
@@ -75,7 +88,7 @@ class LiftStop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
     """Let a robot move again: the stop of this number, which was seen on the page."""
 
     robot: ShortText
-    number: Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
+    number: Numbered
 
 
 class Watch(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="watch"):
@@ -95,6 +108,40 @@ class AskWhy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
     """Say why something is as it is."""
 
     name: ShortText
+
+
+class SearchLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log"):
+    """Find this in the mission's log; empty fields match all.
+
+    Attributes:
+        number: Comes back with what was found.
+        text: Words that stand in the event.
+        robot: Only what is about this name.
+        person: Only what this person did, or what speaks of them.
+        level: Only what matters at least so much.
+        since: Not before this moment, as people type it.
+        until: Not after it.
+    """
+
+    number: Numbered
+    text: Annotated[str, msgspec.Meta(max_length=LONGEST_WORDS)] = ""
+    robot: ShortText = ""
+    person: ShortText = ""
+    level: ShortText = ""
+    since: ShortText = ""
+    until: ShortText = ""
+
+
+class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="more_log"):
+    """Hand out the next part of what was found.
+
+    Attributes:
+        number: Of the search.
+        first: How many events of it the page has.
+    """
+
+    number: Numbered
+    first: Numbered
 
 
 class Acknowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="acknowledge"):
@@ -138,6 +185,8 @@ Intent = (
     | Watch
     | Drawn
     | AskWhy
+    | SearchLog
+    | MoreLog
     | Acknowledge
     | AskParameters
     | SetParameter

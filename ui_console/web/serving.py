@@ -10,7 +10,6 @@ from ssl import SSLContext
 
 import msgspec
 
-from backbone import run_files
 from backbone.bus.interface import Bus
 from backbone.cli import ExitCode, say
 from backbone.component.launch import Launch
@@ -35,12 +34,14 @@ class Site:
         port: Port; 0: any that is free.
         certificate: PEM file; empty: the page is not encrypted.
         key: PEM file with its key; empty: it is in the certificate's file.
+        has_new_tokens: Whether the tokens of the server before at this port are forgotten.
     """
 
     host: str
     port: int
     certificate: str
     key: str
+    has_new_tokens: bool
 
     @property
     def encryption(self) -> SSLContext | None:
@@ -51,13 +52,19 @@ class Site:
         """
         return encryption_with(self.certificate, self.key) if self.certificate else None
 
-    def print_addresses(self, port: int, passes: Mapping[str, Pass]) -> None:
-        """Print the page's address for each token.
+    def passes_with(self, tokens: TokenFile | None, passes: Mapping[str, Pass]) -> Mapping[str, Pass]:
+        """Return what opens the server: the tokens of the server before, where they are kept and wanted."""
+        return passes if tokens is None or self.has_new_tokens else kept_or_new(passes, tokens.read())
+
+    def opened(self, port: int, tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:
+        """Keep the tokens for the next server, and print the page's address for each.
 
         Args:
             port: At which browsers can come.
+            tokens: Where the tokens are kept; None: nowhere.
             passes: Token → whose it is.
         """
+        _keep(tokens, passes)
         scheme = "https" if self.certificate else "http"
         for token, granted in passes.items():
             who = f"{granted.user}: " if granted.user else ""
@@ -82,9 +89,7 @@ class Claims:
     away_after_s: float
 
 
-async def serve_console(
-    where: Where, passes: Mapping[str, Pass], site: Site, claims: Claims, *, has_new_tokens: bool
-) -> int:
+async def serve_console(where: Where, passes: Mapping[str, Pass], site: Site, claims: Claims) -> int:
     """Serve the console until a signal ends it; return the command's exit code.
 
     Args:
@@ -92,7 +97,6 @@ async def serve_console(
         passes: Token → whose it is.
         site: Where it is served.
         claims: What operators claim.
-        has_new_tokens: Whether the tokens of the server before at this port are forgotten.
 
     Raises:
         CannotListen: The address cannot be had.
@@ -101,9 +105,8 @@ async def serve_console(
     encryption = site.encryption
     joining = await join(where)
     launch = msgspec.structs.replace(joining.launch, name=f"web-{os.getpid()}")
-    tokens = _token_file(launch.mission, site) if where.connect is None else None
-    if tokens is not None and not has_new_tokens:
-        passes = kept_or_new(passes, tokens.read())
+    tokens = _tokens_of_mission(where, launch.mission, joining.secret, site.port)
+    passes = site.passes_with(tokens, passes)
 
     async def one_more(launch: Launch) -> Bus:
         return await joining.open_bus(launch)
@@ -111,22 +114,22 @@ async def serve_console(
     bus = await one_more(launch)
     hub = WebHub(launch, bus, joining.clock, one_more, kind=claims.kind, away_after_s=claims.away_after_s)
     interrupted = end_server_on_signals(hub.observer.end)
-
-    def ready(port: int) -> None:
-        _keep(tokens, passes)
-        site.print_addresses(port, passes)
-
+    server = WebServer(hub, Doorkeeper(passes))
     try:
-        await WebServer(hub, Doorkeeper(passes)).run(site.host, site.port, ready, encryption)
+        await server.run(site.host, site.port, lambda port: site.opened(port, tokens, passes), encryption)
     except CannotListen:
         await bus.close()
         raise
     return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
 
 
-def _token_file(mission: str, site: Site) -> TokenFile | None:
-    """Return where the tokens are kept; None: nowhere, for no open page can come back to a port that nobody chose."""
-    return TokenFile(run_files.run_directory(mission), site.port) if site.port else None
+def _tokens_of_mission(where: Where, mission: str, secret: str, port: int) -> TokenFile | None:
+    """Return where the tokens of a console's page are kept; None: nowhere, see ``token_file``."""
+    if not port:
+        return None
+    if where.connect is None:
+        return TokenFile.of_mission_here(mission, port)
+    return TokenFile.of_mission_elsewhere(mission, where.connect, secret, port)
 
 
 def _keep(tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:

@@ -1,11 +1,18 @@
-"""Tokens that outlive the server: beside the run files of its mission, for this user alone.
+"""Tokens that outlive the server, for this user alone.
 
-A server that begins again at the same port knows the pages that are still open, and they come back by themselves. The
-file ends with the mission.
+A server that begins again at the same port knows the pages that are still open, and they come back by themselves. Where
+the tokens lie decides when they end:
+
+* A mission on this machine: beside its run files, which end with it.
+* A mission elsewhere: named after its hub and the secret of its run, so that the next run finds none.
+* A designer: named after the mission file; they end with the login session.
+* Port 0: nowhere. A page belongs to the port it came from, and no open page finds a port that nobody chose.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 import stat
 from collections.abc import Mapping
@@ -13,11 +20,13 @@ from pathlib import Path
 
 import msgspec
 
+from backbone import run_files
 from backbone.atomic_file import replace_file
 from backbone.errors import Refusal
 from ui_console.web.door import Pass
 
 MODE = 0o600
+DIGITS = 16  # chosen: 64 bits; no two missions of one user have the same
 
 
 class TokensNotKept(Refusal):
@@ -31,12 +40,28 @@ class TokenFile:
     """The tokens of the server at one port.
 
     Args:
-        folder: Of the mission's run files.
+        folder: Of the mission's run files, or of what is kept for others.
         port: Of the server.
+        of: What is served, where the folder is not only for that.
     """
 
-    def __init__(self, folder: Path, port: int) -> None:
-        self.path = folder / f"web-{port}.json"
+    def __init__(self, folder: Path, port: int, of: str = "") -> None:
+        self.path = folder / f"web-{of}{port}.json"
+
+    @classmethod
+    def of_mission_here(cls, mission: str, port: int) -> TokenFile:
+        """Return the tokens of a mission that is up on this machine."""
+        return cls(run_files.run_directory(mission), port)
+
+    @classmethod
+    def of_mission_elsewhere(cls, mission: str, endpoint: str, secret: str, port: int) -> TokenFile:
+        """Return the tokens of one run of a mission whose hub is reached over the network."""
+        return cls(run_files.kept_directory(), port, _digest(mission, endpoint, secret))
+
+    @classmethod
+    def of_design(cls, source: str, port: int) -> TokenFile:
+        """Return the tokens of the designer of a mission file."""
+        return cls(run_files.kept_directory(), port, _digest(str(Path(source).resolve())))
 
     def read(self) -> dict[str, Pass]:
         """Return the tokens of the server before; none if there was none, or somebody else could have read them."""
@@ -65,6 +90,11 @@ class TokenFile:
             replace_file(self.path, msgspec.json.encode(dict(passes)), is_lasting=False)
         except OSError as error:
             raise TokensNotKept(f"{self.path}: {error.strerror or error}", path=str(self.path)) from error
+
+
+def _digest(*of: str) -> str:
+    """Return a short name that tells these from others and says nothing of them."""
+    return f"{hashlib.sha256(json.dumps(of).encode()).hexdigest()[:DIGITS]}-"
 
 
 def kept_or_new(new: Mapping[str, Pass], before: Mapping[str, Pass]) -> dict[str, Pass]:

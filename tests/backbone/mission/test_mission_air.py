@@ -7,8 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.reader import read_mission
-from backbone.mission.schema import vocabulary
 from scout_model.description import AS_THE_PAPERS, AirDescription, WorldDescription
 
 SMALL = Path(__file__).parent / "small.xml"

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.document import MAX_BYTES
 from backbone.mission.edit import EditRefused, NewElement, Node, add, move, outline, remove, set_attribute
 from backbone.mission.reader import MissionInvalid
-from backbone.mission.schema import vocabulary
 
-MISSION = (FilePath(__file__).parents[3] / "mission.xml").read_bytes()
+MISSION = (FilePath(__file__).parent / "everything_declared.xml").read_bytes()
 SMALL = b"""<?xml version="1.0"?>
 <!-- before -->
 <mission name="m" priority="1">

@@ -1,5 +1,6 @@
 """A mission file is read whole or refused whole, with every fault at its place."""
 
+import json
 import math
 import re
 from pathlib import Path
@@ -8,11 +9,15 @@ import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from record_messages import MESSAGES, messages
 
 from backbone.mission.behavior_orders import behavior_orders
+from backbone.mission.declaration.elements import HUB_PORT
 from backbone.mission.document import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS
-from backbone.mission.model import HUB_PORT, MissionDescription
+from backbone.mission.model import MissionDescription
 from backbone.mission.reader import Fault, MissionInvalid, read_mission
+from backbone.mission.shipped_types import shipped_text, shipped_types
+from backbone.mission.tables import CORE_SERVICES, parameter_value
 from backbone.naming import MAX_NAME_LENGTH
 from scout_model.description import WorldDescription
 
@@ -20,6 +25,7 @@ HERE = Path(__file__).parent
 SMALL = HERE / "small.xml"
 BROKEN = sorted((HERE / "broken").glob("*.xml"))
 MISSION_XML = HERE.parents[2] / "mission.xml"
+SMALLEST = HERE.parents[2] / "docs" / "examples" / "smallest.xml"
 
 
 def faults_of(path: Path | str) -> list[Fault]:
@@ -79,6 +85,11 @@ def test_an_invalid_mission_tells_every_fault_one_a_line() -> None:
     lines = str(caught.value).splitlines()
     assert len(lines) == len(caught.value.faults) == 8
     assert lines[1] == f"{path}:19:28: no host is named 'bse' (did you mean 'base'?) (There is: base)"
+
+
+def test_every_message_is_one_that_was_read_and_found_good() -> None:
+    """A message that changes shows in ``messages.json``, once ``record_messages.py`` has run."""
+    assert messages() == json.loads(MESSAGES.read_text())
 
 
 # ---------------------------------------------------------------------- files that are no mission at all
@@ -158,7 +169,7 @@ def test_columns_count_characters_not_bytes(tmp_path: Path) -> None:
 
 
 def test_an_attribute_is_found_though_another_value_looks_like_it(tmp_path: Path) -> None:
-    text = changed(('<parameter name="threshold" value="12"/>', "<parameter value=' name=\"x\" ' name='no name'/>"))
+    text = changed(('<parameter name="view_s" value="12"/>', "<parameter value=' name=\"x\" ' name='no name'/>"))
     [fault] = faults_in(tmp_path, text)
     assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith("name='no name'")
 
@@ -224,9 +235,8 @@ def test_a_simulated_resource_is_told_its_world_a_real_one_is_not(tmp_path: Path
         ("", ""),
     ],
 )
-def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(tmp_path: Path, written: str, value: object) -> None:
-    description = read_text(tmp_path, changed(('name="threshold" value="12"', f'name="threshold" value="{written}"')))
-    read = description.behaviors[0].parameters["threshold"]
+def test_a_parameter_is_a_number_or_truth_value_if_it_reads_as_one(written: str, value: object) -> None:
+    read = parameter_value(written)
     assert (read, type(read)) == (value, type(value))
 
 
@@ -283,15 +293,60 @@ def test_classes_on_other_machines_are_not_looked_for_here(tmp_path: Path) -> No
         ('address="127.0.0.1"', 'address="192.0.2.1"'),
         ("  </hosts>", '    <host name="attic" address="192.0.2.7"/>\n  </hosts>'),
         ("<core>", '<core><service type="creator" host="attic"/>'),
-        ('name="watch" class="backbone.component.component:Component"', 'name="watch" class="only_there.watch:Watch"'),
+        ('class="mission_control.behaviors.watch_for_motion:WatchForMotion"', 'class="only_there.watch:Watch"'),
     )
-    assert read_text(tmp_path, text).types[-1].class_path == "only_there.watch:Watch"
+    assert "only_there.watch:Watch" in {kind.class_path for kind in read_text(tmp_path, text).types}
 
 
 def test_an_arc_whose_name_would_be_too_long_is_refused(tmp_path: Path) -> None:
     long = "w" * (MAX_NAME_LENGTH - len("-drive") + 1)
     [fault] = faults_in(tmp_path, changed(('name="watch2"', f'name="{long}"')))
     assert "too long" in fault.message
+
+
+# ---------------------------------------------------------------------- what need not be written
+MINIMAL = '<mission name="m" priority="1"/>'
+
+
+def test_a_mission_of_one_element_has_a_host_the_core_services_and_the_shipped_types(tmp_path: Path) -> None:
+    mission = read_text(tmp_path, MINIMAL)
+    assert [(host.name, host.address) for host in mission.hosts] == [("base", "127.0.0.1")]
+    assert [(service.type, service.host) for service in mission.core] == [(name, "base") for name in CORE_SERVICES]
+    assert [kind.name for kind in mission.types] == [kind.text("name") for kind in shipped_types()]
+    assert (mission.resources, mission.components, mission.behaviors) == ((), (), ())
+
+
+def test_old_files_that_declare_everything_say_the_same(tmp_path: Path) -> None:
+    services = "".join(f'<service type="{name}" host="base"/>' for name in CORE_SERVICES)
+    types = shipped_text().decode().partition("<types>")[2].partition("</types>")[0]
+    old = f'<mission name="m" priority="1"><core>{services}</core><types>{types}</types></mission>'
+    assert read_text(tmp_path, old) == read_text(tmp_path, MINIMAL)
+    declared, short = read_mission(HERE / "everything_declared.xml"), read_mission(MISSION_XML)
+    assert declared.model_copy(update={"source": short.source}) == short
+
+
+def test_a_type_takes_the_place_of_the_shipped_one_of_its_name(tmp_path: Path) -> None:
+    own = '<type name="drive" class="backbone.component.component:Component" subsystem="resource_pool"/>'
+    mission = read_text(tmp_path, f'<mission name="m" priority="1"><types>{own}</types></mission>')
+    [drive] = [kind for kind in mission.types if kind.name == "drive"]
+    assert (drive.class_path, drive.needs, drive.restart) == ("backbone.component.component:Component", [], True)
+
+
+def test_every_host_runs_a_creator_and_the_first_the_other_services(tmp_path: Path) -> None:
+    hosts = '<host name="one" address="192.0.2.1"/><host name="two" address="192.0.2.2"/>'
+    rules = '<service type="rc_manager"><parameter name="grid_s" value="4"/></service>'
+    text = f'<mission name="m" priority="1"><core>{rules}</core><hosts>{hosts}</hosts></mission>'
+    mission = read_text(tmp_path, text)
+    assert [service.host for service in mission.core if service.type == "creator"] == ["one", "two"]
+    assert {service.host for service in mission.core if service.type != "creator"} == {"one"}
+    assert mission.core_parameters("rc_manager") == {"grid_s": 4}
+
+
+def test_the_shipped_missions_say_only_what_is_their_own() -> None:
+    assert len(MISSION_XML.read_text().splitlines()) <= 75
+    assert len(SMALLEST.read_text().splitlines()) <= 15
+    for file in (MISSION_XML, *SMALLEST.parent.glob("*.xml")):
+        assert not re.search("<core>|<types>", file.read_text()), file
 
 
 # ---------------------------------------------------------------------- the mission at the top of the project

@@ -10,12 +10,12 @@ import pytest
 from backbone.component.launch import Launch
 from backbone.core_launches import UpOptions, core_launches
 from backbone.dry_run import dry_run
-from backbone.mission.core_checks import descriptions
+from backbone.mission.class_facts import parameters_of
 from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
-from backbone.rc_manager.rules import SchedulingRules, values_of
 from backbone.rc_manager.service import RcManagerParameters
+from backbone.scheduling.rules import SchedulingRules, values_of
 
 HERE = Path(__file__).parent
 SMALL = HERE / "small.xml"
@@ -77,7 +77,8 @@ def test_a_dry_run_goes_by_the_rules_of_the_file(tmp_path: Path) -> None:
 
 def test_the_reference_tells_every_rule_with_its_default_and_meaning() -> None:
     told = REFERENCE.read_text()
-    meanings = descriptions(SchedulingRules)
+    meanings = {one.name: one.doc for one in parameters_of(SchedulingRules)}
     for rule in msgspec.structs.fields(SchedulingRules):
         assert meanings[rule.name]
-        assert f"| `{rule.name}` | `{rule.default}` | {meanings[rule.name]} |" in told
+        default = f"{rule.default:g}" if isinstance(rule.default, float) else rule.default
+        assert f"| `{rule.name}` | `{default}` | {meanings[rule.name]}; " in told

@@ -85,7 +85,7 @@ def test_a_room_of_ones_own_travels_with_the_mission(tmp_path: Path) -> None:
         ('<mujoco><asset>\n<texture name="t" file="t.png"/></asset></mujoco>', "needs the file 't.png' in line 2"),
         ("<!DOCTYPE mujoco><mujoco/>", "document type declaration"),
         ("<mujoco/>" + " " * MAX_BYTES, "is larger than"),
-        ("\udcff", "not well-formed XML"),
+        ("\udcff", "no UTF-8"),
     ],
 )
 def test_a_room_file_that_cannot_be_used_is_refused_with_a_remedy(tmp_path: Path, content: str, told: str) -> None:

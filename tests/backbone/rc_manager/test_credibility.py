@@ -15,16 +15,9 @@ from backbone.bus.clock import run_virtual
 from backbone.dependency_database.messages import Resource
 from backbone.keys import Conversation
 from backbone.rc_manager.credibility import contradiction
-from backbone.rc_manager.messages import (
-    ADDRESS,
-    AskWhy,
-    Holder,
-    RcState,
-    RequestState,
-    Scheduled,
-    Why,
-    most_epoch,
-)
+from backbone.rc_manager.messages import ADDRESS, AskWhy, RcState, most_epoch
+from backbone.scheduling.requests import Holder, RequestState, Scheduled
+from backbone.scheduling.views import Why
 from backbone.wire import MalformedMessage
 
 VIDEO = Resource("video", "video_frequency")

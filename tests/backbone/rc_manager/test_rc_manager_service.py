@@ -28,13 +28,11 @@ from backbone.placer.messages import Start
 from backbone.rc_manager.messages import (
     ADDRESS,
     BEAT_EVERY_S,
-    LEASE_S,
     AskRc,
     AskRequest,
     AskSchedule,
     AskWhy,
     Beat,
-    CapacityExceeded,
     CloseGate,
     Connect,
     Connected,
@@ -45,25 +43,28 @@ from backbone.rc_manager.messages import (
     GateClosed,
     GateOpens,
     Held,
-    Holder,
     OpenGate,
-    PathNode,
     RcState,
-    RcUse,
-    RequestState,
-    Schedule,
-    Scheduled,
-    SchedulingRequest,
     SetIdle,
     SetPriority,
     StaleEpoch,
-    UnknownRc,
-    UnknownRequest,
-    Usage,
-    Why,
     Withdraw,
 )
 from backbone.rc_manager.service import RcManager
+from backbone.scheduling.requests import (
+    LEASE_S,
+    CapacityExceeded,
+    Holder,
+    PathNode,
+    RcUse,
+    RequestState,
+    Scheduled,
+    SchedulingRequest,
+    UnknownRc,
+    UnknownRequest,
+    Usage,
+)
+from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope, Message
 
 HARDWARE = [

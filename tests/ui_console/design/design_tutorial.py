@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node
-from ui_console.design.catalogue import ClassFacts, ParameterFacts
 from ui_console.design.commands import Add, AddBehavior, AddResource, AddWorld, Claim, SetValue
 from ui_console.design.draft import Draft
 
 WATCH = "mission_control.behaviors.watch_for_motion:WatchForMotion"
+VIEW_S = {"type": "number", "minimum": 0, "default": 0.0}
 FACTS = {
-    WATCH: ClassFacts(
-        "Looks for motion.",
-        (ParameterFacts("view_s", "number", "0.0", "at least 0", "For how long what moves is in view."),),
-    )
+    WATCH: ClassFacts("Looks for motion.", (ParameterFacts("view_s", VIEW_S, "For how long what moves is in view."),))
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -70,6 +71,42 @@ def test_the_designer_loads_neither_opencv_nor_mujoco_nor_textual() -> None:
     )
     done = subprocess.run([sys.executable, "-c", check], check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.processes
+def test_a_designer_that_begins_again_at_its_port_has_the_same_token(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "runtime"))
+    (tmp_path / "runtime").mkdir()
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    command = [
+        sys.executable,
+        "-m",
+        "ui_console.cli",
+        "serve",
+        "--design",
+        str(tmp_path / "mission.xml"),
+        "--port",
+        port,
+    ]
+    told = []
+    for more in ([], [], ["--new-tokens"]):
+        process = subprocess.Popen([*command, *more], stdout=subprocess.PIPE, text=True)
+        try:
+            assert process.stdout is not None
+            told.append(process.stdout.readline())
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+            process.wait(10)
+            process.stdout.close()
+    assert told[0] == told[1]
+    assert told[0].startswith(f"http://127.0.0.1:{port}/#token=")
+    assert told[2] != told[0]
 
 
 @pytest.mark.processes

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from backbone.errors import Refusal
+from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node, outline
 from backbone.mission.reader import MissionInvalid, read_mission
 from ui_console.design.catalogue import Role, entries, stock
@@ -38,6 +39,7 @@ from ui_console.design.properties import properties
 from ui_console.design.views import element_view, problems_view, tree_view
 
 ROOT = Path(__file__).parents[3]
+EVERYTHING_DECLARED = ROOT / "tests" / "backbone" / "mission" / "everything_declared.xml"
 SHIPPED = [ROOT / "mission.xml", ROOT / "docs" / "examples" / "behaviors.xml"]
 COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 
@@ -199,17 +201,17 @@ def test_two_watchers_are_built_from_nothing_and_take_turns() -> None:
     assert max(turns.values()) - min(turns.values()) <= 1
 
 
-def test_the_projects_own_list_is_what_its_missions_write() -> None:
+def test_the_shipped_types_are_those_that_an_old_file_declares() -> None:
     written = {
         one.text("name"): (one.attributes, [needed.attributes for needed in one.all("needs")])
-        for file in SHIPPED
+        for file in [EVERYTHING_DECLARED]
         for one in Draft.opened(str(file)).mission.first("types").all("type")  # type: ignore[union-attr]
     }
     listed = {
         one.text("name"): (one.attributes, [needed.attributes for needed in one.all("needs")])
         for one in stock().first("types").all("type")  # type: ignore[union-attr]
     }
-    assert listed == {name: written[name] for name in listed}
+    assert written == {name: listed[name] for name in written}
     modules = {path.stem for path in (ROOT / "mission_control" / "behaviors").glob("*.py")}
     assert {entry.name for entry in entries(stock()) if entry.role is Role.BEHAVIOR} <= modules
 
@@ -255,17 +257,16 @@ def test_to_rename_a_robot_renames_what_speaks_of_it() -> None:
     ("tag", "old"), [("host", "base"), ("type", "scout"), ("type", "capture"), ("world", "world"), ("type", "placer")]
 )
 def test_to_rename_anything_keeps_the_mission_fine(tag: str, old: str) -> None:
-    draft = Draft.opened(str(SHIPPED[0]))
+    draft = Draft.opened(str(EVERYTHING_DECLARED))
     after = draft.do(Rename(only(draft, tag, old).path, "renamed"))
     assert [fault for fault in after.problems if "core service" not in fault.message and tag != "type"] == []
     assert after.do(Rename(only(after, tag, "renamed").path, old)).text == draft.text
 
 
-def test_a_claim_replaces_the_one_before_and_declares_what_it_needs() -> None:
+def test_a_claim_replaces_the_one_before_and_declares_no_shipped_type() -> None:
     draft = designed(AddBehavior((), "patrol", "guard"))
     draft = draft.do(Claim(draft.step.touched, "drive", "5"))
-    names = {one.text("name") for one in draft.mission.first("types").all("type")}  # type: ignore[union-attr]
-    assert {"patrol", "drive", "scout", "command_radio"} <= names
+    assert draft.mission.first("types") is None
     draft = draft.do(Claim(draft.step.touched[:-1], "capture", "7"))
     (arc,) = [node for node in draft.mission if node.tag == "arc"]
     assert (arc.text("kind"), arc.text("minimum-runtime-s")) == ("capture", "7")
@@ -402,3 +403,19 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
     for node in draft.mission:
         element_view(draft, node.path, {})
     assert draft.problems or draft.rehearsal is not None
+
+
+def test_parameters_of_shipped_classes_are_judged_and_of_others_once_they_were_looked_up() -> None:
+    draft = watchers()
+    wrong = draft.do(SetParameter(only(draft, "behavior", "watch-scout1").path, "veiw_s", "6"))
+    assert [fault.message for fault in wrong.problems] == [
+        "watch_for_motion has no parameter 'veiw_s' (did you mean 'view_s'?)"
+    ]
+    own = {"name": "own", "class": "backbone.naming:Subsystem", "subsystem": "mission_control"}
+    draft = draft.do(Add((), NewElement("types", {}, [NewElement("type", own)])))
+    draft = draft.do(AddBehavior((), "own", "mine")).do(SetParameter((4, 1), "depth_m", "deep"))
+    assert draft.problems == ()
+    depth = ParameterFacts("depth_m", {"type": "number", "default": 1.0})
+    known = draft.knowing({"backbone.naming:Subsystem": ClassFacts(parameters=(depth,))})
+    assert [fault.message for fault in known.problems] == ["depth_m='deep' is illegal"]
+    assert known.undo().redo().problems == known.problems

@@ -17,7 +17,7 @@ from msgspec import DecodeError
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from ui_console.design.catalogue import ClassFacts
+from backbone.mission.class_facts import ClassFacts
 from ui_console.design.draft import Draft
 from ui_console.design.keeping import path_of_draft
 from ui_console.design.protocol import DesignIntent, Select, understand_designer
@@ -282,6 +282,7 @@ async def test_a_draft_that_cannot_be_kept_is_told(tmp_path: Path) -> None:
 async def test_classes_are_looked_up_only_if_the_file_named_them_when_the_server_began(file: Path) -> None:
     async with serving(file) as served, served.page() as anna:
         await anna.wait(lambda: all(row["is_known"] for row in anna.view["palette"] if row["type"]), "stock looked up")
+        assert await anna.change(do="take", path=[], label="types") is None
         section = anna.path("types")
         answers = ["spy", "somebody.elses:Spy", "mission_control"]
         assert await anna.change(do="take", path=section, label="type", answers=answers) is None

@@ -22,8 +22,8 @@ from typer.testing import CliRunner
 from websockets.asyncio.client import connect
 from websockets.exceptions import InvalidMessage
 
+from backbone.mission.class_facts import ClassFacts
 from ui_console.cli import app
-from ui_console.design.catalogue import ClassFacts
 from ui_console.design.room import DesignRoom
 from ui_console.design.server import DesignServer, begin
 from ui_console.web.door import Doorkeeper, Pass

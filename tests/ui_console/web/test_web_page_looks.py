@@ -186,3 +186,28 @@ async def test_by_keyboard_alone_a_robot_is_taken_stopped_lifted_and_released(st
         await page.locator("#release").focus()
         await keyboard.press("Enter")
         await page.wait_for_selector("body[data-held='']")
+
+
+COVERED = """() => {
+  const ends = [0, document.documentElement.scrollHeight];
+  const controls = [...document.querySelectorAll("button, input, select, [tabindex]")];
+  const isAt = (one, box, share) => {
+    const found = document.elementFromPoint(box.x + box.width / 2, box.y + share * box.height);
+    return found === one || one.contains(found) || found?.contains(one);
+  };
+  return controls.filter((one) => one.checkVisibility() && !one.disabled).flatMap((one) => ends.flatMap((end) => {
+    document.activeElement.blur();
+    scrollTo(0, end);
+    one.focus();
+    const box = one.getBoundingClientRect();
+    const isSeen = [0.2, 0.5, 0.8].some((share) => isAt(one, box, share));
+    return isSeen ? [] : [`${one.id || one.textContent || one.className}, from ${end}`];
+  }));
+}"""
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_what_gets_the_focus_is_not_hidden_below_what_stays_on_the_screen(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        await take(page)
+        assert await page.evaluate(COVERED) == []

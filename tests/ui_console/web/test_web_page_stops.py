@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 
 import pytest
-from web_browser import Finger
+from web_browser import Cable, Finger
 from web_page import (
     ALL_SIZES,
     GAMEPAD,
@@ -20,7 +20,10 @@ from web_page import (
     wait_stopped,
     wait_until,
 )
-from web_stage import LOW, Stage
+from web_stage import ANYBODY, LOW, Stage
+
+from resource_pool.messages import Drive
+from ui_console.driving import STICK_LASTS_S
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 
@@ -209,6 +212,52 @@ async def test_keys_stop_one_and_all_whatever_has_the_focus(stage: Stage) -> Non
             assert await page.locator("#login-user").input_value() == "", "it is no letter here"
             for robot in robots:
                 robot.free()
+
+
+async def test_a_hold_from_before_a_stop_moves_nothing_however_late_it_arrives(stage: Stage) -> None:
+    async with (
+        Cable(stage.port).plugged_in() as cable,
+        stage.browser() as other,
+        page_at(stage, address=f"http://127.0.0.1:{cable.port}/#token={ANYBODY}") as page,
+    ):
+        await take(page)
+        wheels = Wheels(stage)
+        await page.keyboard.down("d")
+        await wheels.wait_turning()
+        cable.may_pass.clear()
+        await other.say(do="stop_robot", robot="scout1")
+        await wait_until(lambda: stage.robots["scout1"].is_stopped, "stopped")
+        stage.robots["scout1"].free()
+        await asyncio.sleep(STICK_LASTS_S + 0.1)
+        wheels.forget()
+        cable.may_pass.set()
+        await page.locator("#let-go").wait_for()
+        assert not any(isinstance(one, Drive) for one in wheels.news), "they were sent before the stop"
+        await wheels.assert_still("the key is still down")
+        await page.keyboard.up("d")
+        await page.keyboard.down("d")
+        await wheels.wait_turning()
+
+
+IN_REACH = """(words) => [...document.querySelectorAll("button.emergency")].some((button) => {
+  if (!button.checkVisibility() || !button.textContent.startsWith(words)) return false;
+  const box = button.getBoundingClientRect();
+  return document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2) === button;
+})"""
+
+
+@pytest.mark.parametrize("size", ALL_SIZES)
+async def test_a_dialog_leaves_red_buttons_of_one_and_of_all_in_reach_of_a_finger(stage: Stage, size: str) -> None:
+    async with page_at(stage, size) as page:
+        await take(page)
+        await page.evaluate("() => document.getElementById('reading').showModal()")
+        dialog = page.locator("dialog[open]")
+        for words, count in (("Stop scout1", 1), ("Stop all", 3)):
+            assert await page.evaluate(IN_REACH, words), words
+            button = dialog.get_by_role("button", name=words)
+            await (button.click() if size == "desktop" else button.tap())
+            await wait_until(lambda: sum(one.is_stopped for one in stage.robots.values()) == count, words)  # noqa: B023
+        assert await dialog.count() == 1, "the reading goes on"
 
 
 async def test_a_letter_that_stops_is_written_with_alt(stage: Stage) -> None:

@@ -35,7 +35,7 @@ async def test_who_takes_a_robot_drives_it_and_who_lets_go_stops_it(stage: Stage
         await anna.wait(lambda: anna.is_held, "held")
         assert anna.view["own"]["status"].startswith("you hold scout1")
         for _ in range(6):
-            await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=4.0)
+            await anna.drive(forward=1.0, right=0.0, speed_rad_s=4.0)
             await stage.clock.sleep_s(0.05)
         await anna.say(do="stop")
         await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))
@@ -58,11 +58,30 @@ async def test_when_nothing_is_heard_for_a_moment_the_wheels_stop_by_the_servers
     async with stage.browser() as anna:
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
-        await anna.say(do="drive", forward=1.0, right=0.5, speed_rad_s=4.0)
+        await anna.drive(forward=1.0, right=0.5, speed_rad_s=4.0)
         await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))
         count = len(stage.drives())
         await stage.clock.sleep_s(0.5)
         assert len(stage.drives()) == count, "one halt, then silence"
+
+
+async def test_a_press_from_before_a_stop_moves_nothing_after_the_lift(stage: Stage) -> None:
+    stage.grant_all()
+    stage.place_robots("scout1")
+    async with stage.browser() as anna:
+        await anna.say(do="take", robot="scout1")
+        await anna.wait(lambda: anna.is_held, "held")
+        pressed_at = anna.view["own"]["moment"]
+        stage.robots["scout1"].stop("ben", "")
+        await anna.wait(lambda: anna.view["own"]["stop"], "stopped")
+        stage.robots["scout1"].free()
+        await anna.wait(lambda: not anna.view["own"]["stop"], "free")
+        count = len(stage.drives())
+        await anna.say(do="drive", moment=pressed_at, forward=1.0, right=0.0, speed_rad_s=4.0)
+        await anna.say(do="jump", moment=pressed_at)
+        await anna.drive(forward=1.0, right=0.0, speed_rad_s=3.0)
+        await stage.placer.wait(lambda: len(stage.drives()) > count)
+        assert stage.drives()[count][1] == Drive(3.0, 3.0, after_stop=1), "it was pressed after the lift"
 
 
 async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back(stage: Stage) -> None:
@@ -71,7 +90,7 @@ async def test_a_browser_that_vanishes_stops_its_wheels_and_gives_the_robot_back
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
         [arc] = stage.placer.arcs.values()
-        await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=4.0)
+        await anna.drive(forward=1.0, right=0.0, speed_rad_s=4.0)
         await stage.placer.wait(lambda: arc.commands)
         anna.socket.transport.abort()
         await stage.placer.wait(lambda: arc.released)
@@ -213,14 +232,16 @@ async def test_others_do_not_notice_one_that_floods(stage: Stage) -> None:
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
         await flooder.send(json.dumps({"do": "hello", "token": LOW}))
-        flood = (flooder.send(b'{"do":"drive","forward":1,"right":0,"speed_rad_s":4}') for _ in range(20_000))
+        flood = (
+            flooder.send(b'{"do":"drive","moment":0,"forward":1,"right":0,"speed_rad_s":4}') for _ in range(20_000)
+        )
         with contextlib.suppress(ConnectionClosed):
             await all_in_turn(flood)
         async with asyncio.timeout(WITHIN_S):
             await flooder.wait_closed()
         assert flooder.close_code == CloseCode.POLICY_VIOLATION
         await anna.wait(lambda: anna.has_alarm("ben at 127.0.0.1 sent more than"), "alarm")
-        await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=3.0)
+        await anna.drive(forward=1.0, right=0.0, speed_rad_s=3.0)
         await stage.placer.wait(lambda: any(command == Drive(3.0, 3.0) for _at, command in stage.drives()))
 
 
@@ -322,7 +343,7 @@ async def test_when_the_page_is_no_longer_in_front_the_wheels_stop_and_alarms_ar
     async with stage.browser() as anna:
         await anna.say(do="take", robot="scout1")
         await anna.wait(lambda: anna.is_held, "held")
-        await anna.say(do="drive", forward=1.0, right=0.0, speed_rad_s=4.0)
+        await anna.drive(forward=1.0, right=0.0, speed_rad_s=4.0)
         await stage.placer.wait(stage.drives)
         await anna.say(do="here", is_there=False)
         await stage.placer.wait(lambda: any(isinstance(command, Halt) for _at, command in stage.drives()))

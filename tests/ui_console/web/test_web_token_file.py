@@ -10,11 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone import run_files
 from ui_console.web.door import Doorkeeper, Pass, passes_for
 from ui_console.web.token_file import TokenFile, TokensNotKept, kept_or_new
 
 ANNA, BEN = Pass("anna", 120), Pass("ben", 80)
 operators = st.dictionaries(st.sampled_from(["anna", "ben", "carla"]), st.integers(0, 200))
+
+
+@pytest.fixture
+def private(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path_factory.mktemp("runtime")
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
+    return folder
 
 
 @given(operators, operators)
@@ -71,3 +79,30 @@ def test_what_is_no_token_file_opens_nothing(tmp_path: Path, content: bytes) -> 
 def test_where_nothing_can_be_written_it_says_what_to_do(tmp_path: Path) -> None:
     with pytest.raises(TokensNotKept, match="gone"):
         TokenFile(tmp_path / "gone", 8420).keep({"one": ANNA})
+
+
+def test_tokens_of_a_mission_elsewhere_are_those_of_one_run_of_it(private: Path) -> None:
+    here = ("lab", "tcp/10.0.0.1:7447", "secret of this run", 8420)
+    TokenFile.of_mission_elsewhere(*here).keep({"one": ANNA})
+    assert TokenFile.of_mission_elsewhere(*here).read() == {"one": ANNA}
+    for other in (("lob", *here[1:]), (here[0], "tcp/10.0.0.2:7447", *here[2:]), (*here[:2], "of the next", 8420)):
+        assert TokenFile.of_mission_elsewhere(*other).read() == {}
+    [kept] = [path for path in private.rglob("*") if path.is_file()]
+    assert stat.S_IMODE(kept.stat().st_mode) == 0o600
+    assert stat.S_IMODE(kept.parent.stat().st_mode) == 0o700
+    assert "secret" not in str(kept)
+
+
+def test_tokens_of_a_designer_are_those_of_its_file_however_it_is_named(
+    private: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    TokenFile.of_design("mission.xml", 8420).keep({"one": ANNA})
+    assert TokenFile.of_design(str(tmp_path / "mission.xml"), 8420).read() == {"one": ANNA}
+    assert TokenFile.of_design("other.xml", 8420).read() == {}
+    assert not any(tmp_path.glob("*.json")), "nothing lies beside a file that may be shared"
+
+
+def test_what_is_kept_for_others_is_no_mission(private: Path) -> None:
+    TokenFile.of_design("mission.xml", 8420).keep({"one": ANNA})
+    assert run_files.find_all() == []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import struct
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -17,10 +17,15 @@ from websockets.exceptions import ConnectionClosed
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
+from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
+from backbone.mission_log import AskLog, AskPeople, MissionLog, PeopleKnown
+from backbone.mission_picture import LAUNCHER
 from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskSchedule, Holder, RcView, RequestState, RequestView, Schedule
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.requests import Holder, RequestState
+from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
 from resource_pool.stop_latch import StopLatch
@@ -63,6 +68,10 @@ class Browser:
 
     async def say(self, **message: Any) -> None:
         await self.socket.send(json.dumps(message))
+
+    async def drive(self, **stick: float) -> None:
+        """Say that the stick is held since now."""
+        await self.say(do="drive", moment=self.view["own"]["moment"], **stick)
 
     async def wait(self, holds: Callable[[], Any], what: str) -> None:
         """Return when this holds of what was heard so far."""
@@ -145,6 +154,7 @@ class Stage:
         self.port = 0
         self.robots: dict[str, FakeRobot] = {}
         self._network = network
+        self._launchers: list[Bus] = []
 
     @property
     def address(self) -> str:
@@ -158,6 +168,18 @@ class Stage:
             self.robots[name] = FakeRobot(bus, self.clock, name, self._stop_changed)
         self.publish_schedule(**dict.fromkeys(names, ""))
 
+    def keep_log(self, events: Iterable[StoryEvent]) -> None:
+        """Have a launcher that has kept these events."""
+        log, bus = MissionLog(), self._network.join(LAUNCHER, self.clock)
+        for event in events:
+            log.add(event)
+
+        async def answer(asked: Envelope[Any]) -> Message:
+            return log.told(asked.body) if isinstance(asked.body, AskLog) else PeopleKnown({})
+
+        bus.serve(LAUNCHER, AskLog | AskPeople, answer)
+        self._launchers.append(bus)
+
     def _stop_changed(self, latch: StopLatch) -> None:
         """Have the ARCs of a stopped robot refuse what moves it."""
         state = latch.state
@@ -168,6 +190,8 @@ class Stage:
                 arc.refusal = refusal if state.is_stopped else None
 
     async def close(self) -> None:
+        for launcher in self._launchers:
+            await launcher.close()
         for robot in self.robots.values():
             await robot.bus.close()
 

@@ -2,6 +2,8 @@
 
 import { set } from "./text.js";
 
+/** @import { Link } from "./link.js" */
+
 const LOOK_EVERY_MS = 250;
 
 /**
@@ -9,14 +11,27 @@ const LOOK_EVERY_MS = 250;
  * does not hear the mission counts as well: its page is connected, and stops nothing.
  */
 export class Blindness {
+  /**
+   * @param {{ link: Link, root: HTMLElement, title: Element, why: Element, areas: HTMLElement[],
+   *   stops: () => Iterable<HTMLButtonElement> }} given
+   */
   constructor({ link, root, title, why, areas, stops }) {
-    Object.assign(this, { link, root, title, why, areas, stops });
+    this.link = link;
+    this.root = root;
+    this.title = title;
+    this.why = why;
+    this.areas = areas;
+    this.stops = stops;
     this.hubAgeMs = -1;
     this.wasUp = false;
     setInterval(() => this.look(), LOOK_EVERY_MS);
   }
 
-  /** Since when the server does not hear the mission, in milliseconds; negative: it does. */
+  /**
+   * Since when the server does not hear the mission, in milliseconds; negative: it does.
+   *
+   * @param {number} ageMs
+   */
   hub(ageMs) {
     this.hubAgeMs = ageMs;
     this.look();
@@ -32,9 +47,12 @@ export class Blindness {
     for (const stop of this.stops()) stop.disabled = !isUp;
     if (!isBlind) return;
     set(this.title, !isUp ? "THIS PAGE CANNOT STOP A ROBOT" : "A STOP PRESSED HERE MAY NOT ARRIVE");
-    const since = (ageMs) => `${Math.max(1, Math.round(ageMs / 1000))} s`;
-    set(this.why, is === "fresh"
-      ? `The server has not heard the mission for ${since(this.hubAgeMs)}. What you see is older than that.`
-      : `Nothing was heard for ${since(this.link.ageMs)} (${this.link.why}). What you see is as old as that.`);
+    const since = (/** @type {number} */ ageMs) => `${Math.max(1, Math.round(ageMs / 1000))} s`;
+    set(
+      this.why,
+      is === "fresh"
+        ? `The server has not heard the mission for ${since(this.hubAgeMs)}. What you see is older than that.`
+        : `Nothing was heard for ${since(this.link.ageMs)} (${this.link.why}). What you see is as old as that.`,
+    );
   }
 }

@@ -1,8 +1,12 @@
 // One card for each robot: its newest picture, who has it, and what can be done about it. One of them is large.
 
+import { make } from "./dom.js";
 import { actWhenHeld } from "./holding.js";
 import { Screen } from "./pictures.js";
 import { lasting, set } from "./text.js";
+
+/** @import { OwnView, RobotView, StopView } from "./messages.d.ts" */
+/** @import { Act, Picture, Say } from "./types.d.ts" */
 
 const LOOK_EVERY_MS = 250;
 const HOLD = "hold to lift"; // what the model says of a stop that nobody else has a say in; the button says it
@@ -10,44 +14,70 @@ const MOST_WATCHED = 16; // what the server takes
 
 /** Shows all robots, one of them on the stage; `act(what, robot, more)` does what a person wants. */
 export class Cards {
+  /** @param {{ stage: HTMLElement, thumbs: HTMLElement, say: Say, act: Act }} given */
   constructor({ stage, thumbs, say, act }) {
-    Object.assign(this, { stage, thumbs, say, act });
+    this.stage = stage;
+    this.thumbs = thumbs;
+    this.say = say;
+    this.act = act;
+    /** @type {Map<string, Card>} */
     this.cards = new Map();
     this.chosen = "";
     this.large = "";
-    setInterval(() => { for (const card of this.cards.values()) card.look(performance.now()); }, LOOK_EVERY_MS);
+    setInterval(() => {
+      for (const card of this.cards.values()) card.look(performance.now());
+    }, LOOK_EVERY_MS);
   }
 
-  /** Show these robots; a card that was there stays, with its picture. */
+  /**
+   * Show these robots; a card that was there stays, with its picture.
+   *
+   * @param {RobotView[]} robots
+   * @param {Partial<OwnView>} own
+   * @param {Record<string, number>} drawn
+   */
   show(robots, own, drawn) {
     const names = robots.map((robot) => robot.robot);
     const gone = [...this.cards.keys()].filter((name) => !names.includes(name));
     const isNew = gone.length > 0 || names.some((name) => !this.cards.has(name));
-    for (const name of gone) { this.cards.get(name).root.remove(); this.cards.delete(name); }
-    for (const robot of robots) {
-      if (!this.cards.has(robot.robot)) this.add(robot.robot);
-      this.cards.get(robot.robot).fill(robot, own, drawn[robot.robot]);
+    for (const name of gone) {
+      this.cards.get(name)?.root.remove();
+      this.cards.delete(name);
     }
-    this.enlarge(names.includes(own.robot) ? own.robot : names.includes(this.chosen) ? this.chosen : (names[0] ?? ""));
+    for (const robot of robots) {
+      const card = this.cards.get(robot.robot) ?? this.add(robot.robot);
+      card.fill(robot, own, drawn[robot.robot]);
+    }
+    const wanted = [own.robot, this.chosen].find((name) => name !== undefined && names.includes(name));
+    this.enlarge(wanted ?? names[0] ?? "");
     if (isNew) this.watch();
   }
 
+  /** @param {string} name */
   add(name) {
+    /** @type {Act} */
     const act = (what, robot, more) => {
-      if (what === "enlarge") { this.chosen = name; this.enlarge(name); } else this.act(what, robot, more);
+      if (what === "enlarge") {
+        this.chosen = name;
+        this.enlarge(name);
+      } else this.act(what, robot, more);
     };
     const card = new Card({ name, act, drawn: (number) => this.say({ do: "drawn", robot: name, number }) });
     this.cards.set(name, card);
     this.thumbs.append(card.root);
+    return card;
   }
 
-  /** Show this one large; who was about to press something on a card still is. */
+  /**
+   * Show this one large; who was about to press something on a card still is.
+   *
+   * @param {string} name
+   */
   enlarge(name) {
-    if (name === this.large && this.stage.firstElementChild?.dataset.robot === name) return;
+    if (name === this.large && this.stage.firstElementChild?.getAttribute("data-robot") === name) return;
     this.large = name;
-    const focus = document.activeElement;
-    for (const one of [...this.cards.keys()].sort()) {
-      const { root } = this.cards.get(one);
+    const focus = /** @type {HTMLElement | null} */ (document.activeElement);
+    for (const [one, { root }] of [...this.cards].sort(([one], [other]) => (one < other ? -1 : 1))) {
       root.classList.toggle("is-large", one === name);
       (one === name ? this.stage : this.thumbs).append(root);
     }
@@ -58,15 +88,24 @@ export class Cards {
     this.say({ do: "watch", robots: [...this.cards.keys()].slice(0, MOST_WATCHED) });
   }
 
-  saw(picture) { this.cards.get(picture.robot)?.screen.saw(picture); }
+  /** @param {Picture} picture */
+  saw(picture) {
+    this.cards.get(picture.robot)?.screen.saw(picture);
+  }
 
-  /** The robot whose card has the focus, else the large one. */
+  /**
+   * The robot whose card has the focus, else the large one.
+   *
+   * @returns {string}
+   */
   get meant() {
-    return document.activeElement?.closest?.(".robot")?.dataset.robot ?? this.large;
+    return document.activeElement?.closest(".robot")?.getAttribute("data-robot") ?? this.large;
   }
 
   /** What is held down on a card counts no more. */
-  letGo() { for (const card of this.cards.values()) card.dropLift(); }
+  letGo() {
+    for (const card of this.cards.values()) card.dropLift();
+  }
 
   /** The connection ended: who has which robot is not known here. */
   cut() {
@@ -79,31 +118,17 @@ export class Cards {
 }
 
 class Card {
+  /** @param {{ name: string, act: Act, drawn: (number: number) => void }} given */
   constructor({ name, act, drawn }) {
-    Object.assign(this, { name, act });
+    this.name = name;
+    this.act = act;
+    /** @type {StopView | null} */
     this.stop = null;
     this.root = make("article", "robot");
     this.root.dataset.robot = name;
     this.root.setAttribute("aria-label", `robot ${name}`);
     this.screen = new Screen({ name, drawn });
-    this.screen.root.append(this.makeEnlarge(), this.makeStanding());
-    const top = make("div", "top");
-    const title = make("h2", "", name);
-    this.state = make("span", "state");
-    top.append(title, this.state);
-    this.holder = make("p", "holder");
-    this.root.append(this.screen.root, top, this.holder, this.makeButtons());
-  }
-
-  makeEnlarge() {
-    const button = this.button("", "enlarge");
-    button.className = "enlarge";
-    button.setAttribute("aria-label", `Show ${this.name} large`);
-    return button;
-  }
-
-  /** What stands over the picture of a stopped robot: whose stop it is, and far from every Stop what lifts it. */
-  makeStanding() {
+    // What stands over the picture of a stopped robot: whose stop it is, and far from every Stop what lifts it.
     this.standing = make("div", "standing");
     this.standing.hidden = true;
     this.whose = make("p", "whose");
@@ -114,12 +139,25 @@ class Card {
       if (this.stop) this.act("lift", this.name, { number: this.stop.number });
     });
     this.standing.append(this.whose, this.lift, this.needs);
-    return this.standing;
+    this.screen.root.append(this.makeEnlarge(), this.standing);
+    const top = make("div", "top");
+    const title = make("h2", "", name);
+    this.state = make("span", "state");
+    top.append(title, this.state);
+    this.holder = make("p", "holder");
+    this.take = this.button("Take over", "take");
+    this.root.append(this.screen.root, top, this.holder, this.makeButtons());
+  }
+
+  makeEnlarge() {
+    const button = this.button("", "enlarge");
+    button.className = "enlarge";
+    button.setAttribute("aria-label", `Show ${this.name} large`);
+    return button;
   }
 
   makeButtons() {
     const row = make("div", "row");
-    this.take = this.button("Take over", "take");
     const stop = this.button("Stop", "stop_robot");
     stop.className = "emergency";
     stop.setAttribute("aria-label", `Stop ${this.name}`);
@@ -129,6 +167,10 @@ class Card {
     return row;
   }
 
+  /**
+   * @param {string} label
+   * @param {string} what
+   */
   button(label, what) {
     const made = make("button", "", label);
     made.type = "button";
@@ -136,6 +178,11 @@ class Card {
     return made;
   }
 
+  /**
+   * @param {RobotView} robot
+   * @param {Partial<OwnView>} own
+   * @param {number} [latency_s]
+   */
   fill(robot, own, latency_s) {
     this.screen.latencyMs = 1000 * (latency_s ?? 0);
     this.root.classList.toggle("is-mine", robot.is_mine);
@@ -148,9 +195,10 @@ class Card {
     set(this.holder, who ? `${who}: ${robot.feedback || robot.because}${next}` : robot.feedback + next);
     const isWanted = own.is_asked && own.robot === this.name;
     set(this.take, robot.is_mine ? "Yours" : isWanted ? "Waiting…" : "Take over");
-    this.take.disabled = robot.is_mine || isWanted;
+    this.take.disabled = robot.is_mine || isWanted === true;
   }
 
+  /** @param {StopView | null} stop */
   fillStop(stop) {
     if (stop?.number !== this.stop?.number) this.dropLift(); // what is held was meant for another stop
     this.stop = stop;
@@ -164,12 +212,8 @@ class Card {
     this.lift.setAttribute("aria-label", `Hold to lift the stop of ${this.name} by ${whom}`);
   }
 
-  look(now) { this.root.classList.toggle("is-stale", this.screen.look(now)); }
-}
-
-function make(tag, className, text = "") {
-  const made = document.createElement(tag);
-  if (className) made.className = className;
-  if (text) made.textContent = text;
-  return made;
+  /** @param {number} now */
+  look(now) {
+    this.root.classList.toggle("is-stale", this.screen.look(now));
+  }
 }

@@ -7,7 +7,8 @@ const find = (id) => document.getElementById(id);
  * `refused` says why earlier answers were not taken.
  */
 export function ask(title, doc, asks, refused = "") {
-  const dialog = find("ask"), form = dialog.querySelector("form");
+  const dialog = find("ask"),
+    form = dialog.querySelector("form");
   find("ask-title").textContent = title;
   find("ask-doc").textContent = doc;
   find("ask-refused").textContent = refused;
@@ -20,7 +21,10 @@ export function ask(title, doc, asks, refused = "") {
       dialog.close();
       resolve(answers);
     };
-    form.onsubmit = (event) => { event.preventDefault(); close(fields.map((one) => one.input.value)); };
+    form.onsubmit = (event) => {
+      event.preventDefault();
+      close(fields.map((one) => one.input.value));
+    };
     cancel.onclick = () => close(null);
     dialog.onclose = () => close(null);
     dialog.showModal();
@@ -31,7 +35,9 @@ export function ask(title, doc, asks, refused = "") {
 
 /** Let one of `options` ({label, doc}) be chosen; resolves to it, or null. */
 export function choose(title, options) {
-  const dialog = find("choose"), filter = find("choose-find"), list = find("choose-list");
+  const dialog = find("choose"),
+    filter = find("choose-find"),
+    list = find("choose-list");
   find("choose-title").textContent = title;
   filter.value = "";
   return new Promise((resolve) => {
@@ -43,16 +49,20 @@ export function choose(title, options) {
     const fill = () => {
       const part = filter.value.trim().toLowerCase();
       const shown = options.filter((one) => one.label.toLowerCase().includes(part));
-      list.replaceChildren(...shown.map((one) => {
-        const item = document.createElement("li"), button = document.createElement("button"), doc = document.createElement("span");
-        button.type = "button";
-        button.textContent = one.label;
-        button.onclick = () => close(one);
-        doc.className = "quiet";
-        doc.textContent = one.doc;
-        item.append(button, doc);
-        return item;
-      }));
+      list.replaceChildren(
+        ...shown.map((one) => {
+          const item = document.createElement("li"),
+            button = document.createElement("button"),
+            doc = document.createElement("span");
+          button.type = "button";
+          button.textContent = one.label;
+          button.onclick = () => close(one);
+          doc.className = "quiet";
+          doc.textContent = one.doc;
+          item.append(button, doc);
+          return item;
+        }),
+      );
     };
     filter.oninput = fill;
     filter.onkeydown = (event) => {
@@ -78,7 +88,9 @@ export function read(title, text, line = 1) {
 
 /** A labelled input, or a select where the answers can be listed; Enter in either is the form's. */
 function field(asked, id) {
-  const label = document.createElement("label"), name = document.createElement("span"), doc = document.createElement("span");
+  const label = document.createElement("label"),
+    name = document.createElement("span"),
+    doc = document.createElement("span");
   const input = asked.choices.length ? document.createElement("select") : document.createElement("input");
   input.append(...asked.choices.map((one) => new Option(one, one)));
   input.id = id;
@@ -88,7 +100,10 @@ function field(asked, id) {
   input.autocomplete = "off";
   if (asked.choices.length) {
     input.addEventListener("keydown", (event) => {
-      if (event.key === "Enter") { event.preventDefault(); input.form.requestSubmit(); }
+      if (event.key === "Enter") {
+        event.preventDefault();
+        input.form.requestSubmit();
+      }
     });
   }
   name.textContent = asked.name;

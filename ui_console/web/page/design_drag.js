@@ -19,7 +19,16 @@ export class Drag {
     document.addEventListener("pointermove", (event) => this.move(event));
     document.addEventListener("pointerup", (event) => this.up(event));
     document.addEventListener("pointercancel", () => this.end());
-    document.addEventListener("keydown", (event) => { if (event.key === "Escape" && this.held) { event.stopPropagation(); this.end(); } }, true);
+    document.addEventListener(
+      "keydown",
+      (event) => {
+        if (event.key === "Escape" && this.held) {
+          event.stopPropagation();
+          this.end();
+        }
+      },
+      true,
+    );
     addEventListener("blur", () => this.end());
   }
 
@@ -29,7 +38,15 @@ export class Drag {
     if (!source || event.target.closest("button, input, select")) return;
     if (event.pointerType !== "mouse" && !event.target.closest(".handle")) return;
     if (event.target.hasPointerCapture?.(event.pointerId)) event.target.releasePointerCapture(event.pointerId);
-    this.held = { pointer: event.pointerId, x: event.clientX, y: event.clientY, source, what: this.what(source), ghost: null, place: null };
+    this.held = {
+      pointer: event.pointerId,
+      x: event.clientX,
+      y: event.clientY,
+      source,
+      what: this.what(source),
+      ghost: null,
+      place: null,
+    };
   }
 
   move(event) {
@@ -102,7 +119,8 @@ export class Drag {
   }
 
   unmark() {
-    for (const part of ["before", "into", "after"]) this.tree.querySelector(`.drop-${part}`)?.classList.remove(`drop-${part}`);
+    for (const part of ["before", "into", "after"])
+      this.tree.querySelector(`.drop-${part}`)?.classList.remove(`drop-${part}`);
   }
 }
 

@@ -31,12 +31,15 @@ export class Palette {
       if (!groups.has(row.group)) groups.set(row.group, []);
       groups.get(row.group).push(this.made(row));
     }
-    this.root.replaceChildren(...[...groups].map(([name, parts]) => {
-      const group = document.createElement("section"), head = document.createElement("h3");
-      head.textContent = name;
-      group.append(head, ...parts);
-      return group;
-    }));
+    this.root.replaceChildren(
+      ...[...groups].map(([name, parts]) => {
+        const group = document.createElement("section"),
+          head = document.createElement("h3");
+        head.textContent = name;
+        group.append(head, ...parts);
+        return group;
+      }),
+    );
     if (focus) this.root.querySelector(`[data-key="${CSS.escape(focus)}"]`)?.focus();
   }
 
@@ -55,7 +58,9 @@ export class Palette {
     handle.setAttribute("aria-hidden", "true");
     const add = button("Add", `add ${row.label}`, () => this.add(row.label));
     add.setAttribute("aria-label", `Add ${row.label}`);
-    const about = button("?", `about ${row.label}`, () => (row.is_known ? this.read(row.name, row.doc.join("\n")) : this.learn(row.type)));
+    const about = button("?", `about ${row.label}`, () =>
+      row.is_known ? this.read(row.name, row.doc.join("\n")) : this.learn(row.type),
+    );
     about.setAttribute("aria-label", `About ${row.label}`);
     made.append(handle, name, about, add);
     return made;
@@ -111,14 +116,23 @@ export class Details {
     input.spellcheck = false;
     input.addEventListener("change", () => this.commit(input));
     input.addEventListener("input", () => this.mark(input, ""));
-    input.addEventListener("keydown", (event) => { if (event.key === "Escape") this.takeBack(input); });
+    input.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") this.takeBack(input);
+    });
     const refused = line("refused", "");
     refused.setAttribute("role", "alert");
-    label.append(line("name", one.is_parameter ? `${one.name} (parameter)` : one.name), input, refused, line("quiet", one.doc));
+    label.append(
+      line("name", one.is_parameter ? `${one.name} (parameter)` : one.name),
+      input,
+      refused,
+      line("quiet", one.doc),
+    );
     return label;
   }
 
-  input(key) { return this.form.querySelector(`[data-key="${CSS.escape(key)}"]`); }
+  input(key) {
+    return this.form.querySelector(`[data-key="${CSS.escape(key)}"]`);
+  }
 
   /** Have the value set that is written in a field, once. */
   commit(input) {
@@ -138,7 +152,8 @@ export class Details {
   }
 
   mark(input, why) {
-    if (why) input.setAttribute("aria-invalid", "true"); else input.removeAttribute("aria-invalid");
+    if (why) input.setAttribute("aria-invalid", "true");
+    else input.removeAttribute("aria-invalid");
     input.parentElement.querySelector(".refused").textContent = why;
   }
 
@@ -150,7 +165,9 @@ export class Details {
 
   /** Show the value, unless another one is just being written, or was refused and nothing has changed since. */
   fill(one) {
-    const input = this.input(keyOf(one)), value = one.value ?? "", was = input.dataset.is ?? "";
+    const input = this.input(keyOf(one)),
+      value = one.value ?? "",
+      was = input.dataset.is ?? "";
     const isWriting = input === document.activeElement && input.value !== was;
     const isRefused = input.getAttribute("aria-invalid") === "true" && value === was;
     const nothing = one.is_missing ? "missing" : one.default === null ? "" : `${one.default} (default)`;
@@ -180,51 +197,82 @@ export function showProblems(root, rows, go) {
     return;
   }
   const list = document.createElement("ul");
-  list.append(...rows.map((one) => {
-    const item = document.createElement("li");
-    const press = button(`${one.message} (${one.remedy})`, `problem ${one.line}:${one.column}`, () => go(one.path));
-    press.className = "problem";
-    const where = document.createElement("span");
-    where.className = "quiet";
-    where.textContent = `${one.line}:${one.column} `;
-    press.prepend(where);
-    item.append(press);
-    return item;
-  }));
+  list.append(
+    ...rows.map((one) => {
+      const item = document.createElement("li");
+      const press = button(`${one.message} (${one.remedy})`, `problem ${one.line}:${one.column}`, () => go(one.path));
+      press.className = "problem";
+      const where = document.createElement("span");
+      where.className = "quiet";
+      where.textContent = `${one.line}:${one.column} `;
+      press.prepend(where);
+      item.append(press);
+      return item;
+    }),
+  );
   root.replaceChildren(list);
 }
 
 // ---------------------------------------------------------------- the first minute
 export function showMinute(root, minute) {
-  if (minute === undefined) { root.replaceChildren(paragraph("…")); return; }
+  if (minute === undefined) {
+    root.replaceChildren(paragraph("…"));
+    return;
+  }
   if (minute === null) {
     root.replaceChildren(paragraph("It has problems; a dry run needs a mission that check says is fine."));
     return;
   }
-  if (minute.rows.length === 0) { root.replaceChildren(paragraph("Nobody asks for anything.")); return; }
+  if (minute.rows.length === 0) {
+    root.replaceChildren(paragraph("Nobody asks for anything."));
+    return;
+  }
   const lines = document.createElement("ul");
   lines.append(...minute.never.map((one) => listed(one, "failure")), ...minute.told.map((one) => listed(one)));
   root.replaceChildren(chart(minute), lines);
 }
 
 function chart(minute) {
-  const height = 24, left = 170, width = 830, arcs = minute.rows.filter((row) => row.is_arc).map((row) => row.name);
+  const height = 24,
+    left = 170,
+    width = 830,
+    arcs = minute.rows.filter((row) => row.is_arc).map((row) => row.name);
   const color = (arc) => `color-${Math.max(0, arcs.indexOf(arc)) % COLORS}`;
   const at = (time) => left + (width * time) / minute.end_s;
-  const svg = drawn("svg", { class: "minute", viewBox: `0 0 ${left + width} ${height * minute.rows.length + 20}`, role: "img",
-    "aria-label": `who runs when in the first ${minute.end_s} s` });
+  const svg = drawn("svg", {
+    class: "minute",
+    viewBox: `0 0 ${left + width} ${height * minute.rows.length + 20}`,
+    role: "img",
+    "aria-label": `who runs when in the first ${minute.end_s} s`,
+  });
   minute.rows.forEach((row, number) => {
     const top = number * height;
     svg.append(drawn("text", { x: 4, y: top + 16 }, row.name.slice(0, 24)));
     for (const turn of row.turns) {
       const title = drawn("title", {}, `${turn.who}: ${turn.open_s.toFixed(1)} s to ${turn.to_s.toFixed(1)} s`);
-      const bar = drawn("rect", { x: at(turn.open_s), y: top + 3, width: Math.max(0.5, at(turn.to_s) - at(turn.open_s)), height: height - 6, rx: 2,
-        class: color(row.is_arc ? row.name : turn.who) });
+      const bar = drawn("rect", {
+        x: at(turn.open_s),
+        y: top + 3,
+        width: Math.max(0.5, at(turn.to_s) - at(turn.open_s)),
+        height: height - 6,
+        rx: 2,
+        class: color(row.is_arc ? row.name : turn.who),
+      });
       bar.append(title);
-      svg.append(drawn("rect", { x: at(turn.from_s), y: top + 8, width: Math.max(0, at(turn.open_s) - at(turn.from_s)), height: height - 16, class: "settles" }), bar);
+      svg.append(
+        drawn("rect", {
+          x: at(turn.from_s),
+          y: top + 8,
+          width: Math.max(0, at(turn.open_s) - at(turn.from_s)),
+          height: height - 16,
+          class: "settles",
+        }),
+        bar,
+      );
     }
   });
-  for (let time = 0; time <= minute.end_s; time += 10) svg.append(drawn("text", { x: at(time) - (time ? 16 : 0), y: height * minute.rows.length + 15 }, `${time} s`));
+  for (let time = 0; time <= minute.end_s; time += 10)
+    svg.append(drawn("text", { x: at(time) - (time ? 16 : 0), y: height * minute.rows.length + 15 }, `${time} s`));
   return svg;
 }
 

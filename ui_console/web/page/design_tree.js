@@ -4,7 +4,8 @@ const FOLDED_AT_FIRST = ["core", "types"]; // what is the same in most missions,
 
 export const keyOf = (path) => path.join("/");
 export const pathOf = (key) => (key ? key.split("/").map(Number) : []);
-export const isWithin = (path, above) => above.every((number, depth) => path[depth] === number) && path.length >= above.length;
+export const isWithin = (path, above) =>
+  above.every((number, depth) => path[depth] === number) && path.length >= above.length;
 
 /** What is folded stays so wherever it is moved. */
 const nameOf = (row) => `${row.path.length} ${row.tag} ${row.told}`;
@@ -29,9 +30,15 @@ export class Tree {
     root.addEventListener("keydown", (event) => this.pressed(event));
   }
 
-  row(path) { return this.byKey.get(keyOf(path)); }
-  parts(path) { return this.inside.get(keyOf(path)) ?? []; }
-  node(path) { return this.root.querySelector(`[data-key="${keyOf(path)}"]`); }
+  row(path) {
+    return this.byKey.get(keyOf(path));
+  }
+  parts(path) {
+    return this.inside.get(keyOf(path)) ?? [];
+  }
+  node(path) {
+    return this.root.querySelector(`[data-key="${keyOf(path)}"]`);
+  }
 
   isFolded(row) {
     if (this.parts(row.path).length === 0) return false;
@@ -85,7 +92,8 @@ export class Tree {
     const hasFocus = this.root.contains(document.activeElement);
     const shown = [];
     let folded = null;
-    for (const row of this.rows) { // in the order of the text, so what is in a folded one follows it
+    for (const row of this.rows) {
+      // in the order of the text, so what is in a folded one follows it
       if (folded !== null && isWithin(row.path, folded)) continue;
       shown.push(row);
       folded = this.isFolded(row) ? row.path : null;
@@ -93,11 +101,15 @@ export class Tree {
     const made = shown.map((row) => this.made(row));
     this.root.replaceChildren(...made);
     const chosen = this.node(this.at) ?? made[0];
-    if (chosen) { chosen.tabIndex = 0; if (hasFocus) chosen.focus({ preventScroll: true }); }
+    if (chosen) {
+      chosen.tabIndex = 0;
+      if (hasFocus) chosen.focus({ preventScroll: true });
+    }
   }
 
   made(row) {
-    const made = document.createElement("div"), isFolded = this.isFolded(row);
+    const made = document.createElement("div"),
+      isFolded = this.isFolded(row);
     const inside = row.path.length ? this.parts(row.path).length : 0; // the mission itself is never folded
     made.className = `element tag-${row.tag}`;
     made.dataset.key = keyOf(row.path);
@@ -126,7 +138,9 @@ export class Tree {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const keys = [...this.root.children].map((one) => one.dataset.key);
     const number = keys.indexOf(keyOf(this.at));
-    const to = (next) => { if (next >= 0 && next < keys.length) this.pick(pathOf(keys[next])); };
+    const to = (next) => {
+      if (next >= 0 && next < keys.length) this.pick(pathOf(keys[next]));
+    };
     const row = this.row(this.at);
     if (!row) return;
     const moves = {
@@ -134,7 +148,8 @@ export class Tree {
       ArrowUp: () => to(number - 1),
       Home: () => to(0),
       End: () => to(keys.length - 1),
-      ArrowRight: () => (this.isFolded(row) ? this.fold(row.path, false) : this.parts(row.path).length && to(number + 1)),
+      ArrowRight: () =>
+        this.isFolded(row) ? this.fold(row.path, false) : this.parts(row.path).length && to(number + 1),
       ArrowLeft: () => {
         if (!this.isFolded(row) && this.parts(row.path).length && row.path.length) this.fold(row.path, true);
         else if (row.path.length) this.pick(row.path.slice(0, -1));

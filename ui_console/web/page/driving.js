@@ -2,8 +2,11 @@
 
 import { DRIVES } from "./keys.js";
 
+/** @import { Say, Stick } from "./types.d.ts" */
+
 const SAY_EVERY_MS = 50; // chosen: six times within the 300 ms after which the server stops the wheels
 const SHOULDERS = [4, 5]; // Gamepad API, standard mapping
+/** @type {Record<string, string>} */
 const BUTTONS = { 0: "jump", 1: "stop_mine", 3: "stop_all", 8: "release", 9: "take" }; // as the terminal has them
 const DEAD_ZONE = 0.12; // chosen: worn sticks rest within it
 
@@ -15,28 +18,55 @@ const DEAD_ZONE = 0.12; // chosen: worn sticks rest within it
  * down, the gamepad's shoulder button pressed again.
  */
 export class Driving {
-  constructor({ pad, knob, hint, say, isClogged, speed, does }) {
-    Object.assign(this, { pad, knob, hint, say, isClogged, speed });
+  /**
+   * @param {{ pad: HTMLElement, knob: HTMLElement, hint: HTMLElement, say: Say, isClogged: () => boolean,
+   *   speed: () => number, moment: () => number, does: (what: string) => void }} given
+   */
+  constructor({ pad, knob, hint, say, isClogged, speed, moment, does }) {
+    this.pad = pad;
+    this.knob = knob;
+    this.hint = hint;
+    this.say = say;
+    this.isClogged = isClogged;
+    this.speed = speed;
+    this.moment = moment;
+    this.pressedAt = 0; // the moment at which what is held was pressed
     this.isOn = false;
+    /** @type {Set<string>} */
     this.keys = new Set();
+    /** @type {number | null} */
     this.pointer = null;
+    /** @type {Stick} */
     this.stick = [0, 0];
     this.gamepad = new Gamepad(does);
+    /** @type {ReturnType<typeof setInterval> | 0} */
     this.timer = 0;
+    this.isFollowing = false;
     pad.addEventListener("pointerdown", (event) => this.grab(event));
     pad.addEventListener("pointermove", (event) => this.drag(event));
-    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+    for (const end of /** @type {const} */ (["pointerup", "pointercancel", "lostpointercapture"])) {
       pad.addEventListener(end, (event) => this.drop(event));
     }
-    addEventListener("keyup", (event) => { this.hint.hidden = true; if (this.keys.delete(event.code)) this.update(); });
-    addEventListener("pointerup", () => { this.hint.hidden = true; });
+    addEventListener("keyup", (event) => {
+      this.hint.hidden = true;
+      if (this.keys.delete(event.code)) this.update();
+    });
+    addEventListener("pointerup", () => {
+      this.hint.hidden = true;
+    });
     addEventListener("blur", () => this.letGo());
     addEventListener("pagehide", () => this.letGo());
-    document.addEventListener("visibilitychange", () => { if (document.hidden) this.letGo(); });
+    document.addEventListener("visibilitychange", () => {
+      if (document.hidden) this.letGo();
+    });
     addEventListener("gamepadconnected", () => this.followGamepad());
   }
 
-  /** Whether there is a robot to drive; hands count only from then on. */
+  /**
+   * Whether there is a robot to drive; hands count only from then on.
+   *
+   * @param {boolean} isOn
+   */
   turn(isOn) {
     if (isOn === this.isOn) return;
     this.letGo();
@@ -44,22 +74,31 @@ export class Driving {
     this.pad.setAttribute("aria-disabled", String(!isOn));
   }
 
-  /** What is wanted now: [forward, right], or null if nothing is held. */
+  /**
+   * What is wanted now: [forward, right], or null if nothing is held.
+   *
+   * @returns {Stick | null}
+   */
   wanted() {
     if (!this.isOn) return null;
     if (this.pointer !== null) return this.stick;
     if (this.gamepad.stick !== null) return this.gamepad.stick;
     if (this.keys.size === 0) return null;
     let [forward, right] = [0, 0];
-    for (const code of this.keys) { forward += DRIVES[code][0]; right += DRIVES[code][1]; }
+    for (const code of this.keys) {
+      forward += DRIVES[code][0];
+      right += DRIVES[code][1];
+    }
     return [Math.sign(forward), Math.sign(right)];
   }
 
+  /** @param {string} code */
   press(code) {
     this.keys.add(code);
     this.update();
   }
 
+  /** @param {PointerEvent} event */
   grab(event) {
     if (!this.isOn || this.pointer !== null || (event.pointerType === "mouse" && event.button !== 0)) return;
     event.preventDefault();
@@ -69,17 +108,22 @@ export class Driving {
     this.drag(event);
   }
 
+  /** @param {PointerEvent} event */
   drag(event) {
     if (event.pointerId !== this.pointer) return;
     const box = this.pad.getBoundingClientRect();
     let right = (2 * (event.clientX - box.left)) / box.width - 1;
     let forward = 1 - (2 * (event.clientY - box.top)) / box.height;
     const length = Math.hypot(right, forward);
-    if (length > 1) { right /= length; forward /= length; }
+    if (length > 1) {
+      right /= length;
+      forward /= length;
+    }
     this.stick = length < DEAD_ZONE ? [0, 0] : [forward, right];
     this.update();
   }
 
+  /** @param {PointerEvent} event */
   drop(event) {
     if (event.pointerId !== this.pointer) return;
     this.pointer = null;
@@ -95,7 +139,8 @@ export class Driving {
     this.pointer = null;
     this.gamepad.spend();
     this.stick = [0, 0];
-    if (wasHeld) this.update(); else if (always) this.say({ do: "stop" });
+    if (wasHeld) this.update();
+    else if (always) this.say({ do: "stop" });
   }
 
   followGamepad() {
@@ -103,7 +148,7 @@ export class Driving {
     this.isFollowing = true;
     const look = () => {
       const found = [...navigator.getGamepads()].find((one) => one?.connected);
-      this.gamepad.feel(document.hasFocus() ? found : undefined);
+      this.gamepad.feel(document.hasFocus() ? (found ?? undefined) : undefined);
       if (this.timer !== 0 || this.gamepad.stick !== null) this.update();
       this.isFollowing = found !== undefined;
       if (found) requestAnimationFrame(look);
@@ -117,9 +162,14 @@ export class Driving {
     const [forward, right] = wanted ?? [0, 0];
     this.knob.style.transform = `translate(${right * 60}%, ${-forward * 60}%)`;
     if (wanted === null) {
-      if (this.timer !== 0) { clearInterval(this.timer); this.timer = 0; this.say({ do: "stop" }); }
+      if (this.timer !== 0) {
+        clearInterval(this.timer);
+        this.timer = 0;
+        this.say({ do: "stop" });
+      }
     } else if (this.timer === 0) {
       this.hint.hidden = true;
+      this.pressedAt = this.moment();
       this.timer = setInterval(() => this.tell(), SAY_EVERY_MS);
       this.tell();
     }
@@ -128,16 +178,20 @@ export class Driving {
   tell() {
     const wanted = this.wanted();
     if (wanted === null || this.isClogged()) return; // what cannot leave now must not arrive late
-    this.say({ do: "drive", forward: wanted[0], right: wanted[1], speed_rad_s: this.speed() });
+    const [forward, right] = wanted;
+    this.say({ do: "drive", moment: this.pressedAt, forward, right, speed_rad_s: this.speed() });
   }
 }
 
 /** A gamepad as it was felt last. Pure: `feel` gets what the browser says of it. */
 export class Gamepad {
+  /** @param {(what: string) => void} does */
   constructor(does) {
     this.does = does;
+    /** @type {Stick | null} */
     this.stick = null;
     this.isSpent = true; // a shoulder button that is held from the beginning was not pressed for this page
+    /** @type {string[] | null} */
     this.pressed = null;
   }
 
@@ -147,12 +201,20 @@ export class Gamepad {
     this.isSpent = true;
   }
 
-  /** Take in how it is; undefined: it is away, or it is another window's. */
+  /**
+   * Take in how it is; undefined: it is away, or it is another window's.
+   *
+   * @param {{ buttons: readonly { pressed: boolean }[], axes: readonly number[] } | undefined} device
+   */
   feel(device) {
-    if (device === undefined) { this.spend(); this.pressed = null; return; }
-    const isDown = (number) => device.buttons[number]?.pressed ?? false;
+    if (device === undefined) {
+      this.spend();
+      this.pressed = null;
+      return;
+    }
+    const isDown = (/** @type {number} */ number) => device.buttons[number]?.pressed ?? false;
     const before = this.pressed;
-    this.pressed = Object.keys(BUTTONS).filter((number) => isDown(number));
+    this.pressed = Object.keys(BUTTONS).filter((number) => isDown(Number(number)));
     if (before !== null) {
       for (const number of this.pressed) if (!before.includes(number)) this.does(BUTTONS[number]);
     }
@@ -162,6 +224,7 @@ export class Gamepad {
   }
 }
 
+/** @param {number} value */
 function near(value) {
   return Math.abs(value) < DEAD_ZONE ? 0 : Math.max(-1, Math.min(1, value));
 }

@@ -6,32 +6,49 @@
  */
 export class Freshness {
   constructor() {
-    this.sent = new Map();
+    /** @type {Map<number, number>} */
+    this.sent = new Map(); // number of a beat → when it was sent
     this.number = 0;
     this.provenAt = -Infinity;
   }
 
-  /** A connection began: whatever it brings is newer than this. */
+  /**
+   * A connection began: whatever it brings is newer than this.
+   *
+   * @param {number} now
+   */
   begin(now) {
     this.sent.clear();
     this.provenAt = now;
   }
 
-  /** Returns the number of a beat that is sent now. */
+  /**
+   * Returns the number of a beat that is sent now.
+   *
+   * @param {number} now
+   */
   beat(now) {
     this.number += 1;
     this.sent.set(this.number, now);
     return this.number;
   }
 
-  /** A beat came back. */
+  /**
+   * A beat came back.
+   *
+   * @param {number} number
+   */
   returned(number) {
-    if (!this.sent.has(number)) return;
-    this.provenAt = this.sent.get(number);
+    const sentAt = this.sent.get(number);
+    if (sentAt === undefined) return;
+    this.provenAt = sentAt;
     for (const earlier of [...this.sent.keys()].filter((one) => one <= number)) this.sent.delete(earlier);
   }
 
-  age(now) { return now - this.provenAt; }
+  /** @param {number} now */
+  age(now) {
+    return now - this.provenAt;
+  }
 }
 
 /**

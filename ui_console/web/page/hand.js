@@ -1,15 +1,23 @@
 // This operator's own part: what is held, what was lost, who asks for it.
 
+import { find } from "./dom.js";
 import { lasting, set } from "./text.js";
 
-const find = (id) => document.getElementById(id);
+/** @import { Driving } from "./driving.js" */
+/** @import { OwnView } from "./messages.d.ts" */
+/** @import { Act } from "./types.d.ts" */
+
 const MEMORY = "held";
 
 /** Shows `own` of the view; `act(what, name)` does what a person wants. */
 export class Hand {
+  /** @param {{ act: Act, driving: Driving }} given */
   constructor({ act, driving }) {
-    Object.assign(this, { act, driving });
+    this.act = act;
+    this.driving = driving;
+    /** @type {OwnView | null} */
     this.own = null;
+    this.now_s = 0;
     this.memory = new Memory();
     find("take").addEventListener("click", () => act("take", this.own?.robot ?? ""));
     find("release").addEventListener("click", () => act("release"));
@@ -17,30 +25,51 @@ export class Hand {
     find("stop-mine").addEventListener("click", () => act("stop_mine"));
     find("halt").addEventListener("click", () => act("halt"));
     find("jump").addEventListener("click", () => act("jump"));
-    find("consent-yes").addEventListener("click", () => act("consent", true));
-    find("consent-no").addEventListener("click", () => act("consent", false));
+    find("consent-yes").addEventListener("click", () => act("consent", "yes"));
+    find("consent-no").addEventListener("click", () => act("consent", "no"));
     find("retake").addEventListener("click", () => {
       this.memory.forget();
       act("take", find("retake").dataset.robot);
     });
-    find("dismiss").addEventListener("click", () => { this.memory.forget(); act("dismiss"); this.showLost(); });
+    find("dismiss").addEventListener("click", () => {
+      this.memory.forget();
+      act("dismiss");
+      this.showLost();
+    });
     find("speed").addEventListener("input", () => this.showSpeed());
     this.showSpeed();
     addEventListener("pagehide", () => this.cut("this page was left", 0));
   }
 
-  get held() { return this.own?.is_held ? this.own.robot : ""; }
+  get held() {
+    return this.own?.is_held ? this.own.robot : "";
+  }
 
-  get speed() { return Number(find("speed").value); }
+  /** The newest moment that is shown: a press from an earlier one moves nothing. */
+  get moment() {
+    return this.own?.moment ?? 0;
+  }
 
+  get speed() {
+    return Number(find("speed", HTMLInputElement).value);
+  }
+
+  /** @param {number} step */
   change(step) {
-    find("speed").value = String(this.speed + step);
+    find("speed", HTMLInputElement).value = String(this.speed + step);
     this.showSpeed();
   }
 
-  showSpeed() { set(find("speed-shown"), find("speed").value); }
+  showSpeed() {
+    set(find("speed-shown"), find("speed", HTMLInputElement).value);
+  }
 
-  /** The connection ended: what was held may be somebody else's by now. */
+  /**
+   * The connection ended: what was held may be somebody else's by now.
+   *
+   * @param {string} why
+   * @param {number} ageMs
+   */
   cut(why, ageMs) {
     if (this.held) this.memory.keep(this.held, why, Date.now() - ageMs);
     set(find("own"), this.held ? `You held ${this.held} when the connection ended.` : "Not connected.");
@@ -50,11 +79,17 @@ export class Hand {
     document.body.classList.remove("is-asking");
   }
 
+  /**
+   * @param {OwnView} own
+   * @param {number} now_s
+   */
   show(own, now_s) {
     const before = this.own;
     this.own = own;
     this.now_s = now_s;
-    if (isOther(before, own)) this.driving.letGo(own.is_held); // what is held down was meant for another moment
+    if (isOther(before, own))
+      this.driving.letGo(own.is_held); // what is held down was meant for another moment
+    else if (own.moment !== before?.moment) this.driving.letGo();
     this.driving.turn(own.is_held);
     if (own.is_asked) this.memory.forget();
     set(find("own"), own.status);
@@ -63,10 +98,10 @@ export class Hand {
     set(find("asked"), own.asked);
     this.showLost();
     this.showConsent();
-    find("may-i").disabled = !own.is_asked || own.is_held;
-    find("release").disabled = !own.is_asked;
-    find("take").disabled = own.is_asked;
-    find("halt").disabled = find("jump").disabled = !own.is_held;
+    find("may-i", HTMLButtonElement).disabled = !own.is_asked || own.is_held;
+    find("release", HTMLButtonElement).disabled = !own.is_asked;
+    find("take", HTMLButtonElement).disabled = own.is_asked;
+    find("halt", HTMLButtonElement).disabled = find("jump", HTMLButtonElement).disabled = !own.is_held;
     find("stop-mine").hidden = !own.is_held;
     set(find("stop-mine"), `Stop ${own.robot}`);
     document.body.dataset.held = this.held;
@@ -75,19 +110,21 @@ export class Hand {
 
   /** Say which robot was lost, when and why, and offer it again: the server's word first, then what this page saw. */
   showLost() {
-    const told = this.own?.lost ?? null, kept = told ? null : this.memory.kept;
-    find("lost").hidden = (told ?? kept) === null || this.own?.is_asked === true;
-    if (find("lost").hidden) return;
-    const robot = (told ?? kept).robot;
-    const age_s = told ? this.now_s - told.at_s : (Date.now() - kept.at) / 1000;
-    set(find("lost-line"), `You lost ${robot}${lasting(age_s)}: ${(told ?? kept).why}`);
-    set(find("retake"), `Take ${robot} again`);
-    find("retake").dataset.robot = robot;
-    find("retake").disabled = told ? !told.may_retake : false;
+    const told = this.own?.lost ?? null;
+    const kept = told === null ? this.memory.kept : null;
+    const lost = told ?? kept;
+    find("lost").hidden = lost === null || this.own?.is_asked === true;
+    if (lost === null || find("lost").hidden) return;
+    const age_s = told !== null ? this.now_s - told.at_s : (Date.now() - (kept?.at ?? 0)) / 1000;
+    set(find("lost-line"), `You lost ${lost.robot}${lasting(age_s)}: ${lost.why}`);
+    const retake = find("retake", HTMLButtonElement);
+    set(retake, `Take ${lost.robot} again`);
+    retake.dataset.robot = lost.robot;
+    retake.disabled = told !== null && !told.may_retake;
   }
 
   showConsent() {
-    const { consent } = this.own;
+    const consent = this.own?.consent ?? null;
     find("consent").hidden = consent === null;
     if (consent === null) return;
     const others = consent.others ? `, ${consent.others} more ask` : "";
@@ -96,18 +133,39 @@ export class Hand {
   }
 }
 
-/** Is this another moment than that, so that whatever is held down has to be let go first? */
+/**
+ * Is this another robot, hold or stop than that, so that whatever is held down has to be let go first?
+ *
+ * @param {OwnView | null} before
+ * @param {OwnView} own
+ */
 export function isOther(before, own) {
   if (before === null) return true;
-  return before.is_held !== own.is_held || before.robot !== own.robot || before.epoch !== own.epoch
-    || before.stop?.number !== own.stop?.number || (own.must_let_go === true && before.must_let_go !== true);
+  return (
+    before.is_held !== own.is_held ||
+    before.robot !== own.robot ||
+    before.epoch !== own.epoch ||
+    before.stop?.number !== own.stop?.number
+  );
 }
 
 /** What this tab held when its connection ended: it outlives the connection, a reload, and the server. */
 class Memory {
-  keep(robot, why, at) { sessionStorage.setItem(MEMORY, JSON.stringify({ robot, why, at })); }
+  /**
+   * @param {string} robot
+   * @param {string} why
+   * @param {number} at
+   */
+  keep(robot, why, at) {
+    sessionStorage.setItem(MEMORY, JSON.stringify({ robot, why, at }));
+  }
 
-  forget() { sessionStorage.removeItem(MEMORY); }
+  forget() {
+    sessionStorage.removeItem(MEMORY);
+  }
 
-  get kept() { return JSON.parse(sessionStorage.getItem(MEMORY) ?? "null"); }
+  /** @returns {{ robot: string, why: string, at: number } | null} */
+  get kept() {
+    return JSON.parse(sessionStorage.getItem(MEMORY) ?? "null");
+  }
 }

@@ -2,8 +2,14 @@
 
 export const HOLD_MS = 1000; // chosen: longer than any double press, short enough for whoever means it
 
-/** Have `act` called once the button was held; whatever else happens lets it go. Space never holds: it stops. */
+/**
+ * Have `act` called once the button was held; whatever else happens lets it go. Space never holds: it stops.
+ *
+ * @param {HTMLButtonElement} button
+ * @param {() => void} act
+ */
 export function actWhenHeld(button, act) {
+  /** @type {ReturnType<typeof setTimeout> | 0} */
   let timer = 0;
   const drop = () => {
     clearTimeout(timer);
@@ -13,11 +19,19 @@ export function actWhenHeld(button, act) {
   const hold = () => {
     if (timer !== 0 || button.disabled) return;
     button.classList.add("is-held");
-    timer = setTimeout(() => { drop(); act(); }, HOLD_MS);
+    timer = setTimeout(() => {
+      drop();
+      act();
+    }, HOLD_MS);
   };
-  button.addEventListener("pointerdown", (event) => { if (event.isPrimary && event.button === 0) hold(); });
+  button.addEventListener("pointerdown", (event) => {
+    if (event.isPrimary && event.button === 0) hold();
+  });
   button.addEventListener("keydown", (event) => {
-    if (event.key !== "Enter") { drop(); return; }
+    if (event.key !== "Enter") {
+      drop();
+      return;
+    }
     event.preventDefault();
     if (!event.repeat) hold();
   });

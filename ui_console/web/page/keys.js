@@ -1,10 +1,19 @@
 // What a key means at this moment. Pure: a key and where it is pressed go in, an act comes out.
 
+/** @type {Record<string, [number, number]>} */
 export const DRIVES = {
-  ArrowUp: [1, 0], KeyW: [1, 0], ArrowDown: [-1, 0], KeyS: [-1, 0],
-  ArrowLeft: [0, -1], KeyA: [0, -1], ArrowRight: [0, 1], KeyD: [0, 1],
+  ArrowUp: [1, 0],
+  KeyW: [1, 0],
+  ArrowDown: [-1, 0],
+  KeyS: [-1, 0],
+  ArrowLeft: [0, -1],
+  KeyA: [0, -1],
+  ArrowRight: [0, 1],
+  KeyD: [0, 1],
 };
+/** @type {Record<string, string>} */
 const STOPS = { x: "stop_mine", X: "stop_all", " ": "halt", Escape: "halt" };
+/** @type {Record<string, string>} */
 const SPEEDS = { "+": "faster", "=": "faster", "-": "slower" };
 const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "color", "file"];
 
@@ -15,9 +24,12 @@ const NO_TEXT = ["range", "checkbox", "radio", "button", "submit", "reset", "col
  * Stops are heard wherever the focus is, in dialogs and in fields too. Drives are heard everywhere but where arrows and
  * letters write, and not while a dialog asks for something.
  *
- * @param key {key, code, isRepeat, hasModifier} of the event.
- * @param at {isText, isRed, isDialog, isHeld}: a text is written there; a red button has the focus; a dialog is open; a
- *   robot is held.
+ * @typedef {{ key: string, code: string, isRepeat: boolean, hasModifier: boolean }} Key Of the event.
+ * @typedef {{ isText: boolean, isRed: boolean, isDialog: boolean, isHeld: boolean }} Place A text is written there; a red
+ *   button has the focus; a dialog is open; a robot is held.
+ *
+ * @param {Key} key
+ * @param {Place} at
  */
 export function meaningOf(key, at) {
   if (key.hasModifier) return null;
@@ -29,48 +41,82 @@ export function meaningOf(key, at) {
   return speed ? { act: speed, isTaken: true } : null;
 }
 
-/** A letter that stops is not written; a blank is, and closes no button's press unless a robot is driven meanwhile. */
+/**
+ * A letter that stops is not written; a blank is, and closes no button's press unless a robot is driven meanwhile.
+ *
+ * @param {string} key
+ * @param {Place} at
+ */
 function isStopTaken(key, at) {
   if (key === "Escape") return false; // it closes dialogs, too
   if (key === " ") return at.isHeld && !at.isText && !at.isRed;
   return true;
 }
 
-/** Says whether what is typed there is written. */
+/**
+ * Says whether what is typed there is written.
+ *
+ * @param {HTMLElement} element
+ */
 export function isText(element) {
   if (element.isContentEditable || element.tagName === "TEXTAREA") return true;
-  return element.tagName === "INPUT" && !NO_TEXT.includes(element.type);
+  return element.tagName === "INPUT" && !NO_TEXT.includes(/** @type {HTMLInputElement} */ (element).type);
 }
 
 /** Listens to every key of the page; `does` is called with an act and the key's code, `isHeld` says what is driven. */
 export class Keys {
+  /** @param {{ does: (what: string, code: string) => void, isHeld: () => boolean }} given */
   constructor({ does, isHeld }) {
     let isSpaceTaken = false;
-    addEventListener("keyup", (event) => { if (event.key === " " && isSpaceTaken) event.preventDefault(); }, true);
-    addEventListener("keydown", (event) => {
-      const hasModifier = event.ctrlKey || event.metaKey || event.altKey;
-      if (event.altKey && isText(event.target) && event.code === "KeyX") { write(event); return; }
-      const meaning = meaningOf(
-        { key: event.key, code: event.code, isRepeat: event.repeat, hasModifier },
-        {
-          isText: isText(event.target),
-          isRed: Boolean(event.target.closest?.(".emergency")),
-          isDialog: document.querySelector("dialog[open]") !== null,
-          isHeld: isHeld(),
-        },
-      );
-      if (event.key === " ") isSpaceTaken = meaning?.isTaken ?? false; // a button is pressed when it comes up again
-      if (meaning === null) return;
-      if (meaning.isTaken) event.preventDefault();
-      if (meaning.act) does(meaning.act, event.code);
-    }, true);
+    addEventListener(
+      "keyup",
+      (event) => {
+        if (event.key === " " && isSpaceTaken) event.preventDefault();
+      },
+      true,
+    );
+    addEventListener(
+      "keydown",
+      (event) => {
+        const target = /** @type {HTMLElement} */ (event.target);
+        const hasModifier = event.ctrlKey || event.metaKey || event.altKey;
+        if (event.altKey && isText(target) && event.code === "KeyX") {
+          write(event);
+          return;
+        }
+        const meaning = meaningOf(
+          { key: event.key, code: event.code, isRepeat: event.repeat, hasModifier },
+          {
+            isText: isText(target),
+            isRed: Boolean(target.closest?.(".emergency")),
+            isDialog: document.querySelector("dialog[open]") !== null,
+            isHeld: isHeld(),
+          },
+        );
+        if (event.key === " ") isSpaceTaken = meaning?.isTaken ?? false; // a button is pressed when it comes up again
+        if (meaning === null) return;
+        if (meaning.isTaken) event.preventDefault();
+        if (meaning.act) does(meaning.act, event.code);
+      },
+      true,
+    );
   }
 }
 
-/** Have the letter written that stops otherwise. */
+/**
+ * Have the letter written that stops otherwise.
+ *
+ * @param {KeyboardEvent} event
+ */
 function write(event) {
   event.preventDefault();
-  const field = event.target, letter = event.shiftKey ? "X" : "x";
-  field.setRangeText(letter, field.selectionStart, field.selectionEnd, "end");
+  const field = /** @type {HTMLInputElement} */ (event.target);
+  const letter = event.shiftKey ? "X" : "x";
+  field.setRangeText(
+    letter,
+    field.selectionStart ?? field.value.length,
+    field.selectionEnd ?? field.value.length,
+    "end",
+  );
   field.dispatchEvent(new Event("input", { bubbles: true }));
 }

@@ -2,6 +2,8 @@
 
 import { Freshness, makeClock } from "./freshness.js";
 
+/** @import { LinkChange, LinkState, Picture } from "./types.d.ts" */
+
 const AGAIN_FIRST_MS = 500; // chosen: a server that was restarted is back soon
 const AGAIN_MOST_MS = 5000; // chosen: a person waits no longer before looking
 const BEAT_EVERY_MS = 250; // chosen: what is shown is known to be fresh to a quarter of a second
@@ -15,13 +17,25 @@ const NOT_LET_IN = 1008;
  * whether what is shown is "fresh", "old" (nothing came back for most of a second), "down", or "refused" (wrong token).
  */
 export class Link {
+  /**
+   * @param {{ heard: (message: any) => void, saw: (picture: Picture) => void, changed: (to: LinkChange) => void,
+   *   silentMs?: number, oldMs?: number }} given
+   */
   constructor({ heard, saw, changed, silentMs = SILENT_MS, oldMs = OLD_MS }) {
-    Object.assign(this, { heard, saw, changed, silentMs, oldMs });
+    this.heard = heard;
+    this.saw = saw;
+    this.changed = changed;
+    this.silentMs = silentMs;
+    this.oldMs = oldMs;
+    /** @type {WebSocket | null} */
     this.socket = null;
+    /** @type {LinkState} */
     this.is = "down";
     this.why = "";
     this.waitMs = AGAIN_FIRST_MS;
+    /** @type {ReturnType<typeof setTimeout> | 0} */
     this.timer = 0;
+    this.hello = {};
     this.now = makeClock();
     this.freshness = new Freshness();
     this.seenSince = 0;
@@ -35,15 +49,20 @@ export class Link {
     });
   }
 
+  /** @param {{ token: string, user: string }} hello */
   open(hello) {
     this.hello = hello;
     this.connect();
   }
 
-  get isUp() { return this.is === "fresh" || this.is === "old"; }
+  get isUp() {
+    return this.is === "fresh" || this.is === "old";
+  }
 
   /** How old what is shown can be, in milliseconds. */
-  get ageMs() { return this.freshness.age(this.now()); }
+  get ageMs() {
+    return this.freshness.age(this.now());
+  }
 
   connect() {
     clearTimeout(this.timer);
@@ -53,7 +72,10 @@ export class Link {
     socket.onopen = () => socket.send(JSON.stringify({ do: "hello", page: this.page, ...this.hello }));
     socket.onmessage = (event) => {
       if (socket !== this.socket) return;
-      if (typeof event.data !== "string") { this.saw(readPacket(event.data)); return; }
+      if (typeof event.data !== "string") {
+        this.saw(readPacket(event.data));
+        return;
+      }
       if (!this.isUp) this.came();
       const message = JSON.parse(event.data);
       if (message.view?.beat !== undefined) this.freshness.returned(message.view.beat);
@@ -83,7 +105,8 @@ export class Link {
   /** Find out how old what is shown is; in a page that nobody sees that matters to nobody. */
   look() {
     if (!this.isUp || document.hidden) return;
-    const now = this.now(), ageMs = this.freshness.age(now);
+    const now = this.now(),
+      ageMs = this.freshness.age(now);
     if (Math.min(ageMs, now - this.seenSince) > this.silentMs) this.giveUp();
     else if (ageMs > this.oldMs) this.become("old", "the server is silent");
     else this.become("fresh", "");
@@ -93,25 +116,34 @@ export class Link {
   giveUp() {
     const silent = this.socket;
     this.socket = null;
-    silent.close();
+    silent?.close();
     this.again("the server is silent");
   }
 
+  /** @param {string} why */
   again(why) {
     this.become("down", why);
     this.timer = setTimeout(() => this.connect(), this.waitMs);
     this.waitMs = Math.min(2 * this.waitMs, AGAIN_MOST_MS);
   }
 
+  /**
+   * @param {LinkState} is
+   * @param {string} why
+   */
   become(is, why) {
     const isNew = is !== this.is || (is === "down" && why !== this.why);
     [this.is, this.why] = [is, why];
     if (isNew) this.changed({ is, why, ageMs: this.ageMs });
   }
 
-  /** Say something if it can be said now: nothing is kept for later, least of all a drive. */
+  /**
+   * Say something if it can be said now: nothing is kept for later, least of all a drive.
+   *
+   * @param {object} message A page has its own: see `Said` of the console.
+   */
   say(message) {
-    if (!this.isUp || this.socket.readyState !== WebSocket.OPEN) return false;
+    if (!this.isUp || this.socket?.readyState !== WebSocket.OPEN) return false;
     this.socket.send(JSON.stringify(message));
     return true;
   }
@@ -122,6 +154,7 @@ export class Link {
   }
 }
 
+/** @param {ArrayBuffer} buffer */
 function readPacket(buffer) {
   const view = new DataView(buffer);
   const length = view.getUint8(0);

@@ -1,21 +1,30 @@
 // Who is there: the token comes with the address or is asked for, and is kept for this tab only.
 
+import { set } from "./text.js";
+
 /** Calls `enter({token, user})` as soon as there is a token to try. */
 export class Login {
+  /** @param {{ form: HTMLFormElement, enter: (hello: { token: string, user: string }) => void }} given */
   constructor({ form, enter }) {
     this.form = form;
     this.enter = enter;
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.try(form.elements.token.value.trim(), form.elements.user.value.trim());
+      this.try(this.field("token").value.trim(), this.field("user").value.trim());
     });
+  }
+
+  /** @param {string} name */
+  field(name) {
+    return /** @type {HTMLInputElement} */ (this.form.elements.namedItem(name));
   }
 
   begin() {
     const given = new URLSearchParams(location.hash.slice(1));
-    if (given.has("token")) {
-      sessionStorage.setItem("token", given.get("token"));
-      if (given.has("user")) sessionStorage.setItem("user", given.get("user"));
+    const [newToken, newUser] = [given.get("token"), given.get("user")];
+    if (newToken !== null) {
+      sessionStorage.setItem("token", newToken);
+      if (newUser !== null) sessionStorage.setItem("user", newUser);
       history.replaceState(null, "", location.pathname); // so that no picture of the screen shows the token
     }
     const token = sessionStorage.getItem("token");
@@ -23,13 +32,18 @@ export class Login {
     else this.ask("");
   }
 
+  /** @param {string} why */
   ask(why) {
     sessionStorage.removeItem("token");
-    this.form.querySelector("[role=alert]").textContent = why;
+    set(/** @type {Element} */ (this.form.querySelector("[role=alert]")), why);
     this.form.hidden = false;
-    this.form.elements.token.focus();
+    this.field("token").focus();
   }
 
+  /**
+   * @param {string} token
+   * @param {string} user
+   */
   try(token, user) {
     sessionStorage.setItem("token", token);
     sessionStorage.setItem("user", user);

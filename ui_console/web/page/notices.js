@@ -1,11 +1,19 @@
 // What a person is told in passing: newest alarm, refusals, and longer answers to read.
 
+import { find, make, makeButton } from "./dom.js";
 import { set } from "./text.js";
 
-const find = (id) => document.getElementById(id);
+/** @import { AlarmView, HealthView } from "./messages.d.ts" */
+/** @import { Act } from "./types.d.ts" */
+
 const SHOWN_MS = 12000; // chosen: long enough to be read twice
 
-/** Show the first alarm that nobody has seen. */
+/**
+ * Show the first alarm that nobody has seen.
+ *
+ * @param {AlarmView[]} alarms
+ * @param {Act} act
+ */
 export function showAlarm(alarms, act) {
   const bar = find("alarm-bar");
   const first = alarms.find((alarm) => !alarm.acknowledged_by);
@@ -13,13 +21,21 @@ export function showAlarm(alarms, act) {
   if (bar.dataset.shown === shown) return;
   bar.dataset.shown = shown;
   bar.className = first?.severity ?? "quiet";
-  if (!first) { bar.replaceChildren("no alarm"); return; } // its place is kept: nothing moves under a finger
-  const line = document.createElement("span");
+  if (!first) {
+    bar.replaceChildren("no alarm");
+    return;
+  } // its place is kept: nothing moves under a finger
+  const line = make("span");
   line.textContent = `${first.severity}: ${first.line}${first.remedy ? ` — ${first.remedy}` : ""}`;
-  const why = button("Why?", () => act("why", first.subject));
-  bar.replaceChildren(line, why, button("Seen", () => act("acknowledge", first.key)));
+  const why = makeButton("Why?", () => act("why", first.subject));
+  bar.replaceChildren(
+    line,
+    why,
+    makeButton("Seen", () => act("acknowledge", first.key)),
+  );
 }
 
+/** @param {HealthView | null} health */
 export function showHealth(health) {
   const shown = find("health");
   shown.hidden = health === null;
@@ -29,26 +45,27 @@ export function showHealth(health) {
   set(shown, `mission ${[health.word, ...health.lines.slice(0, 1)].join(": ")}`);
 }
 
-/** Say it without standing in the way of anything, least of all of Stop. */
+/**
+ * Say it without standing in the way of anything, least of all of Stop.
+ *
+ * @param {string} text
+ */
 export function notice(text) {
-  const line = document.createElement("p");
-  line.append(text, button("✕", () => line.remove()));
-  line.lastChild.setAttribute("aria-label", "Seen");
+  const line = make("p", "", text);
+  const seen = makeButton("✕", () => line.remove());
+  seen.setAttribute("aria-label", "Seen");
+  line.append(seen);
   find("notices").append(line);
   setTimeout(() => line.remove(), SHOWN_MS);
 }
 
+/**
+ * @param {string} title
+ * @param {string[]} lines
+ */
 export function read(title, lines) {
   find("reading-title").textContent = title;
   const items = lines.map((line) => Object.assign(document.createElement("li"), { textContent: line }));
   find("reading-lines").replaceChildren(...items);
-  if (!find("reading").open) find("reading").showModal();
-}
-
-function button(label, press) {
-  const made = document.createElement("button");
-  made.type = "button";
-  made.textContent = label;
-  made.addEventListener("click", press);
-  return made;
+  if (!find("reading", HTMLDialogElement).open) find("reading", HTMLDialogElement).showModal();
 }

@@ -1,10 +1,13 @@
 // The screen of one robot: its newest picture, and how old that is.
 
+/** @import { Picture } from "./types.d.ts" */
+
 const STALE_MS = 1000; // as in the console model: do not drive by it
 const RATE_OVER_MS = 2000; // chosen: a rate a person can read
 
 /** Draws what it is given, the newest only; `drawn` is called with the number of each picture that is on the screen. */
 export class Screen {
+  /** @param {{ name: string, drawn: (number: number) => void }} given */
   constructor({ name, drawn }) {
     this.drawn = drawn;
     this.root = document.createElement("div");
@@ -19,13 +22,18 @@ export class Screen {
     this.root.append(this.canvas, this.age);
     this.drawnAt = 0;
     this.latencyMs = 0;
+    /** @type {Picture | null} */
     this.pending = null;
     this.isBusy = false;
     this.count = this.rate = 0;
     this.since = performance.now();
   }
 
-  /** A picture came: the newest that is not drawn yet takes the place of an older one. */
+  /**
+   * A picture came: the newest that is not drawn yet takes the place of an older one.
+   *
+   * @param {Picture} picture
+   */
   async saw(picture) {
     this.pending = picture;
     if (this.isBusy) return;
@@ -43,20 +51,28 @@ export class Screen {
     this.isBusy = false;
   }
 
+  /**
+   * @param {ImageBitmap} bitmap
+   * @param {number} number
+   */
   draw(bitmap, number) {
     const { canvas } = this;
     if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) {
       canvas.width = bitmap.width;
       canvas.height = bitmap.height;
     }
-    canvas.getContext("2d").drawImage(bitmap, 0, 0);
+    canvas.getContext("2d")?.drawImage(bitmap, 0, 0);
     bitmap.close();
-    canvas.dataset.number = number;
+    canvas.dataset.number = String(number);
     this.drawnAt = performance.now();
     this.count += 1;
   }
 
-  /** Say how old the picture is, from the lens on; returns whether it is too old to drive by. */
+  /**
+   * Say how old the picture is, from the lens on; returns whether it is too old to drive by.
+   *
+   * @param {number} now
+   */
   look(now) {
     const span = now - this.since;
     if (span >= (this.rate === 0 ? 500 : RATE_OVER_MS)) {

@@ -2,22 +2,41 @@
 
 import { set } from "./text.js";
 
+/** @import { RobotView, StopAll, StopRobot } from "./messages.d.ts" */
+/** @import { Say } from "./types.d.ts" */
+
 const CONFIRMED_WITHIN_MS = 1000; // chosen: wheels stand within 0.7 s wherever the link is there
 
 /** Stops one robot or all, and says in `shown` which ones are not known to stand. */
 export class Stopping {
+  /** @param {{ say: Say, shown: HTMLElement }} given */
   constructor({ say, shown }) {
-    Object.assign(this, { say, shown });
+    this.say = say;
+    this.shown = shown;
+    /** @type {RobotView[]} */
     this.robots = [];
+    /** @type {Map<string, number>} */
     this.pending = new Map(); // robot → when it was told to stop
     this.unsent = "";
     setInterval(() => this.look(performance.now()), 100);
   }
 
-  one(name) { this.stop({ do: "stop_robot", robot: name }, [name]); }
+  /** @param {string} name */
+  one(name) {
+    this.stop({ do: "stop_robot", robot: name }, [name]);
+  }
 
-  all() { this.stop({ do: "stop_all" }, this.robots.map((robot) => robot.robot)); }
+  all() {
+    this.stop(
+      { do: "stop_all" },
+      this.robots.map((robot) => robot.robot),
+    );
+  }
 
+  /**
+   * @param {StopRobot | StopAll} message
+   * @param {string[]} names
+   */
   stop(message, names) {
     const isSent = this.say(message);
     this.unsent = isSent ? "" : `NOT SENT: ${names.join(", ") || "no robot"} was not told to stop.`;
@@ -26,13 +45,18 @@ export class Stopping {
     this.look(performance.now());
   }
 
-  /** Take in what is heard of the robots. */
+  /**
+   * Take in what is heard of the robots.
+   *
+   * @param {RobotView[]} robots
+   */
   heard(robots) {
     this.robots = robots;
     for (const robot of robots) if (robot.stop?.is_confirmed) this.pending.delete(robot.robot);
     this.look(performance.now());
   }
 
+  /** @param {number} now */
   look(now) {
     const late = [...this.pending].filter(([, at]) => now - at > CONFIRMED_WITHIN_MS).map(([name]) => name);
     const line = late.length ? `NOT CERTAIN to have stopped: ${late.join(", ")}.` : "";

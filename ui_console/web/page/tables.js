@@ -1,16 +1,28 @@
 // Tables of the mission. What is shown was decided by the console model; here it only becomes rows.
 
+import { paragraph, span, table } from "./table.js";
 import { seconds, set } from "./text.js";
 import { timeline } from "./timeline.js";
 
+/** @import { AlarmView, ComponentRow, LinkView, NodeView, ParameterView, RequestRow, RobotView, View } from "./messages.d.ts" */
+/** @import { Log } from "./log.js" */
+/** @import { Act } from "./types.d.ts" */
+
 const NAMES = ["alarms", "robots", "tree", "schedule", "timeline", "links", "parameters", "components", "log"];
+/** @type {Record<string, string>} */
 const NOTHING = { alarms: "none", tree: "no behavior is known yet", parameters: "ask a component for its parameters" };
 
 export class Tables {
-  constructor({ tabs, panel, act }) {
-    Object.assign(this, { tabs, panel, act });
+  /** @param {{ tabs: HTMLElement, panel: HTMLElement, act: Act, log: Log }} given */
+  constructor({ tabs, panel, act, log }) {
+    this.tabs = tabs;
+    this.panel = panel;
+    this.act = act;
+    this.log = log;
     this.chosen = "alarms";
+    /** @type {Partial<View>} */
     this.view = {};
+    /** @type {Map<string, HTMLButtonElement>} */
     this.buttons = new Map();
     for (const name of NAMES) {
       const button = document.createElement("button");
@@ -24,132 +36,242 @@ export class Tables {
       this.buttons.set(name, button);
     }
     tabs.addEventListener("keydown", (event) => this.step(event));
-    addEventListener("resize", () => { if (this.chosen === "timeline") this.draw(); });
+    addEventListener("resize", () => {
+      if (this.chosen === "timeline") this.draw();
+    });
     this.choose(this.chosen);
   }
 
-  /** Arrows go from table to table, unless they drive. */
+  /**
+   * Arrows go from table to table, unless they drive.
+   *
+   * @param {KeyboardEvent} event
+   */
   step(event) {
     const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (!step || event.defaultPrevented) return;
     event.preventDefault();
     const next = NAMES[(NAMES.indexOf(this.chosen) + step + NAMES.length) % NAMES.length];
     this.choose(next);
-    this.buttons.get(next).focus();
+    this.buttons.get(next)?.focus();
   }
 
+  /** @param {string} name */
   choose(name) {
     this.chosen = name;
     for (const [other, button] of this.buttons) button.setAttribute("aria-selected", String(other === name));
     this.panel.setAttribute("aria-labelledby", `tab-${name}`);
+    this.log.form.hidden = name !== "log";
     this.draw();
   }
 
+  /**
+   * @param {Partial<View>} view
+   * @param {Partial<View>} changed
+   */
   show(view, changed) {
     this.view = view;
+    const tab = /** @type {HTMLButtonElement} */ (this.buttons.get("alarms"));
     const alarms = (view.alarms ?? []).filter((alarm) => !alarm.acknowledged_by).length;
-    set(this.buttons.get("alarms"), alarms ? `alarms (${alarms})` : "alarms");
-    if (this.section in changed) this.draw();
+    set(tab, alarms ? `alarms (${alarms})` : "alarms");
+    const isFound = this.chosen === "log" && this.log.found !== null; // what was found does not change
+    if (this.section in changed && !isFound) this.draw();
   }
 
-  get section() { return this.chosen === "schedule" ? "requests" : this.chosen; }
+  get section() {
+    return /** @type {keyof View} */ (this.chosen === "schedule" ? "requests" : this.chosen);
+  }
+
+  /** Returns what the chosen table shows now; none: nothing is known of it yet. */
+  content() {
+    const view = this.view;
+    if (view[this.section] === undefined) return [];
+    switch (this.chosen) {
+      case "log":
+        return this.log.draw(view.log ?? []);
+      case "timeline":
+        return view.timeline ? [timeline(view.timeline, this.panel.clientWidth)] : [];
+      case "alarms":
+        return view.alarms?.length ? [this.alarms(view.alarms)] : this.nothing();
+      case "robots":
+        return view.robots?.length ? [this.robots(view.robots)] : this.nothing();
+      case "tree":
+        return view.tree?.length ? [this.tree(view.tree)] : this.nothing();
+      case "schedule":
+        return view.requests?.length ? [this.requests(view.requests)] : this.nothing();
+      case "links":
+        return view.links?.length ? [this.links(view.links)] : this.nothing();
+      case "parameters":
+        return view.parameters?.length ? [this.parameters(view.parameters)] : this.nothing();
+      default:
+        return view.components?.length ? [this.components(view.components)] : this.nothing();
+    }
+  }
+
+  nothing() {
+    return [paragraph(NOTHING[this.chosen] ?? "nothing yet")];
+  }
 
   draw() {
-    const isHeld = this.panel.querySelector("input:focus, button:active") !== null;
+    const isPressed = this.panel.querySelector("input:focus, button:active") !== null;
+    const isHeld = isPressed && this.chosen !== "log"; // what is pressed in the log asks for another table
     this.panel.classList.toggle("is-held", isHeld); // somebody is typing or pressing here: it says that it stands still
-    const rows = this.view[this.section];
-    if (isHeld || rows === undefined) return;
-    const focus = this.panel.contains(document.activeElement) ? document.activeElement.dataset.key : "";
-    if (this.chosen === "timeline") this.panel.replaceChildren(timeline(rows, this.panel.clientWidth));
-    else if (rows.length) this.panel.replaceChildren(this[this.section](rows));
-    else this.panel.replaceChildren(paragraph(NOTHING[this.chosen] ?? "nothing yet"));
-    if (focus) this.panel.querySelector(`[data-key="${CSS.escape(focus)}"]`)?.focus();
+    const content = isHeld ? [] : this.content();
+    if (content.length === 0) return;
+    const active = document.activeElement;
+    const focus = active !== null && this.panel.contains(active) ? active.getAttribute("data-key") : null;
+    this.panel.replaceChildren(...content);
+    if (focus === null) return;
+    const again = this.panel.querySelector(`[data-key="${CSS.escape(focus)}"]`);
+    if (again instanceof HTMLElement) again.focus();
   }
 
+  /** @param {AlarmView[]} rows */
   alarms(rows) {
     const all = this.button("Seen all", "acknowledge:", () => this.act("acknowledge", ""));
-    return table(["level", "what", "where", "since", "times", all], rows.map((row) => [
-      span(row.severity, row.is_active ? `${row.severity}, now` : row.severity),
-      `${row.line}${row.remedy ? ` — ${row.remedy}` : ""}${row.while_away ? " (while away)" : ""}${follows(row.also)}`,
-      [row.robot === row.subject ? "" : row.robot, row.where].filter(Boolean).join(", "),
-      seconds(row.first_s), String(row.count), this.seenOrWhy(row),
-    ]));
+    return table(
+      ["level", "what", "where", "since", "times", all],
+      rows.map((row) => [
+        span(row.severity, row.is_active ? `${row.severity}, now` : row.severity),
+        `${row.line}${row.remedy ? ` — ${row.remedy}` : ""}${row.while_away ? " (while away)" : ""}${follows(row.also)}`,
+        [row.robot === row.subject ? "" : row.robot, row.where].filter(Boolean).join(", "),
+        seconds(row.first_s),
+        String(row.count),
+        this.seenOrWhy(row),
+      ]),
+    );
   }
 
+  /** @param {AlarmView} row */
   seenOrWhy(row) {
     const both = document.createElement("span");
-    both.append(this.button("Why?", `why:${row.key}`, () => this.act("why", row.subject)), " ",
-      row.acknowledged_by ? `seen by ${row.acknowledged_by}`
-        : this.button("Seen", `acknowledge:${row.key}`, () => this.act("acknowledge", row.key)));
-    return both;
-  }
-
-  robots(rows) {
-    const heads = ["robot", "stop", "holder", "priority", "since", "slice ends", "lease left", "because", "waiting"];
-    return table(heads, rows.map((row) => [
-      row.robot, row.stop ? span("alarm", `STOPPED by ${row.stop.by_user || row.stop.by}`) : "",
-      row.is_mine ? "you" : row.holder || "–", row.priority, seconds(row.since_s), seconds(row.until_s),
-      seconds(row.lease_left_s), row.because, row.waiting.map((one) => one.who).join(", "),
-    ]));
-  }
-
-  tree(rows) {
-    return table(["behavior", "state", "priority", "does", "because", "ask"], rows.map((row) => [
-      "\u2003".repeat(row.depth) + row.name, span(row.state, row.state), row.priority === null ? "" : String(row.priority),
-      row.feedback, row.because, this.more(row.name),
-    ]));
-  }
-
-  requests(rows) {
-    return table(["who", "state", "resources", "priority", "since", "until", "expected", "because", "ask"], rows.map((row) => [
-      row.who, span(row.state, row.state), row.rcs.join(" "), row.priority, seconds(row.since_s), seconds(row.until_s),
-      seconds(row.expected_start_s), row.because, this.button("Why?", `why:${row.arc}`, () => this.act("why", row.arc)),
-    ]));
-  }
-
-  links(rows) {
-    return table(["link", "state", "there and back", "more"], rows.map((row) => [
-      row.name, span(row.is_up ? "running" : "lost", row.is_up ? "up" : "DOWN"),
-      row.latency_s < 0 ? "" : `${(1000 * row.latency_s).toFixed(0)} ms`, row.feedback,
-    ]));
-  }
-
-  parameters(rows) {
-    return table(["component", "parameter", "value", "before", "changed by"], rows.map((row) => {
-      const input = document.createElement("input");
-      input.value = row.value;
-      input.dataset.key = `set:${row.component}.${row.name}`;
-      input.setAttribute("aria-label", `${row.component} ${row.name}`);
-      input.addEventListener("keydown", (event) => {
-        if (event.key !== "Enter") return;
-        let value = input.value;
-        try { value = JSON.parse(value); } catch { /* it is text as it stands */ }
-        input.blur();
-        this.act("set", row.component, { parameter: row.name, value });
-      });
-      return [row.component, row.name, input, row.before, row.changed_by];
-    }));
-  }
-
-  components(rows) {
-    return table(["component", "type", "host", "pid", "state", "does", "ask"], rows.map((row) => [
-      row.name, row.type, row.host, String(row.pid), row.state, row.feedback, this.more(row.name),
-    ]));
-  }
-
-  log(rows) {
-    return table(["at", "about", "what", "told by"], [...rows].reverse().map((row) => [seconds(row.at_s), row.subject, row.what, row.where]));
-  }
-
-  more(name) {
-    const both = document.createElement("span");
     both.append(
-      this.button("Why?", `why:${name}`, () => this.act("why", name)), " ",
-      this.button("Parameters", `parameters:${name}`, () => { this.act("parameters", name); this.choose("parameters"); }),
+      this.button("Why?", `why:${row.key}`, () => this.act("why", row.subject)),
+      " ",
+      row.acknowledged_by
+        ? `seen by ${row.acknowledged_by}`
+        : this.button("Seen", `acknowledge:${row.key}`, () => this.act("acknowledge", row.key)),
     );
     return both;
   }
 
+  /** @param {RobotView[]} rows */
+  robots(rows) {
+    const heads = ["robot", "stop", "holder", "priority", "since", "slice ends", "lease left", "because", "waiting"];
+    return table(
+      heads,
+      rows.map((row) => [
+        row.robot,
+        row.stop ? span("alarm", `STOPPED by ${row.stop.by_user || row.stop.by}`) : "",
+        row.is_mine ? "you" : row.holder || "–",
+        row.priority,
+        seconds(row.since_s),
+        seconds(row.until_s),
+        seconds(row.lease_left_s),
+        row.because,
+        row.waiting.map((one) => one.who).join(", "),
+      ]),
+    );
+  }
+
+  /** @param {NodeView[]} rows */
+  tree(rows) {
+    return table(
+      ["behavior", "state", "priority", "does", "because", "ask"],
+      rows.map((row) => [
+        "\u2003".repeat(row.depth) + row.name,
+        span(row.state, row.state),
+        row.priority === null ? "" : String(row.priority),
+        row.feedback,
+        row.because,
+        this.more(row.name),
+      ]),
+    );
+  }
+
+  /** @param {RequestRow[]} rows */
+  requests(rows) {
+    return table(
+      ["who", "state", "resources", "priority", "since", "until", "expected", "because", "ask"],
+      rows.map((row) => [
+        row.who,
+        span(row.state, row.state),
+        row.rcs.join(" "),
+        row.priority,
+        seconds(row.since_s),
+        seconds(row.until_s),
+        seconds(row.expected_start_s),
+        row.because,
+        this.button("Why?", `why:${row.arc}`, () => this.act("why", row.arc)),
+      ]),
+    );
+  }
+
+  /** @param {LinkView[]} rows */
+  links(rows) {
+    return table(
+      ["link", "state", "there and back", "more"],
+      rows.map((row) => [
+        row.name,
+        span(row.is_up ? "running" : "lost", row.is_up ? "up" : "DOWN"),
+        row.latency_s < 0 ? "" : `${(1000 * row.latency_s).toFixed(0)} ms`,
+        row.feedback,
+      ]),
+    );
+  }
+
+  /** @param {ParameterView[]} rows */
+  parameters(rows) {
+    return table(
+      ["component", "parameter", "value", "before", "changed by"],
+      rows.map((row) => {
+        const input = document.createElement("input");
+        input.value = row.value;
+        input.dataset.key = `set:${row.component}.${row.name}`;
+        input.setAttribute("aria-label", `${row.component} ${row.name}`);
+        input.addEventListener("keydown", (event) => {
+          if (event.key !== "Enter") return;
+          let value = input.value;
+          try {
+            value = JSON.parse(value);
+          } catch {
+            /* it is text as it stands */
+          }
+          input.blur();
+          this.act("set", row.component, { parameter: row.name, value });
+        });
+        return [row.component, row.name, input, row.before, row.changed_by];
+      }),
+    );
+  }
+
+  /** @param {ComponentRow[]} rows */
+  components(rows) {
+    return table(
+      ["component", "type", "host", "pid", "state", "does", "ask"],
+      rows.map((row) => [row.name, row.type, row.host, String(row.pid), row.state, row.feedback, this.more(row.name)]),
+    );
+  }
+
+  /** @param {string} name */
+  more(name) {
+    const both = document.createElement("span");
+    both.append(
+      this.button("Why?", `why:${name}`, () => this.act("why", name)),
+      " ",
+      this.button("Parameters", `parameters:${name}`, () => {
+        this.act("parameters", name);
+        this.choose("parameters");
+      }),
+    );
+    return both;
+  }
+
+  /**
+   * @param {string} label
+   * @param {string} key
+   * @param {() => void} press
+   */
   button(label, key, press) {
     const button = document.createElement("button");
     button.type = "button";
@@ -160,46 +282,7 @@ export class Tables {
   }
 }
 
+/** @param {string[]} lines */
 function follows(lines) {
   return lines.length ? ` (and what follows from it: ${lines.join("; ")})` : "";
-}
-
-/** Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still. */
-function table(heads, rows) {
-  const made = document.createElement("table");
-  made.setAttribute("role", "table");
-  const head = made.createTHead().insertRow();
-  head.setAttribute("role", "row");
-  for (const one of heads) {
-    const cell = document.createElement("th");
-    cell.scope = "col";
-    cell.setAttribute("role", "columnheader");
-    cell.append(one);
-    head.append(cell);
-  }
-  const body = made.createTBody();
-  for (const row of rows) {
-    const line = body.insertRow();
-    line.setAttribute("role", "row");
-    row.forEach((one, number) => {
-      const cell = line.insertCell();
-      cell.setAttribute("role", "cell");
-      cell.dataset.head = typeof heads[number] === "string" ? heads[number] : "";
-      cell.append(one);
-    });
-  }
-  return made;
-}
-
-function span(className, text) {
-  const made = document.createElement("span");
-  made.className = className;
-  made.textContent = text;
-  return made;
-}
-
-function paragraph(text) {
-  const made = document.createElement("p");
-  made.textContent = text;
-  return made;
 }

@@ -2,33 +2,60 @@
 
 import { seconds, shortened } from "./text.js";
 
-const SVG = "http://www.w3.org/2000/svg";
-const ROW_PX = 28, LEFT_PX = 110, LEAST_PX = 560, LETTER_PX = 7.2, FOOT_PX = 20;
+/** @import { SliceView, TimelineRow, TimelineView } from "./messages.d.ts" */
 
-/** Returns the picture of a timeline, so many pixels wide; wider if that is too narrow to be read. */
+const SVG = "http://www.w3.org/2000/svg";
+const ROW_PX = 28,
+  LEFT_PX = 110,
+  LEAST_PX = 560,
+  LETTER_PX = 7.2,
+  FOOT_PX = 20;
+
+/**
+ * Returns the picture of a timeline, so many pixels wide; wider if that is too narrow to be read.
+ *
+ * @param {TimelineView} view
+ * @param {number} widthPx
+ */
 export function timeline(view, widthPx) {
-  const width = Math.max(LEAST_PX, widthPx) - LEFT_PX, height = ROW_PX * view.rows.length;
+  const width = Math.max(LEAST_PX, widthPx) - LEFT_PX,
+    height = ROW_PX * view.rows.length;
   const svg = node("svg", {
-    class: "timeline", width: LEFT_PX + width, height: height + FOOT_PX, role: "img",
+    class: "timeline",
+    width: LEFT_PX + width,
+    height: height + FOOT_PX,
+    role: "img",
     "aria-label": "who had which resource, who has it, who comes next",
   });
-  const within = (time) => Math.max(view.from_s, Math.min(view.to_s, time));
-  const at = (time) => LEFT_PX + (width * (within(time) - view.from_s)) / (view.to_s - view.from_s);
-  view.rows.forEach((row, number) => svg.append(...rowOf(row, number * ROW_PX, at)));
+  const within = (/** @type {number} */ time) => Math.max(view.from_s, Math.min(view.to_s, time));
+  const at = (/** @type {number} */ time) =>
+    LEFT_PX + (width * (within(time) - view.from_s)) / (view.to_s - view.from_s);
+  for (const [number, row] of view.rows.entries()) svg.append(...rowOf(row, number * ROW_PX, at));
   const here = at(view.now_s);
   svg.append(node("line", { x1: here, x2: here, y1: 0, y2: height, class: "here" }));
   svg.append(node("text", { x: here - 30, y: height + 15 }, seconds(view.now_s)));
   return svg;
 }
 
+/**
+ * @param {TimelineRow} row
+ * @param {number} top
+ * @param {(time: number) => number} at
+ */
 function rowOf(row, top, at) {
   const name = node("text", { x: 4, y: top + 18 }, shortened(row.rc, Math.floor(LEFT_PX / LETTER_PX) - 1));
   name.append(node("title", {}, row.rc));
   return [name, ...row.slices.flatMap((slice) => sliceOf(slice, top, at))];
 }
 
+/**
+ * @param {SliceView} slice
+ * @param {number} top
+ * @param {(time: number) => number} at
+ */
 function sliceOf(slice, top, at) {
-  const from = at(slice.from_s), width = Math.max(1, at(slice.to_s) - from);
+  const from = at(slice.from_s),
+    width = Math.max(1, at(slice.to_s) - from);
   const kind = `${slice.certainty}${slice.is_console ? " console" : ""}`;
   const bar = node("rect", { x: from, y: top + 3, width, height: ROW_PX - 6, rx: 3, class: kind });
   bar.append(node("title", {}, `${slice.who}: ${seconds(slice.from_s)} to ${seconds(slice.to_s)}`));
@@ -36,9 +63,14 @@ function sliceOf(slice, top, at) {
   return label ? [bar, node("text", { x: from + 4, y: top + 18 }, label)] : [bar];
 }
 
+/**
+ * @param {string} tag
+ * @param {Record<string, string | number>} attributes
+ * @param {string} [text]
+ */
 function node(tag, attributes, text = "") {
   const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
+  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
   if (text) made.append(text);
   return made;
 }

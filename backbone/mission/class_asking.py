@@ -1,0 +1,54 @@
+"""Ask classes for their facts, in a process of its own.
+
+To ask a class, its module is imported, and with it OpenCV or MuJoCo: the asking process stays light, and it goes on
+if a module raises, hangs, or ends its process.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import msgspec
+
+from backbone.mission.class_facts import ClassFacts
+
+WITHIN_S = 30.0  # chosen: ten times the import of OpenCV and MuJoCo on a loaded machine
+
+_known: dict[str, ClassFacts] = {}
+
+
+def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
+    """Return the facts of each class; ``failure`` says why a class has none. A class is asked once in a process.
+
+    Args:
+        class_paths: ``package.module:Class`` each. Their modules are run.
+    """
+    left = [path for path in dict.fromkeys(class_paths) if path not in _known]
+    failed: dict[str, ClassFacts] = {}
+    while left:
+        answers, reason = _asked(left)
+        _known.update({path: facts for path, facts in answers.items() if not facts.failure})
+        failed.update({path: facts for path, facts in answers.items() if facts.failure})
+        left = left[len(answers) :]
+        if left:
+            failed[left.pop(0)] = ClassFacts(failure=reason)
+    return {path: _known.get(path) or failed[path] for path in class_paths}
+
+
+def _asked(class_paths: Sequence[str]) -> tuple[dict[str, ClassFacts], str]:
+    """Return the answers up to the first class that ended or held up the process, and how it did so."""
+    command = [sys.executable, "-P", "-m", "backbone.mission.class_probe", *class_paths]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    reason = "the process that imports its module ends without an answer"
+    try:
+        printed = subprocess.run(  # noqa: S603  # this interpreter, with this program
+            command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=WITHIN_S, check=False
+        ).stdout
+    except subprocess.TimeoutExpired as expired:
+        printed, reason = expired.stdout or b"", f"its module is not imported within {WITHIN_S:g} s"
+    lines = printed[: printed.rfind(b"\n") + 1].splitlines()
+    answers = [msgspec.json.decode(line, type=ClassFacts) for line in lines]
+    return dict(zip(class_paths, answers, strict=False)), reason

@@ -1,0 +1,155 @@
+"""What the class of a component says of itself: its documentation, and the parameters a mission file may give it.
+
+Pure data and its judgement. ``class_asking`` gets the data from classes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import resources
+from typing import Annotated, Any, Literal, Union
+
+import msgspec
+
+SHIPPED = "shipped_classes.json"
+
+_LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
+_META = {"minimum": "ge", "exclusiveMinimum": "gt", "maximum": "le", "exclusiveMaximum": "lt", "pattern": "pattern"}
+_PEOPLE = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
+_TYPES = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
+
+
+class ParameterFacts(msgspec.Struct, frozen=True):
+    """A parameter of a class.
+
+    Attributes:
+        name: Its name.
+        schema: The JSON schema of its values, as msgspec derives it from the parameter's type.
+        doc: What it means.
+    """
+
+    name: str
+    schema: dict[str, Any] = {}
+    doc: str = ""
+
+    @property
+    def is_required(self) -> bool:
+        """A mission file must give it."""
+        return "default" not in self.schema
+
+    @property
+    def default(self) -> str:
+        """The value that holds if the file gives none, as JSON; empty: the file must give one."""
+        return "" if self.is_required else msgspec.json.encode(self.schema["default"]).decode()
+
+    @property
+    def type(self) -> str:
+        """The kind of its values: number, integer, string, boolean, or a list of words."""
+        return _type_text(self.schema)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The words it can be; none if it takes other values."""
+        if self.schema.get("type") == "boolean":
+            return ("true", "false")
+        return tuple(map(str, self.schema.get("enum", ())))
+
+    @property
+    def legal_values(self) -> str:
+        """Kind and range of its values for people, as in ``a number, above 0, at most 1``."""
+        return ", ".join([_PEOPLE.get(self.type, self.type), *self._span])
+
+    @property
+    def meaning(self) -> str:
+        """What it means, and the values it takes."""
+        return "; ".join(part for part in (self.doc.rstrip("."), self.legal_values) if part)
+
+    @property
+    def told(self) -> str:
+        """Type, range and default on one line."""
+        return ", ".join([self.type, *self._span, f"default {self.default}" if self.default else "required"])
+
+    @property
+    def _span(self) -> list[str]:
+        return [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
+
+    def accepts(self, value: Any) -> bool:
+        """Say whether the class starts with this value."""
+        try:
+            msgspec.convert(value, _value_type(self.schema))
+        except msgspec.ValidationError:
+            return False
+        return True
+
+
+class ClassFacts(msgspec.Struct, frozen=True):
+    """What a class says of itself.
+
+    Attributes:
+        doc: Its documentation.
+        parameters: What it can be given in a mission file.
+        options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
+        failure: Why nothing can be said; empty: all is said.
+    """
+
+    doc: str = ""
+    parameters: tuple[ParameterFacts, ...] = ()
+    options: dict[str, tuple[ParameterFacts, ...]] | None = None
+    failure: str = ""
+
+    def parameters_with(self, driver: str) -> tuple[ParameterFacts, ...] | None:
+        """Return all that can be given while this driver is used; None if nothing is known of the driver."""
+        if self.options is None:
+            return self.parameters
+        return None if driver not in self.options else (*self.parameters, *self.options[driver])
+
+
+@lru_cache(maxsize=1)
+def shipped_classes() -> Mapping[str, ClassFacts]:
+    """Return the facts of every class that the project brings along, by class path."""
+    text = resources.files("backbone.mission").joinpath(SHIPPED).read_bytes()
+    return msgspec.json.decode(text, type=dict[str, ClassFacts])
+
+
+def parameters_of(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
+    """Return the facts of every field of a parameters' type, in the order of declaration."""
+    (schema,), definitions = msgspec.json.schema_components([struct], ref_template="{name}")
+    declared = definitions[schema["$ref"]]
+    return tuple(
+        ParameterFacts(name, _simple(one, definitions), str(one.get("description", "")))
+        for name, one in declared["properties"].items()
+    )
+
+
+def _simple(one: Mapping[str, Any], definitions: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a schema that a value in a mission file can meet: no objects, no lists."""
+    if "$ref" in one:
+        return _simple(definitions[one["$ref"]], definitions)
+    kept = {key: one[key] for key in ("type", "enum", "default", *_META) if key in one}
+    if "anyOf" in one:
+        kept["anyOf"] = [_simple(each, definitions) for each in one["anyOf"]]
+    return kept
+
+
+def _type_text(schema: Mapping[str, Any]) -> str:
+    if "enum" in schema:
+        return "one of " + ", ".join(map(str, schema["enum"]))
+    if "anyOf" in schema:
+        return " or ".join(_type_text(each) for each in schema["anyOf"])
+    return str(schema.get("type", "any"))
+
+
+def _value_type(schema: Mapping[str, Any]) -> Any:
+    """Return the type that msgspec accepts the same values for."""
+    if "enum" in schema:
+        return Literal[tuple(schema["enum"])]
+    if "anyOf" in schema:
+        return Union[tuple(_value_type(each) for each in schema["anyOf"])]  # noqa: UP007  # made of a list
+    if "type" not in schema:
+        return Any
+    if schema["type"] not in _TYPES:
+        return list  # an object or a list, which no mission file can give
+    limits = {_META[key]: schema[key] for key in _META if key in schema}
+    plain: Any = _TYPES[schema["type"]]
+    return Annotated[plain, msgspec.Meta(**limits)] if limits else plain

@@ -1,0 +1,73 @@
+"""The program that imports classes and prints their facts, one JSON line for each; see ``class_asking``."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import os
+import re
+import sys
+from collections.abc import Sequence
+
+import msgspec
+
+from backbone.component.component import Component
+from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of
+
+_ENTRY = re.compile(r"^    (\w+): (.*)$")
+
+
+def facts_of(class_path: str) -> ClassFacts:
+    """Return the facts of a class; imports its module into this process."""
+    module, _, name = class_path.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), name)
+    except Exception as error:  # a module that is being written raises anything
+        return ClassFacts(failure=f"its module cannot be imported: {type(error).__name__}: {error}")
+    if not (isinstance(found, type) and issubclass(found, Component)):
+        return ClassFacts(failure="it is no component: it does not derive from backbone.component.component:Component")
+    own = tuple(one for one in _documented(found.parameters_type) if one.name not in found.given_elsewhere)
+    options = found.driver_options()
+    return ClassFacts(
+        inspect.getdoc(found) or "",
+        own,
+        None if options is None else {driver: _documented(struct) for driver, struct in options.items()},
+    )
+
+
+def _documented(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
+    docs = _documentation(struct)
+    found = parameters_of(struct)
+    return tuple(
+        msgspec.structs.replace(one, doc=one.doc or docs.get(one.name, "").replace("``", "'")) for one in found
+    )
+
+
+def _documentation(struct: type) -> dict[str, str]:
+    """Return what the docstrings of a struct and its bases say of each field."""
+    found: dict[str, str] = {}
+    for base in reversed(struct.__mro__):
+        _, _, section = inspect.cleandoc(base.__dict__.get("__doc__") or "").partition("Attributes:\n")
+        name = ""
+        for line in section.splitlines():
+            if entry := _ENTRY.match(line):
+                name = entry[1]
+                found[name] = entry[2]
+            elif name and line.startswith("        "):
+                found[name] += " " + line.strip()
+            else:
+                name = ""
+    return found
+
+
+def _answer(class_paths: Sequence[str]) -> None:
+    """Print the facts of each class as it is known; what the modules print goes nowhere."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    for path in class_paths:
+        answers.write(msgspec.json.encode(facts_of(path)) + b"\n")
+        answers.flush()
+
+
+if __name__ == "__main__":
+    _answer(sys.argv[1:])

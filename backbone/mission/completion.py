@@ -1,0 +1,51 @@
+"""What a mission has without saying so: a host, the core services, and the types that the project brings along.
+
+Whatever the file declares itself takes the place of it: a type of a shipped type's name replaces that type, because
+missions name types by name alone, and a class of one's own under a known name is how hardware is exchanged.
+"""
+
+from __future__ import annotations
+
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.mission.document import Attribute, Element
+from backbone.mission.shipped_types import shipped_types
+from backbone.mission.tables import CORE_SERVICES
+
+THIS_HOST = {"name": "base", "address": "127.0.0.1"}
+
+
+def complete(root: Element) -> None:
+    """Add hosts, core services and types that the mission leaves out; they stand where the mission begins."""
+    hosts, core, types = (_section(root, tag) for tag in ("hosts", "core", "types"))
+    if not hosts.children:
+        hosts.children.append(_element(root, "host", THIS_HOST))
+    _complete_core(root, core, [host.text("name") for host in hosts.children])
+    declared = {one.text("name") for one in types.children}
+    for shipped in shipped_types():
+        if shipped.text("name") not in declared:
+            for element in shipped:
+                element.place = root.place
+            types.children.append(shipped)
+
+
+def _complete_core(root: Element, core: Element, hosts: list[str]) -> None:
+    for service in core.children:
+        service.attributes.setdefault("host", Attribute(hosts[0], service.place))
+    there = {(service.text("type"), service.text("host")) for service in core.children}
+    for name in CORE_SERVICES:
+        if name == CREATOR:
+            missing = [host for host in hosts if (name, host) not in there]
+        else:
+            missing = [] if any(known == name for known, _host in there) else hosts[:1]
+        core.children += [_element(root, "service", {"type": name, "host": host}) for host in missing]
+
+
+def _section(root: Element, tag: str) -> Element:
+    found = root.first(tag)
+    if found is None:
+        root.children.append(found := _element(root, tag, {}))
+    return found
+
+
+def _element(root: Element, tag: str, values: dict[str, str]) -> Element:
+    return Element(tag, root.place, {name: Attribute(value, root.place) for name, value in values.items()})

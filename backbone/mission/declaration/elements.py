@@ -1,0 +1,246 @@
+"""The elements of a mission file, from the innermost to the mission; those of the world have a file of their own."""
+
+from __future__ import annotations
+
+import ipaddress
+
+from pydantic import Field
+
+from backbone.component_database.messages import Multiplicity as MultiplicityWord
+from backbone.mission.declaration.parts import Declared, ParameterElement
+from backbone.mission.declaration.values import (
+    Address,
+    Capacity,
+    ClassPath,
+    Duration,
+    Flag,
+    Multiplicity,
+    Name,
+    Names,
+    Port,
+    Priority,
+    Seconds,
+    Subsystem,
+)
+from backbone.mission.declaration.world_elements import WorldElement
+
+HUB_PORT = 7447  # Zenoh's own
+
+
+def is_loopback(address: str) -> bool:
+    """Say whether this IP address or name means the machine itself."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
+
+
+class Host(Declared):
+    """One machine that may run components."""
+
+    name: Name = Field(description="Name of the machine within this file.")
+    address: Address = Field(description="IP address or host name; 127.0.0.1 is the machine 'up' is typed on.")
+    tags: Names = Field(
+        default=(), description="What the machine has, as names separated by blanks; types may ask for them."
+    )
+    port: Port = Field(
+        default=HUB_PORT,
+        description=(
+            "TCP port at which other machines reach the first host's hub, 1 to 65535; other hosts have none, and "
+            "without other machines no port is open."
+        ),
+    )
+
+    @property
+    def is_loopback(self) -> bool:
+        """True if the address means the machine 'up' is typed on, whatever machine that is."""
+        return is_loopback(self.address)
+
+
+class HostsElement(Declared):
+    """The machines; the first one runs the core services. Left out: base, the machine 'up' is typed on."""
+
+    host: tuple[Host, ...] = ()
+
+
+class ServiceElement(Declared):
+    """One core service: nameserver, component_database, placer, dependency_database, rc_manager or creator."""
+
+    type: Name = Field(description="Its component type.")
+    host: Name = Field(default="", description="The host it runs on; left out: the first.")
+    parameter: tuple[ParameterElement, ...] = ()
+
+
+class CoreElement(Declared):
+    """What is set of the core services.
+
+    Each runs without being written: creator on every host, the others on the first.
+    """
+
+    service: tuple[ServiceElement, ...] = ()
+
+
+class NeedsElement(Declared):
+    """A kind of resource an ARC needs one of."""
+
+    type: Name = Field(description="The component type of that resource.")
+
+
+class TypeElement(Declared):
+    """One component type; it takes the place of a shipped one of its name.
+
+    With needs inside it is an ARC, a set of resources claimed and given back as one.
+    """
+
+    name: Name = Field(description="Name of the type, used wherever this file says type or kind.")
+    class_path: ClassPath = Field(
+        alias="class", description="The Python class that runs it, written package.module:Class."
+    )
+    subsystem: Subsystem = Field(
+        description="Where its components belong: backbone, resource_pool, mission_control or ui_console."
+    )
+    multiplicity: Multiplicity = Field(
+        default=MultiplicityWord.MANY, description="How many may run at the same time: one or many."
+    )
+    core: Flag = Field(
+        default=False, description="Whether it is a core service, true or false; only the six of the papers are."
+    )
+    tags: Names = Field(default=(), description="Tags a host must have to run it, as names separated by blanks.")
+    restart: Flag = Field(
+        default=True,
+        description=(
+            "Whether it is started again however it ended, unless it was ordered to stop; false: its owner asks "
+            "for another one."
+        ),
+    )
+    uses: Names = Field(
+        default=(), description="Types of resource that each resource of this type must be tied to by a uses element."
+    )
+    needs: tuple[NeedsElement, ...] = ()
+
+
+class TypesElement(Declared):
+    """The mission's own component types, besides those that the project brings along."""
+
+    type: tuple[TypeElement, ...] = ()
+
+
+class UsesElement(Declared):
+    """Another resource this one only works with; several of one type are alternatives."""
+
+    type: Name = Field(description="Component type of the other resource.")
+    name: Name = Field(description="Name of the other resource.")
+
+
+class ResourceElement(Declared):
+    """One physical resource."""
+
+    type: Name = Field(description="Component type of its resource controller.")
+    name: Name = Field(description="Name of the resource and of its controller.")
+    host: Name = Field(default="", description="The host its hardware is wired to; left out: any.")
+    sharable: Flag = Field(
+        default=False, description="Whether several ARCs may hold it at once within its capacity, true or false."
+    )
+    capacity: Capacity = Field(
+        default=1.0, description="Share of its time a sharable resource can give, above 0, at most 1."
+    )
+    connect_s: Seconds = Field(
+        default=0.0,
+        description=(
+            "Settling time: how long after the order to connect it can be used, tuning included; seconds, 0 or "
+            "more, at most a day."
+        ),
+    )
+    disconnect_s: Seconds = Field(
+        default=0.0, description="Time it takes to let go, seconds, 0 or more, at most a day."
+    )
+    driver: Name = Field(
+        default="simulated",
+        description="Name of the driver its controller uses; 'simulated' is played by the mission's world.",
+    )
+    features: Names = Field(default=(), description="What it has, as names separated by blanks, for wishes (camera).")
+    process: Name = Field(
+        default="",
+        description="Name of the process it shares with all others of that name; left out: a process of its own.",
+    )
+    uses: tuple[UsesElement, ...] = ()
+    parameter: tuple[ParameterElement, ...] = ()
+
+
+class ResourcesElement(Declared):
+    """The hardware; each resource is run by a resource controller of the same name."""
+
+    resource: tuple[ResourceElement, ...] = ()
+
+
+class WishElement(Declared):
+    """Which one of a kind the ARC should get: by name, by features, or both. Kinds without a wish: any."""
+
+    type: Name = Field(description="The kind of resource, one the ARC needs.")
+    name: Name = Field(default="", description="Name of the resource wanted.")
+    features: Names = Field(default=(), description="Features it must have, as names separated by blanks.")
+
+
+class ArcAttributes(Declared):
+    """What is written in the tag of an ARC."""
+
+    kind: Name = Field(description="Component type of the ARC, one with needs.")
+    minimum_runtime_s: Duration = Field(
+        description="Shortest time in which the behavior can do something useful, seconds, above 0, at most a day."
+    )
+    maximum_runtime_s: Seconds = Field(
+        default=0.0, description="Where extensions of its time end, seconds, at least the minimum; 0: at the minimum."
+    )
+    period_s: Duration = Field(
+        default=0.05, description="Interval between its radio packets, seconds, above 0, at most a day."
+    )
+    packet_time_s: Duration = Field(
+        default=0.002, description="Time one of its radio packets is on the air, seconds, above 0, at most a day."
+    )
+
+
+class ArcElement(ArcAttributes):
+    """The set of resources a behavior claims, for how long at a time, and how often it uses the radio."""
+
+    wish: tuple[WishElement, ...] = ()
+
+
+class BehaviorAttributes(Declared):
+    """What is written in the tag of a behavior."""
+
+    type: Name = Field(description="Its component type, of subsystem mission_control.")
+    name: Name = Field(description="Name of the behavior, unique in the mission.")
+    priority: Priority = Field(description="Its priority among its siblings, a whole number; larger is higher.")
+    process: Name = Field(
+        default="",
+        description="Name of the process it shares with all others of that name; left out: a process of its own.",
+    )
+
+
+class BehaviorElement(BehaviorAttributes):
+    """A node of the behavior tree; the behaviors inside it are its children."""
+
+    parameter: tuple[ParameterElement, ...] = ()
+    arc: ArcElement | None = None
+    behavior: tuple[BehaviorElement, ...] = ()
+
+
+class BehaviorsElement(Declared):
+    """The behavior tree's roots."""
+
+    behavior: tuple[BehaviorElement, ...] = ()
+
+
+class MissionElement(Declared):
+    """A whole mission: machines, core services, component types, hardware, world and behaviors."""
+
+    name: Name = Field(description="Name of the mission; missions with different names can run side by side.")
+    priority: Priority = Field(
+        description="Priority of the whole mission among the consoles, a whole number; larger is higher."
+    )
+    hosts: HostsElement | None = None
+    core: CoreElement | None = None
+    types: TypesElement | None = None
+    resources: ResourcesElement | None = None
+    world: WorldElement | None = None
+    behaviors: BehaviorsElement | None = None

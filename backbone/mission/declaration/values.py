@@ -1,0 +1,132 @@
+"""Kinds of value an attribute can have, each with its range.
+
+Rules of this file:
+
+* A kind reads the text of an attribute, as XML Schema would: decimals without exponent, ``true`` or ``1``, names
+  separated by blanks. A value that has its type already passes, so that code can make the same objects.
+* ``kind`` is the name of the simple type in the XML schema; ``meaning`` is the remedy for a wrong value, where the
+  attribute's own description does not tell it.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BeforeValidator, Field, JsonValue
+
+from backbone.component_database.messages import Multiplicity as MultiplicityWord
+from backbone.naming import Subsystem as SubsystemWord
+
+T = TypeVar("T")
+
+LEAST_WHOLE, MOST_WHOLE = -(2**31), 2**31 - 1  # those of xs:int
+
+_BLANKS = " \t\r\n"  # those of XML; Python knows more
+_DECIMAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
+_WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
+_FLAGS = {"true": True, "1": True, "false": False, "0": False}
+
+
+def decimal(text: str) -> float | None:
+    """Return the number that a decimal is; None if the text is none."""
+    return float(text) if _DECIMAL.fullmatch(text := text.strip(_BLANKS)) else None
+
+
+def flag(text: str) -> bool | None:
+    """Return true or false; None if the text is neither."""
+    return _FLAGS.get(text.strip(_BLANKS))
+
+
+def _read_decimal(value: Any) -> Any:
+    return _must(decimal(value)) if isinstance(value, str) else value
+
+
+def _read_whole(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    return _must(int(value) if _WHOLE.fullmatch(value := value.strip(_BLANKS)) else None)
+
+
+def _read_flag(value: Any) -> Any:
+    return _must(flag(value)) if isinstance(value, str) else value
+
+
+def _read_words(value: Any) -> Any:
+    return tuple(re.findall(rf"[^{_BLANKS}]+", value)) if isinstance(value, str) else value
+
+
+def _must(value: T | None) -> T:
+    if value is None:
+        raise ValueError("the text has another form")
+    return value
+
+
+def _kind(name: str, meaning: str = "") -> dict[str, JsonValue]:
+    return {"kind": name, "meaning": meaning} if meaning else {"kind": name}
+
+
+# Readers stand behind the limits: pydantic leaves limits that stand behind a reader out of its JSON schema.
+_DECIMAL_TEXT = BeforeValidator(_read_decimal)
+_WHOLE_TEXT = BeforeValidator(_read_whole)
+
+Name = Annotated[
+    str,
+    Field(
+        pattern=r"^[a-z][a-z0-9_\-]{0,62}$",
+        json_schema_extra=_kind(
+            "name", "A lower-case letter, then lower-case letters, digits, '_' or '-'; at most 63 characters."
+        ),
+    ),
+]
+Names = Annotated[
+    tuple[Name, ...],
+    BeforeValidator(_read_words),
+    Field(
+        json_schema_extra=_kind(
+            "names", "Names separated by blanks, each a lower-case letter, then lower-case letters, digits, '_' or '-'."
+        )
+    ),
+]
+ParameterName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,62}$", json_schema_extra=_kind("parameter-name"))]
+ClassPath = Annotated[
+    str,
+    Field(
+        pattern=r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*:[A-Za-z_][A-Za-z0-9_]*$",
+        json_schema_extra=_kind("class-path"),
+    ),
+]
+Address = Annotated[
+    str,
+    Field(pattern=r"^[A-Za-z0-9:]([A-Za-z0-9.:\-]{0,251}[A-Za-z0-9])?$", json_schema_extra=_kind("address")),
+]
+File = Annotated[
+    str,
+    Field(
+        min_length=1,
+        max_length=4096,
+        json_schema_extra=_kind("file", "The name of a file, at most 4096 characters."),
+    ),
+]
+Text = Annotated[str, Field(json_schema_extra=_kind("xs:string"))]
+Flag = Annotated[bool, BeforeValidator(_read_flag), Field(json_schema_extra=_kind("xs:boolean"))]
+
+Subsystem = Annotated[SubsystemWord, Field(json_schema_extra=_kind("subsystem"))]
+Multiplicity = Annotated[MultiplicityWord, Field(json_schema_extra=_kind("multiplicity"))]
+Shape = Annotated[Literal["pioneer", "person", "carrier"], Field(json_schema_extra=_kind("shape"))]
+FurnitureShape = Annotated[Literal["box", "table"], Field(json_schema_extra=_kind("furniture-shape"))]
+
+Priority = Annotated[int, Field(ge=LEAST_WHOLE, le=MOST_WHOLE, json_schema_extra=_kind("priority")), _WHOLE_TEXT]
+Seed = Annotated[int, Field(ge=0, le=MOST_WHOLE, json_schema_extra=_kind("seed")), _WHOLE_TEXT]
+Port = Annotated[int, Field(ge=1, le=65535, json_schema_extra=_kind("port")), _WHOLE_TEXT]
+
+Capacity = Annotated[float, Field(gt=0, le=1, json_schema_extra=_kind("capacity")), _DECIMAL_TEXT]
+Seconds = Annotated[float, Field(ge=0, le=86400, json_schema_extra=_kind("seconds")), _DECIMAL_TEXT]
+Duration = Annotated[float, Field(gt=0, le=86400, json_schema_extra=_kind("duration")), _DECIMAL_TEXT]
+Scale = Annotated[float, Field(ge=0, le=10, json_schema_extra=_kind("scale")), _DECIMAL_TEXT]
+Share = Annotated[float, Field(ge=0, le=1, json_schema_extra=_kind("share")), _DECIMAL_TEXT]
+Height = Annotated[float, Field(ge=0, le=100, json_schema_extra=_kind("height")), _DECIMAL_TEXT]
+Coordinate = Annotated[float, Field(ge=-1000, le=1000, json_schema_extra=_kind("coordinate")), _DECIMAL_TEXT]
+Extent = Annotated[float, Field(gt=0, le=1000, json_schema_extra=_kind("extent")), _DECIMAL_TEXT]
+Speed = Annotated[float, Field(gt=0, le=100, json_schema_extra=_kind("speed")), _DECIMAL_TEXT]
+Degrees = Annotated[float, Field(ge=-360, le=360, json_schema_extra=_kind("degrees")), _DECIMAL_TEXT]

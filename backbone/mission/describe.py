@@ -1,0 +1,140 @@
+"""From the declared elements of a mission without faults to its description."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from backbone.component_database.messages import ComponentType
+from backbone.dependency_database.messages import Resource
+from backbone.mission.declaration.elements import (
+    ArcAttributes,
+    ArcElement,
+    BehaviorAttributes,
+    BehaviorElement,
+    MissionElement,
+    ResourceElement,
+    TypeElement,
+)
+from backbone.mission.declaration.parts import Declared, ParameterElement
+from backbone.mission.declaration.world_elements import AirElement, TargetElement, WorldElement
+from backbone.mission.model import ArcWish, Behavior, Component, CoreService, MissionDescription
+from backbone.mission.room_files import room_text
+from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, parameter_value
+
+
+def describe(mission: MissionElement, source: str) -> MissionDescription:
+    """Return the description of a mission without faults."""
+    hosts = () if mission.hosts is None else mission.hosts.host
+    world = mission.world
+    resources = () if mission.resources is None else mission.resources.resource
+    return MissionDescription(
+        name=mission.name,
+        priority=mission.priority,
+        hosts=hosts,
+        core=_core(mission, [host.name for host in hosts]),
+        types=() if mission.types is None else tuple(map(_component_type, mission.types.type)),
+        resources=tuple(_resource(resource, world) for resource in resources),
+        components=() if world is None else (_world(world, resources, source),),
+        behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
+        source=source,
+    )
+
+
+def _parameters(given: Iterable[ParameterElement]) -> dict[str, bool | int | float | str]:
+    return {one.name: parameter_value(one.value) for one in given}
+
+
+def _core(mission: MissionElement, hosts: Sequence[str]) -> tuple[CoreService, ...]:
+    written = () if mission.core is None else mission.core.service
+    services = [CoreService(type=one.type, host=one.host, parameters=_parameters(one.parameter)) for one in written]
+    return tuple(sorted(services, key=lambda one: (CORE_SERVICES.index(one.type), hosts.index(one.host))))
+
+
+def _component_type(declared: TypeElement) -> ComponentType:
+    return ComponentType(
+        name=declared.name,
+        class_path=declared.class_path,
+        subsystem=declared.subsystem,
+        multiplicity=declared.multiplicity,
+        core=declared.core,
+        tags=list(declared.tags),
+        restart=declared.restart,
+        needs=[needed.type for needed in declared.needs],
+    )
+
+
+def _resource(declared: ResourceElement, world: WorldElement | None) -> Resource:
+    links: dict[str, list[str]] = {}
+    for used in declared.uses:
+        links.setdefault(used.type, []).append(used.name)
+    played_by = {WORLD: world.name} if world is not None and declared.driver == SIMULATED else {}
+    values = declared.model_dump(exclude={"uses", "parameter", "features"})
+    return Resource(
+        **values,
+        features=list(declared.features),
+        parameters={**played_by, **_parameters(declared.parameter)},
+        links=links,
+    )
+
+
+def _behavior(declared: BehaviorElement) -> Behavior:
+    return Behavior(
+        **declared.model_dump(include=set(BehaviorAttributes.model_fields), exclude_defaults=True),
+        parameters=_parameters(declared.parameter),
+        arc=None if declared.arc is None else _arc(declared.arc),
+        children=tuple(map(_behavior, declared.behavior)),
+    )
+
+
+def _arc(declared: ArcElement) -> ArcWish:
+    return ArcWish(
+        **declared.model_dump(include=set(ArcAttributes.model_fields), exclude_defaults=True),
+        wish={wish.type: wish.name for wish in declared.wish if wish.name},
+        features={wish.type: wish.features for wish in declared.wish if wish.features},
+    )
+
+
+# ---------------------------------------------------------------------- the world
+def _world(world: WorldElement, resources: Sequence[ResourceElement], source: str) -> Component:
+    ids = {one.name: _parameters(one.parameter).get(NETWORK_ID) for one in resources}
+    return Component(
+        type=world.type,
+        name=world.name,
+        host=world.host,
+        parameters={**_parameters(world.parameter), WORLD: _world_content(world, ids, source)},
+        process=world.process,
+    )
+
+
+def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
+    return {
+        "width_m": world.room.width_m,
+        "depth_m": world.room.depth_m,
+        "seed": world.seed,
+        "furniture": list(map(_body, world.furniture)),
+        "scouts": [
+            {**_body(scout, "class_path"), "kind": scout.class_path, NETWORK_ID: ids[scout.name]}
+            for scout in world.scout
+        ],
+        "targets": list(map(_target, world.target)),
+        "ramps": list(map(_body, world.ramp)),
+        "landmarks": list(map(_body, world.landmark)),
+        "dark_places": list(map(_body, world.dark)),
+        "air": (world.air or AirElement()).model_dump(),
+        "mjcf": room_text(source, world.room.mjcf) if world.room.mjcf else "",
+    }
+
+
+def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
+    """Return the attributes of a body, its heading in radians."""
+    values = declared.model_dump(exclude=set(left_out))
+    if "heading_deg" in values:
+        values["heading_rad"] = math.radians(values.pop("heading_deg"))
+    return values
+
+
+def _target(target: TargetElement) -> dict[str, Any]:
+    return {**_body(target, "point"), "path": [[point.x_m, point.y_m] for point in target.point]}

@@ -1,0 +1,31 @@
+"""The component types that the project brings along: no mission file need declare them."""
+
+from __future__ import annotations
+
+import copy
+from functools import lru_cache
+from importlib import resources
+
+from backbone.mission.document import Element, parse
+from backbone.mission.report import Report
+
+FILE = "shipped_types.xml"
+
+
+def shipped_text() -> bytes:
+    """Return the types as the text of a mission file that has nothing else."""
+    return resources.files("backbone.mission").joinpath(FILE).read_bytes()
+
+
+def shipped_types() -> list[Element]:
+    """Return a new element for each type, in the order of the file."""
+    return copy.deepcopy(_types())
+
+
+@lru_cache(maxsize=1)
+def _types() -> list[Element]:
+    root = parse(shipped_text(), Report(FILE))
+    types = None if root is None else root.first("types")
+    if types is None:
+        raise AssertionError(f"{FILE} has no types")
+    return types.children

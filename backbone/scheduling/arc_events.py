@@ -1,0 +1,275 @@
+"""ARC events: what follows from what ARCs ask and say, and from the outcomes of their context switches.
+
+The rest of an ARC's life is decided by the plan (``schedule_manager``).
+
+Rules of this file (numbers as in docs and ``why``):
+
+* 6  revoke → free → connect → grant.
+* 11 An ARC that lost its owner is revoked; the rest of the schedule goes on.
+* 14 A running ARC may go on up to its maximum run time; an idle one keeps its request.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import msgspec
+
+from backbone.scheduling import trace
+from backbone.scheduling.alternatives import can_be_planned
+from backbone.scheduling.damping import Damping
+from backbone.scheduling.entries import Afterwards, ArcEntry
+from backbone.scheduling.events import Adopted, Requested, RuntimeChanged
+from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.priority_events import PriorityEvents
+from backbone.scheduling.priority_tree import PriorityTree
+from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.transitions import Transitions, because
+
+RETRY_S = 1.0  # chosen: an ARC that cannot open its gate is asked again at a pace that leaves its rivals their time
+
+
+class ArcEvents:
+    """Applies events of ARCs."""
+
+    def __init__(
+        self,
+        transitions: Transitions,
+        schedule: MasterSchedule,
+        tree: PriorityTree,
+        priorities: PriorityEvents,
+        rules: SchedulingRules,
+    ) -> None:
+        self._transitions = transitions
+        self._state = schedule.state
+        self._table = schedule.table
+        self._tree = tree
+        self._priorities = priorities
+        self._grid_s = rules.grid_s
+        self._successors: dict[str, Requested] = {}
+        self._retrying: dict[str, ArcEntry] = {}
+        self._damping = Damping()
+
+    # What ARCs want.
+
+    def requested(self, event: Requested) -> None:
+        """An ARC asks, or asks again: for other RCs it asks anew, once those it has are free."""
+        request = event.request
+        known = self._state.arcs.get(request.arc)
+        if known is None:
+            self._add(event)
+            return
+        if known.afterwards is Afterwards.GONE and known.holds:
+            self._successors[request.arc] = event  # it asks anew while its last RCs are still being freed
+            return
+        place_in_tree = self._priorities.place(request)
+        if dict(known.uses) != _chosen(request, event.rcs) or known.place_in_tree != place_in_tree:
+            self._successors[request.arc] = event
+            self._depart(request.arc, "self")
+            return
+        self._state.request_again(known, request)
+        self.runtime_changed(RuntimeChanged(request.arc, request.minimum_runtime_s, request.maximum_runtime_s))
+        if request.idle:
+            self.idled(request.arc)
+        else:
+            self.wanted(request.arc)
+
+    def adopted(self, event: Adopted) -> None:
+        """Let an ARC run on that an earlier RC manager granted its RCs.
+
+        The caller says that it happened when its RCs were connected, so the trace shows its slice as it was.
+        """
+        request, rcs = event.request, tuple(event.epochs)
+        if request.arc in self._state.arcs or any(rc not in self._state.rcs for rc in rcs):
+            return
+        arc = self._add(Requested(msgspec.structs.replace(request, idle=False), rcs))
+        holders = [other for other in self._state.arcs.values() if other.holds]
+        if self._table.usable(arc) and self._table.fits(arc, holders):
+            self._transitions.adopt(arc, event.epochs, event.granted_s)
+        self._state.request_again(arc, request)
+
+    def wanted(self, name: str) -> None:
+        """An idle ARC wants time again."""
+        arc = self._state.arcs.get(name)
+        if arc is None:
+            return
+        self._successor_idles(name, idle=False)
+        if arc.state is RequestState.REVOKING and arc.afterwards is Afterwards.IDLE:
+            self._state.set_afterwards(arc, Afterwards.WANT)
+        elif arc.state is RequestState.IDLE:
+            self._want(arc)
+
+    def _want(self, arc: ArcEntry) -> None:
+        """Queue an idle ARC, or have it wait for that if its owner asked and left too often."""
+        wait_s = self._damping.wait_s(arc.request.owner, self._transitions.now_s)
+        if wait_s:
+            self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
+        else:
+            self._queue(arc)
+
+    def _queue(self, arc: ArcEntry) -> None:
+        self._transitions.trace.record(trace.about("want", self._transitions.now_s, arc.name), "it wants time again")
+        self._transitions.queue(arc)
+
+    def _wait_to_ask(self, arc: ArcEntry, wait_s: float, why: str) -> None:
+        self._state.retry_at(arc, self._transitions.now_s + wait_s, why)
+        self._retrying[arc.name] = arc
+
+    def _leaves(self, arc: ArcEntry) -> None:
+        if arc.has_forced and arc.state in (RequestState.WAITING, RequestState.CONNECTING):
+            self._damping.left_in_vain(arc.request.owner, self._transitions.now_s)
+
+    def idled(self, name: str) -> None:
+        """An ARC wants no time now; it keeps its request and gives its RCs back."""
+        arc = self._state.arcs.get(name)
+        if arc is None:
+            return
+        self._successor_idles(name, idle=True)
+        self._leaves(arc)
+        self._state.retry_at(arc, None)
+        if arc.state is RequestState.REVOKING:
+            if arc.afterwards is Afterwards.WAIT:
+                self._record_idle(name, "it wants no time now")
+            if arc.afterwards is not Afterwards.GONE:
+                self._state.set_afterwards(arc, Afterwards.IDLE)
+        elif arc.state is not RequestState.IDLE:
+            self._record_idle(name, "it wants no time now")
+            if arc.state is RequestState.WAITING:
+                self._state.rest(arc, self._transitions.now_s)
+            else:
+                self._transitions.revoke(arc, "self", "", Afterwards.IDLE)
+
+    def departed(self, name: str, why: str) -> None:
+        """An ARC withdrew or died."""
+        self._successors.pop(name, None)
+        self._depart(name, why)
+
+    def _depart(self, name: str, why: str) -> None:
+        arc = self._state.arcs.get(name)
+        if arc is None or (arc.holds and arc.afterwards is Afterwards.GONE):
+            return
+        self._leaves(arc)
+        self._transitions.trace.record(trace.about("depart", self._transitions.now_s, name), because(why, ""))
+        if not arc.holds:
+            self._forget(arc)
+        elif arc.state is RequestState.REVOKING:
+            self._state.set_afterwards(arc, Afterwards.GONE)
+        else:
+            self._transitions.revoke(arc, why, "", Afterwards.GONE)
+
+    def runtime_changed(self, event: RuntimeChanged) -> None:
+        """An ARC has other run times from its next slice on; times that cannot be planned change nothing."""
+        arc, minimum_s = self._state.arcs.get(event.arc), event.minimum_runtime_s
+        maximum_s = max(event.maximum_runtime_s, self._longest_s(minimum_s))
+        if arc is None or (arc.minimum_s, arc.maximum_s) == (minimum_s, maximum_s):
+            return
+        if not can_be_planned(minimum_s, maximum_s):
+            return
+        self._state.set_run_times(arc, minimum_s, maximum_s)
+        line = trace.runtime(self._transitions.now_s, event.arc, minimum_s, maximum_s)
+        self._transitions.trace.record(line, "from the next slice on")
+
+    def extended(self, name: str, until_s: float) -> None:
+        """A running ARC goes on until then, at most until the end of its maximum run time."""
+        arc = self._state.arcs.get(name)
+        if arc is None or arc.state is not RequestState.RUNNING:
+            return
+        until_s = min(until_s, arc.slice_s + arc.maximum_s)
+        if until_s > arc.end_s:
+            self._transitions.extend(arc, until_s)
+
+    # Outcomes of context switches.
+
+    def opened(self, name: str) -> None:
+        """The ARC's RCs have settled and its gate is open."""
+        arc = self._state.arcs.get(name)
+        if arc is not None and arc.state is RequestState.CONNECTING:
+            self._transitions.grant(arc)
+
+    def open_failed(self, name: str, rc: str) -> None:
+        """The ARC's RCs could not all be connected (``rc``: already counted as down), or its gate did not open."""
+        arc = self._state.arcs.get(name)
+        if arc is None or arc.state is not RequestState.CONNECTING:
+            return
+        if rc in arc.uses:
+            self._transitions.lose(arc, "rc", rc)
+        else:
+            self._record_idle(name, f"it could not open its gate; again in {RETRY_S:g} s")
+            self._transitions.lose(arc, "failed", "", Afterwards.IDLE)
+            self._wait_to_ask(arc, RETRY_S, "it could not open its gate")
+        self.freed(name)
+
+    def freed(self, name: str) -> None:
+        """All RCs of the ARC are in their safe states."""
+        arc = self._state.arcs.get(name)
+        if arc is None or arc.state is not RequestState.REVOKING:
+            return
+        afterwards = arc.afterwards
+        waits = afterwards is Afterwards.WAIT
+        self._transitions.trace.record(
+            trace.about("free", self._transitions.now_s, name), "its RCs are in their safe states"
+        )
+        self._transitions.free(arc, RequestState.WAITING if waits else RequestState.IDLE)
+        if afterwards is Afterwards.WANT:
+            self.wanted(name)
+        elif afterwards is Afterwards.GONE:
+            self._forget(arc)
+
+    # ARCs that could not open their gates.
+
+    def retry(self) -> None:
+        """Let ARCs ask again whose time for that has come."""
+        for arc in [*self._retrying.values()]:
+            if arc.retry_s is None:
+                del self._retrying[arc.name]
+            elif arc.state is RequestState.IDLE and arc.retry_s <= self._transitions.now_s:
+                del self._retrying[arc.name]
+                self._queue(arc)
+
+    def next_retry_s(self) -> float | None:
+        """Return when the next ARC asks again; None if none does."""
+        return min((arc.retry_s for arc in self._retrying.values() if arc.retry_s is not None), default=None)
+
+    # Bookkeeping.
+
+    def _add(self, event: Requested) -> ArcEntry:
+        request = event.request
+        for rc in event.rcs:
+            self._transitions.trace.introduce_rc(self._state.rcs[rc], self._transitions.now_s)
+        place_in_tree = self._priorities.place(request)
+        uses, path = _chosen(request, event.rcs), self._tree.path(place_in_tree)
+        longest_s = self._longest_s(request.minimum_runtime_s)
+        arc = self._state.add_arc(request, uses, place_in_tree, path, longest_s, self._transitions.now_s)
+        wait_s = 0.0 if request.idle else self._damping.wait_s(request.owner, self._transitions.now_s)
+        self._transitions.trace.record_request(arc, self._transitions.now_s, idle=request.idle or wait_s > 0)
+        if wait_s:
+            self._wait_to_ask(arc, wait_s, "its owner asked and left before the grant, again and again")
+        elif not request.idle:
+            self._transitions.queue(arc)
+        return arc
+
+    def _longest_s(self, minimum_s: float) -> float:
+        """Return the longest slice of this minimum run time that is not extended on request."""
+        return minimum_s + self._grid_s
+
+    def _forget(self, arc: ArcEntry) -> None:
+        self._retrying.pop(arc.name, None)
+        self._state.forget(arc)
+        successor = self._successors.pop(arc.name, None)
+        if successor is not None:
+            self.requested(successor)
+
+    def _successor_idles(self, name: str, *, idle: bool) -> None:
+        """Let the request that waits for the end of the old one of this name know, too."""
+        if name in self._successors:
+            event = self._successors[name]
+            self._successors[name] = Requested(msgspec.structs.replace(event.request, idle=idle), event.rcs)
+
+    def _record_idle(self, name: str, cause: str) -> None:
+        self._transitions.trace.record(trace.about("idle", self._transitions.now_s, name), cause)
+
+
+def _chosen(request: SchedulingRequest, rcs: Sequence[str]) -> dict[str, RcUse]:
+    """Return the alternative of these RCs."""
+    return next((dict(wish) for wish in request.alternatives if wish.keys() == {*rcs}), {rc: RcUse() for rc in rcs})

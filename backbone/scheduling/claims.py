@@ -1,0 +1,60 @@
+"""From a claim to the scheduling request: what an ARC asks of the RC manager on its owner's behalf.
+
+Rule of this file: pure, so that a mission can be rehearsed with the very requests its ARCs will send.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
+
+from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
+
+STREAMED_KINDS = frozenset({"command_radio"})
+"""Kinds of RC that an ARC uses by streams; all others exclusively. Source: RAM 2002, "Sharable Resources"."""
+
+
+def scheduling_request(
+    arc: str,
+    sets: Sequence[Mapping[str, str]],
+    *,
+    owner: str,
+    path: Sequence[tuple[str, int]],
+    streams: Sequence[Usage],
+    minimum_runtime_s: float,
+    maximum_runtime_s: float = 0.0,
+    streamed: AbstractSet[str] = STREAMED_KINDS,
+    console: bool = False,
+    idle: bool = False,
+    stops_at_once: bool = False,
+) -> SchedulingRequest:
+    """Return the request of an ARC.
+
+    Args:
+        arc: Its name.
+        sets: The sets of RCs that would do, best first: kind → name.
+        owner: Address of its decision process.
+        path: Names and priorities from the mission's root, or of the console alone.
+        streams: What it sends through each RC it uses by streams.
+        minimum_runtime_s: Shortest useful time, seconds.
+        maximum_runtime_s: End of all extensions, seconds; 0: the minimum.
+        streamed: Kinds of RC it uses by streams.
+        console: True if the owner is a console.
+        idle: True: no time is wanted yet.
+        stops_at_once: True: nothing must be brought to rest at the end of a slice.
+    """
+
+    def use(kind: str) -> RcUse:
+        return RcUse(list(streams)) if kind in streamed else RcUse()
+
+    return SchedulingRequest(
+        arc=arc,
+        owner=owner,
+        path=[PathNode(name, priority) for name, priority in path],
+        console=console,
+        alternatives=[{rc: use(kind) for kind, rc in rcs.items()} for rcs in sets],
+        minimum_runtime_s=minimum_runtime_s,
+        maximum_runtime_s=maximum_runtime_s,
+        idle=idle,
+        stops_at_once=stops_at_once,
+    )

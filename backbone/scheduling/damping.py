@@ -1,0 +1,45 @@
+"""Damping: an owner that asks and leaves, again and again, cannot keep others from running.
+
+A higher request displaces others at once (rule 4). One that cut a slice short and leaves before it is granted has cost
+them their turn and gained nothing. After a few such in a row the owner's next request counts only after a wait, which
+doubles with each.
+
+Rule of this file: pure; time is an argument.
+"""
+
+from __future__ import annotations
+
+FREE = 4  # chosen: so often may an operator think better of it
+MOST = 9  # chosen: from here on the wait is the longest
+FORGIVEN_S = 2.0  # chosen: one leave is forgotten after this time
+LONGEST_S = 30.0  # chosen: some slices of those that were displaced
+
+
+class Damping:
+    """Counts leaves before the grant, owner by owner."""
+
+    def __init__(self) -> None:
+        self._left: dict[str, tuple[float, float]] = {}
+
+    def left_in_vain(self, owner: str, now_s: float) -> None:
+        """Count a request of this owner that cut a slice short and left before it was granted."""
+        self._left[owner] = min(MOST, self._count(owner, now_s) + 1), now_s
+
+    def wait_s(self, owner: str, now_s: float) -> float:
+        """Return how long the next request of this owner must wait before it counts, seconds; mostly 0.
+
+        Example:
+            >>> damping = Damping()
+            >>> for _ in range(FREE + 3):
+            ...     damping.left_in_vain("ui_console/anna", 0.0)
+            >>> [damping.wait_s("ui_console/anna", now_s) for now_s in (0.0, 2.0, 4.0, 8.0)]
+            [8.0, 4.0, 2.0, 0.0]
+        """
+        count = self._count(owner, now_s)
+        if count <= 0:
+            self._left.pop(owner, None)
+        return 0.0 if count < FREE else min(LONGEST_S, 2.0 ** (count - FREE))
+
+    def _count(self, owner: str, now_s: float) -> float:
+        count, at_s = self._left.get(owner, (0.0, now_s))
+        return max(0.0, count - (now_s - at_s) / FORGIVEN_S)

@@ -1,0 +1,171 @@
+"""Entries: the record of each RC and of each ARC in the schedule.
+
+Rule of this file: data and what is computed from it alone. Only ``ScheduleState`` writes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from backbone.scheduling.priority import Level, Path, higher
+from backbone.scheduling.requests import RcUse, RequestState, SchedulingRequest
+from backbone.scheduling.response_time import Stream
+
+INSTANT_S = 1e-9  # chosen: times closer than this are the same; far above the rounding of sums of times
+SOON_S = 1e-6  # chosen: an RC that should be free by now is expected at once, but is not free yet
+
+HOLDING = frozenset({RequestState.CONNECTING, RequestState.RUNNING, RequestState.REVOKING})
+CONNECTED = frozenset({RequestState.CONNECTING, RequestState.RUNNING})
+
+
+@dataclass(slots=True)
+class RcEntry:
+    """One RC as the schedule sees it.
+
+    Attributes:
+        name: Its name.
+        kind: Its type, for people.
+        sharable: True if several ARCs may hold it by streams.
+        capacity: Part of its time it can give, 0 to 1.
+        connect_s: Settling time.
+        disconnect_s: Release time.
+        up: True if it answers.
+        epoch: Largest epoch given so far, at the beginning of settling.
+        granted_epoch: Largest epoch of a grant so far.
+        failed: True if it went down; False if it only was not started yet.
+        fault: Why it is put aside while it answers; empty: it is not.
+        holders: ARCs that hold it, settling or not yet free of it, in the order in which they got it.
+    """
+
+    name: str
+    kind: str
+    sharable: bool
+    capacity: float
+    connect_s: float
+    disconnect_s: float
+    up: bool
+    epoch: int
+    granted_epoch: int = 0
+    failed: bool = False
+    fault: str = ""
+    holders: dict[ArcEntry, None] = field(default_factory=dict)
+
+
+class Afterwards(Enum):
+    """What becomes of an ARC once its RCs are free."""
+
+    WAIT = "wait"  # it is in the queue again already
+    IDLE = "idle"
+    WANT = "want"  # it said idle, and then that it wants time after all
+    GONE = "gone"
+
+
+@dataclass(slots=True, eq=False)
+class ArcEntry:
+    """One ARC in the master schedule.
+
+    Attributes:
+        request: As last sent.
+        uses: RC → how it uses it; the alternative that was chosen.
+        place_in_tree: Names from the root to its owner.
+        path: The same with the present numbers.
+        level: Its parent's path and its own number, the same object in all siblings of that number: they are equals.
+        minimum_s: Run time it needs to be served, counted from the grant.
+        maximum_s: End of all extensions, counted from the grant.
+        settle_s: Longest settling time of its RCs.
+        release_s: Longest release time of its RCs.
+        touches: The RCs it uses, as a set of bits.
+        excludes: Those of them it uses exclusively.
+        shares: Names of those it uses by streams.
+        streams: Sharable RC → its streams there.
+        stamp: When it became active or was last served, and which of several at that time it was.
+        reservation: Set while RCs are being freed for it by force, or where equals reserve nothing from each other: it
+            comes before all equals; smaller is earlier.
+        state: Where it is.
+        since_s: When it came to that state.
+        began_s: When its RCs began to settle, while it holds them.
+        end_s: End of its slice, while it runs.
+        granted_s: When it was granted, while it runs.
+        slice_s: When its present slice began, while it runs: at the grant, or later where it stayed connected.
+        epochs: RC → epoch, while it holds them.
+        awaited: Its end of slice is on the agenda, because an ARC waits for it.
+        afterwards: What becomes of it once free, while it is being revoked.
+        has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
+        retry_s: When it counts again, after it could not open or left too often; None: when it wants time.
+        retry_why: Why not sooner.
+        turns: Slices so far.
+        had_s: Time it had, as the discipline ``time`` counts it; without the run that goes on.
+        raised: Levels by which it rose because it waited long (aging).
+        swapped_out: Why it lost its RCs last; empty: never.
+        swapped_out_by: Because of whom.
+    """
+
+    request: SchedulingRequest
+    uses: Mapping[str, RcUse]
+    place_in_tree: tuple[str, ...]
+    path: Path
+    level: Level
+    minimum_s: float
+    maximum_s: float
+    settle_s: float
+    release_s: float
+    since_s: float
+    touches: int
+    excludes: int
+    shares: tuple[str, ...]
+    streams: Mapping[str, Sequence[Stream]]
+    stamp: tuple[float, int] = (0.0, 0)
+    reservation: int | None = None
+    state: RequestState = RequestState.IDLE
+    began_s: float = 0.0
+    end_s: float = 0.0
+    granted_s: float = 0.0
+    slice_s: float = 0.0
+    epochs: dict[str, int] = field(default_factory=dict)
+    awaited: bool = False
+    afterwards: Afterwards = Afterwards.WAIT
+    has_forced: bool = False
+    retry_s: float | None = None
+    retry_why: str = ""
+    turns: int = 0
+    had_s: float = 0.0
+    raised: int = 0
+    swapped_out: str = ""
+    swapped_out_by: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name of the ARC."""
+        return self.request.arc
+
+    def goes_before(self, other: ArcEntry) -> bool:
+        """Say whether its owner is strictly higher than the other's."""
+        return self.level is not other.level and higher(self.path, other.path)
+
+    @property
+    def active(self) -> bool:
+        """It wants time, or still holds RCs."""
+        return self.state is not RequestState.IDLE
+
+    @property
+    def holds(self) -> bool:
+        """RCs are connected to it, settling for it, or not yet free of it."""
+        return self.state in HOLDING
+
+    @property
+    def queued(self) -> bool:
+        """It has a place in the order: it waits, or will wait as soon as its RCs are free."""
+        return self.state is RequestState.WAITING or (
+            self.state is RequestState.REVOKING and self.afterwards is Afterwards.WAIT
+        )
+
+    @property
+    def length_s(self) -> float:
+        """Time from the beginning of settling to the end of its minimum run time."""
+        return self.settle_s + self.minimum_s
+
+    def served(self, now_s: float) -> bool:
+        """Say whether it runs and had its whole slice."""
+        return self.state is RequestState.RUNNING and now_s >= self.end_s - INSTANT_S

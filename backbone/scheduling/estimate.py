@@ -1,0 +1,71 @@
+"""Estimate: predicted starts of the ARCs of a large group, for people.
+
+No turn depends on it. Source: decision 0011.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+
+from backbone.scheduling.entries import INSTANT_S, ArcEntry
+from backbone.scheduling.planner import Hold, Slot
+from backbone.scheduling.prefix_maximum import PrefixMaximum
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.table import Table
+
+
+def estimate(table: Table, order: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+    """Return the places of these ARCs, given in order, if each RC serves one after the other.
+
+    Sharers of an RC are counted by their share of its time, not stream by stream.
+    """
+    ends_s: dict[str, float] = {}
+    taken_s: dict[str, float] = {}
+    all_equal = len({(arc.path[:-1], arc.path[-1][1]) for arc in order}) == 1
+    exclusive: defaultdict[str, PrefixMaximum] = defaultdict(PrefixMaximum)
+    sharers: defaultdict[str, PrefixMaximum] = defaultdict(PrefixMaximum)
+    slots = []
+    for arc in order:
+        standing = _standing(table, arc, now_s)
+        if not table.usable(arc):
+            slots.append(Slot(arc, math.inf, standing))
+            continue
+        crowded = [rc for rc in arc.shares if not table.has_room_for_all(rc)]
+        alone = [rc for rc in arc.uses if rc not in arc.shares]
+        start_s = now_s
+        for holder, _, end_s in standing:
+            start_s = max(start_s, end_s + (0.0 if holder.state is RequestState.REVOKING else holder.release_s))
+        for rc in arc.uses:
+            start_s = max(start_s, ends_s.get(rc, now_s))
+        for rc in (*crowded, *alone) if taken_s else ():
+            start_s = max(start_s, now_s + taken_s.get(rc, 0.0))
+        if not all_equal:
+            above = [*(exclusive[rc] for rc in arc.uses), *(sharers[rc] for rc in alone if rc in sharers)]
+            if any(one.largest(arc.path) > -math.inf for one in above):
+                start_s = math.inf  # once those above it run, they need not end
+            for rc in arc.uses:
+                (sharers if rc in arc.shares else exclusive)[rc].add(arc.path, start_s)
+        slots.append(Slot(arc, start_s, [hold for hold in standing if hold[2] > now_s + INSTANT_S]))
+        if start_s < math.inf:
+            for rc in alone:
+                ends_s[rc] = start_s + arc.length_s + arc.release_s
+            for rc in crowded:
+                taken_s[rc] = taken_s.get(rc, 0.0) + arc.length_s * _share(table, arc, rc)
+    return slots
+
+
+def _share(table: Table, arc: ArcEntry, rc: str) -> float:
+    """Return the part of what the RC can give that the ARC asks for, 0 to 1."""
+    demanded = sum(one.packet_time_s / one.period_s for one in arc.uses[rc].streams)
+    return min(1.0, demanded / table.state.rcs[rc].capacity)
+
+
+def _standing(table: Table, arc: ArcEntry, now_s: float) -> list[Hold]:
+    """Return the holders that the ARC cannot run beside."""
+    return [
+        (holder, -math.inf, table.stands_until_s(holder, arc, now_s))
+        for holder in table.state.holders(arc)
+        if table.clash(arc, holder)
+    ]

@@ -1,0 +1,268 @@
+"""Events and instructions: the input and the output of the schedule manager.
+
+Rules of this file: plain frozen data; no bus, no clock. Times are mission seconds.
+An event says what *has happened*; an instruction is carried out in the order given, and its outcome
+comes back as an event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from backbone.scheduling.requests import SchedulingRequest
+
+
+# ---------------------------------------------------------------------- events
+@dataclass(frozen=True, slots=True)
+class RcKnown:
+    """An RC exists; repeated after its restart.
+
+    Attributes:
+        rc: Its name.
+        kind: Its type, for people.
+        sharable: True if several ARCs may hold it.
+        capacity: Share of its time it can give, 0 to 1.
+        connect_s: Settling time.
+        disconnect_s: Release time.
+        up: True if its RC answers.
+        last_epoch: Largest epoch it has seen.
+    """
+
+    rc: str
+    kind: str
+    sharable: bool
+    capacity: float
+    connect_s: float
+    disconnect_s: float
+    up: bool
+    last_epoch: int
+
+
+@dataclass(frozen=True, slots=True)
+class RcWentDown:
+    """The RC does not answer any more, or cannot be believed.
+
+    Attributes:
+        rc: Its name.
+        fault: What it says that cannot be; empty: it does not answer.
+    """
+
+    rc: str
+    fault: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RcCameBack:
+    """The RC answers again, without holders."""
+
+    rc: str
+    last_epoch: int
+
+
+@dataclass(frozen=True, slots=True)
+class CapacityChanged:
+    """A sharable RC can give more or less of its time from now on."""
+
+    rc: str
+    capacity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Requested:
+    """An ARC asks; the set of RCs is already chosen (``choose`` in the schedule manager)."""
+
+    request: SchedulingRequest
+    rcs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Adopted:
+    """A restarted RC manager found an ARC that holds its RCs under a standing lease, since it was connected to them."""
+
+    request: SchedulingRequest
+    epochs: Mapping[str, int]
+    granted_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """An idle ARC wants time again."""
+
+    arc: str
+
+
+@dataclass(frozen=True, slots=True)
+class Idled:
+    """An ARC wants no time now but stays."""
+
+    arc: str
+
+
+@dataclass(frozen=True, slots=True)
+class Departed:
+    """An ARC withdrew or died.
+
+    Attributes:
+        arc: The ARC.
+        why: For the record: ``self``, ``owner``, ``dead``.
+    """
+
+    arc: str
+    why: str = "self"
+
+
+@dataclass(frozen=True, slots=True)
+class RuntimeChanged:
+    """An ARC asked for other run times."""
+
+    arc: str
+    minimum_runtime_s: float
+    maximum_runtime_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Extended:
+    """A running ARC asked to go on until this time."""
+
+    arc: str
+    until_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PriorityChanged:
+    """A node of the tree, or a console, has another priority."""
+
+    node: str
+    priority: int
+
+
+@dataclass(frozen=True, slots=True)
+class NodeMoved:
+    """A node of the tree stands below another parent, with all below it."""
+
+    node: str
+    parent: str
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """The ARC's RCs are connected and settled, its gate is open."""
+
+    arc: str
+
+
+@dataclass(frozen=True, slots=True)
+class OpenFailed:
+    """The ARC's RCs could not all be connected; all of them were disconnected again.
+
+    Attributes:
+        arc: The ARC.
+        rc: The RC that failed, empty if it was the ARC.
+    """
+
+    arc: str
+    rc: str
+
+
+@dataclass(frozen=True, slots=True)
+class Freed:
+    """All RCs of the ARC are disconnected, in their safe states."""
+
+    arc: str
+
+
+@dataclass(frozen=True, slots=True)
+class Woken:
+    """The time of the last ``WakeAt`` has come."""
+
+
+Event = (
+    RcKnown
+    | RcWentDown
+    | RcCameBack
+    | CapacityChanged
+    | Requested
+    | Adopted
+    | Wanted
+    | Idled
+    | Departed
+    | RuntimeChanged
+    | Extended
+    | PriorityChanged
+    | NodeMoved
+    | Opened
+    | OpenFailed
+    | Freed
+    | Woken
+)
+
+
+# ---------------------------------------------------------------------- instructions
+@dataclass(frozen=True, slots=True)
+class ConnectArc:
+    """Connect all these RCs to the ARC, let them settle, open its gate; report ``Opened`` or ``OpenFailed``.
+
+    Attributes:
+        arc: The ARC.
+        epochs: RC → epoch; larger than all before.
+        settle_s: Longest settling time of the set.
+        until_s: End of the minimum run time if the grant came right after settling.
+        ranks: Sharable RC → place of this ARC among its holders by user priority, 0 first.
+    """
+
+    arc: str
+    epochs: Mapping[str, int]
+    settle_s: float
+    until_s: float
+    ranks: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class RevokeArc:
+    """Close the ARC's gate and disconnect its RCs; report ``Freed``.
+
+    Attributes:
+        arc: The ARC.
+        epochs: RC → epoch it held.
+        why: ``slice``, ``higher``, ``rc``, ``self``, ``owner``, ``dead``, ``capacity``, ``failed``.
+        by: ARC or RC because of which; empty for ``self``.
+        deadline_s: Seconds its decision process has to stop cleanly; 0: none.
+        expected_s: Predicted next grant; negative: none.
+    """
+
+    arc: str
+    epochs: Mapping[str, int]
+    why: str
+    by: str
+    deadline_s: float
+    expected_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class WakeAt:
+    """Report ``Woken`` at this time; replaces the last one. ``None``: no more."""
+
+    at_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Write this line to the trace, in this order.
+
+    Attributes:
+        line: As SCHEDULING.md, section 5, has it.
+        cause: One line for people, of the rule that decided.
+    """
+
+    line: Mapping[str, Any]
+    cause: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RenewLeases:
+    """Renew all leases now: the places of holders on a sharable RC have changed."""
+
+
+Instruction = ConnectArc | RevokeArc | WakeAt | RenewLeases | Record

@@ -1,0 +1,1 @@
+"""Explanation, start prediction, blockers: reading the schedule, never changing it."""

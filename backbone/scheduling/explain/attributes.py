@@ -1,0 +1,49 @@
+"""Attributes: run times, priorities and RCs of requests as they count now.
+
+Rule of this file: it reads, it never changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from backbone.naming import component_of
+from backbone.scheduling.entries import ArcEntry
+from backbone.scheduling.priority import CONSOLE
+from backbone.scheduling.requests import PathNode, UnknownRequest
+from backbone.scheduling.views import Attributes, RequestAttributes
+
+
+def attributes(arcs: Iterable[ArcEntry], name: str, way: Callable[[tuple[str, ...]], list[PathNode]]) -> Attributes:
+    """Return what the ARC or owner of this name asks for, or all at and below the node of this name.
+
+    Args:
+        arcs: All there are.
+        name: Of an ARC, of a decision process (name or address), or of a node of the behavior tree.
+        way: Names from the root to an owner → the same with their numbers.
+
+    Raises:
+        UnknownRequest: None of them is meant.
+    """
+    meant = [arc for arc in arcs if name in (arc.name, arc.request.owner, *_nodes(arc))]
+    if not meant:
+        raise UnknownRequest(f"nothing at or below {name!r} asks for run time", name=name)
+    return Attributes([_of(arc, way(arc.place_in_tree)) for arc in meant])
+
+
+def _nodes(arc: ArcEntry) -> list[str]:
+    return [component_of(arc.request.owner), *(node.removeprefix(CONSOLE) for node in arc.place_in_tree)]
+
+
+def _of(arc: ArcEntry, path: list[PathNode]) -> RequestAttributes:
+    return RequestAttributes(
+        arc=arc.name,
+        owner=arc.request.owner,
+        state=arc.state,
+        uses=dict(arc.uses),
+        minimum_runtime_s=arc.minimum_s,
+        maximum_runtime_s=arc.maximum_s,
+        path=path,
+        console=arc.request.console,
+        stops_at_once=arc.request.stops_at_once,
+    )

@@ -1,0 +1,187 @@
+"""Blockers: who would have to go so that a waiting ARC gets its RCs as soon as those are free.
+
+Two answers to two questions. Who stands *directly* in the way is told by the plan at once, for every
+request in the schedule. Who must go *altogether* also counts those that would come before the ARC if
+the first ones were gone; it costs a plan for each of them, and is worked out for one ARC on demand.
+
+Rule of this file: it errs towards naming one too many, never one too few.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator, Sequence
+
+from backbone.scheduling.entries import CONNECTED, HOLDING, INSTANT_S, ArcEntry
+from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.plan import meeting
+from backbone.scheduling.planner import Slot
+from backbone.scheduling.priority import higher, rank
+from backbone.scheduling.requests import RequestState
+
+FEWEST_OF = 24  # chosen: each costs one more plan; more than these are named as they are
+MEANWHILE_OF = 64  # chosen: so many are planned in a few milliseconds
+
+
+class Blockers:
+    """Answers about one master schedule."""
+
+    def __init__(self, schedule: MasterSchedule) -> None:
+        """Look at this schedule.
+
+        Args:
+            schedule: Nothing in it changes.
+        """
+        self._schedule = schedule
+        self._table = schedule.table
+        self._state = schedule.state
+        self._in_turns = schedule.state.fairness.discipline == "turns"
+
+    def direct(self, slot: Slot, now_s: float) -> list[ArcEntry]:
+        """Return who stands in the way of the planned ARC now or has time reserved that it would need, in order.
+
+        Where only the first in line have a start reserved: who stands in its way and who is first in line before it.
+        """
+        arc, planner = slot.arc, self._schedule.planner_of(slot.arc)
+        met = [*dict.fromkeys(other for other, _, _ in meeting(slot.against, now_s, now_s + arc.length_s))]
+        met += [first for first in planner.firsts_before(arc) if first not in met]
+        alone = [other for other in met if not self._table.fits(arc, [other])]
+        if not met and self._table.strict:
+            return [*itertools.islice(self._higher_ones(arc), 1)]
+        if not met and not planner.is_exact:
+            return planner.before(arc)[:1]
+        return alone or met
+
+    def altogether(self, arc: ArcEntry, now_s: float, *, grace_s: float) -> list[ArcEntry]:
+        """Return ARCs without which this one starts as soon as its RCs are free, as few as were found.
+
+        If an RC of it is down or has too little capacity: what is in its way once that is not so any more.
+
+        Args:
+            arc: A waiting ARC.
+            now_s: Time of the question.
+            grace_s: Time a decision process has to stop cleanly at the end of a slice.
+
+        Returns:
+            In the order in which to remove them; none if only RCs settle or come free.
+        """
+        held, rivals = self._holders_in_the_way(arc, now_s), self._rivals(arc)
+        left = {*self._table.left_over(arc, [], [*held, *(one for one in rivals if one.touches & arc.touches)])}
+        found = [one for one in dict.fromkeys([*held, *rivals]) if one in left or self._held_back_by(one, arc)]
+        if self._is_planned_whole(arc) and self._table.usable(arc) and self._in_turns and len(found) <= FEWEST_OF:
+            group = [one for one in self._state.group_of(arc) if one.holds or one is arc or one in rivals]
+            for other in reversed(found):
+                fewer = [one for one in found if one is not other]
+                if self._starts_without(fewer, arc, group, now_s, grace_s):
+                    found = fewer
+        while meanwhile := self._starting_meanwhile(found, arc, now_s):
+            found = [*meanwhile, *found]
+        return found
+
+    def _is_planned_whole(self, arc: ArcEntry) -> bool:
+        return self._schedule.planner_of(arc).is_exact
+
+    def _held_back_by(self, one: ArcEntry, arc: ArcEntry) -> bool:
+        return self._table.strict and one.state is not RequestState.RUNNING and higher(one.path, arc.path)
+
+    def _starting_meanwhile(self, gone: Sequence[ArcEntry], arc: ArcEntry, now_s: float) -> list[ArcEntry]:
+        """Return who would start in the way of the ARC when only the first of those that have to go are gone."""
+        group = self._state.group_of(arc) if self._is_planned_whole(arc) else [arc, *self._state.beside(arc)]
+        if len(group) > MEANWHILE_OF:
+            return []
+        found: dict[ArcEntry, None] = {}
+        for count in range(1, len(gone) + (not self._table.usable(arc))):
+            rest = [one for one in group if one not in gone[:count]]
+            slow = [one for one in [*gone[:count], *rest] if one.state in HOLDING and one.release_s > 0]
+            for slot in self._schedule.whole.plan(rest, now_s, handed_over=True):
+                other = slot.arc
+                if slot.start_s > now_s + INSTANT_S or other is arc or other in gone or higher(arc.path, other.path):
+                    continue
+                waits_for_release = any(
+                    one.touches & other.touches and (one in gone or one.state is RequestState.REVOKING) for one in slow
+                )
+                if not waits_for_release and not self._table.fits(arc, [other]):
+                    found[other] = None
+        return [*found]
+
+    def _holders_in_the_way(self, arc: ArcEntry, now_s: float) -> list[ArcEntry]:
+        """Return the holders of its RCs that it cannot simply displace now."""
+        return [holder for holder in self._state.holders(arc) if self._stays(holder, arc, now_s)]
+
+    def _stays(self, holder: ArcEntry, arc: ArcEntry, now_s: float) -> bool:
+        if not self._in_turns and not rank(holder.path, arc.path):
+            return True  # whether its slice is ended for this one depends on more than time
+        return self._table.stands_until_s(holder, arc, now_s) > now_s + INSTANT_S
+
+    def _rivals(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return who waits and could take RCs before the ARC once the ARC could use them, too."""
+        down = {rc for rc in arc.uses if not self._state.rcs[rc].up}
+        rivals = self._schedule.planner_of(arc).before(arc)
+        if not self._in_turns:  # equals reserve nothing from each other: also who comes later may be quicker
+            equals = [one for one in self._state.beside(arc) if one.queued and not higher(arc.path, one.path)]
+            rivals = [*dict.fromkeys([*rivals, *equals])]
+        else:
+            rivals += [one for one in self._older_equals(arc) if one not in rivals]
+        if not self._table.strict:
+            rivals = [one for one in rivals if one.touches & arc.touches]
+        if down or not self._table.usable(arc):
+            return [one for one in rivals if all(self._state.rcs[rc].up or rc in down for rc in one.uses)]
+        return [one for one in rivals if self._table.usable(one)]
+
+    def _older_equals(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return equals that are behind the ARC only while one waits that is higher than they are."""
+        return [
+            one
+            for one in self._state.beside(arc)
+            if one.queued and one.stamp < arc.stamp and not rank(one.path, arc.path)
+        ]
+
+    def _higher_ones(self, arc: ArcEntry) -> Iterator[ArcEntry]:
+        """Return who is higher and waits in its group."""
+        for other in self._state.group_of(arc):
+            if other.state is RequestState.WAITING and higher(other.path, arc.path) and self._table.usable(other):
+                yield other
+
+    def _starts_without(
+        self,
+        gone: Collection[ArcEntry],
+        arc: ArcEntry,
+        group: Sequence[ArcEntry],
+        now_s: float,
+        grace_s: float,
+    ) -> bool:
+        """Say whether the ARC would start after one hand-over if these were gone."""
+        rest = [other for other in group if other not in gone]
+        sharing = [other for other in rest if other is not arc and other.holds and other.touches & arc.touches]
+        if any(self._stays(h, arc, now_s) and h.state in CONNECTED and not self._table.fits(arc, [h]) for h in sharing):
+            return False
+        release_s = max((other.release_s for other in [*gone, *sharing] if other.holds), default=0.0)
+        latest_s = now_s + release_s + grace_s
+        for handed_over in (True, False):
+            slots = self._schedule.whole.plan(rest, now_s, handed_over=handed_over, slack_s=0.0)
+            own = next(slot for slot in slots if slot.arc is arc)
+            if own.start_s > latest_s + INSTANT_S or not self._fits_throughout(own, now_s, latest_s + arc.length_s):
+                return False
+            starting = {slot.arc for slot in slots if slot.start_s <= now_s + INSTANT_S and slot.arc is not arc}
+            order = self._table.in_order([slot.arc for slot in slots if slot.arc not in starting])
+            before = self._schedule.planner_of(arc).before(arc)
+            overtaking = [one for one in order[: order.index(arc)] if starting and one not in before]
+            if any(not self._table.fits(arc, [one]) for one in overtaking):
+                return False  # who held them back starts as well, and then they come before the ARC
+            others = [slot for slot in slots if self._table.strict and slot.start_s > now_s + INSTANT_S]
+            if any(slot.arc is not arc and higher(slot.arc.path, arc.path) for slot in others):
+                return False
+        return True
+
+    def _fits_throughout(self, slot: Slot, start_s: float, end_s: float) -> bool:
+        """Say whether the ARC fits beside all who meet this span, but for those that only come free."""
+        met = [hold for hold in meeting(slot.against, start_s, end_s) if hold[0].state is not RequestState.REVOKING]
+        reserved = [hold for hold in slot.against if hold[0].state is RequestState.REVOKING and hold[1] > start_s]
+        met += meeting(reserved, start_s, end_s)
+        moments = dict.fromkeys([start_s, *(begin_s for _, begin_s, _ in met if begin_s > start_s)])
+        return all(
+            self._table.fits(
+                slot.arc, [one for one, begin_s, over_s in met if begin_s <= moment_s + INSTANT_S < over_s]
+            )
+            for moment_s in moments
+        )

@@ -1,0 +1,371 @@
+"""Explanation: the state of the master schedule in sentences, with the rule that decides.
+
+Rule of this file: it reads, it never changes; and it asks the same plan that decides, so that what
+it says is what will happen if nothing else does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from backbone.naming import component_of
+from backbone.scheduling.entries import INSTANT_S, ArcEntry, RcEntry
+from backbone.scheduling.explain.blockers import Blockers
+from backbone.scheduling.explain.start_prediction import StartPrediction
+from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.planner import Slot
+from backbone.scheduling.priority import higher
+from backbone.scheduling.requests import LEASE_S, Holder, RequestState, Scheduled, UnknownRequest
+from backbone.scheduling.rules import SchedulingRules
+from backbone.scheduling.views import RcView, RequestView, Schedule, Why
+
+UNKNOWN_S = -1.0
+MOST_REHEARSED = 32  # measured: to play so many forward takes at most 80 ms
+
+_REASONS = {
+    "slice": "its slice was over and it was the turn of {by}",
+    "higher": "{by} is higher and took over",
+    "rc": "{by} does not answer",
+    "capacity": "{by} can give less than before",
+    "order": "{by} could not serve all its holders in time in their new order",
+    "failed": "it could not open its gate",
+    "self": "its owner wanted no time any more",
+}
+
+
+class _Answer(NamedTuple):
+    """Lines for people, the rule that decides, and what would change it."""
+
+    lines: list[str]
+    rule: str
+    would_change: str
+
+
+class Explanation:
+    """Answers about one master schedule."""
+
+    def __init__(
+        self, schedule: MasterSchedule, rules: SchedulingRules, granted_s: Callable[[ArcEntry, float], float]
+    ) -> None:
+        """Explain this schedule.
+
+        Args:
+            schedule: Nothing in it changes.
+            rules: With which it is decided.
+            granted_s: Waiting ARC, time of the question → when it is granted, by playing the schedule forward;
+                infinite: not foreseeable.
+        """
+        self._granted_s = granted_s
+        self._schedule = schedule
+        self._table = schedule.table
+        self._state = schedule.state
+        self._rules = rules
+        self._blockers = Blockers(schedule)
+        self._prediction = StartPrediction(schedule, rules)
+
+    # Views.
+
+    def scheduled(self, arc: ArcEntry, now_s: float) -> Scheduled:
+        """Return the place of one request."""
+        slot, granted_s = self._place(arc, now_s)
+        return Scheduled(
+            rcs=list(arc.uses),
+            state=arc.state,
+            position=len(self._schedule.planner_of(arc).before(arc)) + 1 if slot is not None else 0,
+            blockers=[other.name for other in self._blockers.direct(slot, now_s)] if slot is not None else [],
+            expected_start_s=_expected_s(arc, granted_s),
+        )
+
+    def schedule(self, now_s: float) -> Schedule:
+        """Return the whole schedule."""
+        groups = self._state.in_groups()
+        slot_of: dict[ArcEntry, Slot] = {}
+        grants_s: dict[ArcEntry, float] = {}
+        for group in groups:
+            slots = self._schedule.slots(group, now_s)
+            slot_of.update((slot.arc, slot) for slot in slots)
+            grants_s.update(self._prediction.grants_s(slots, now_s))
+        coming: dict[str, list[tuple[ArcEntry, float]]] = {rc: [] for rc in self._state.rcs}
+        for arc, granted_s in sorted(grants_s.items(), key=lambda item: item[1]):
+            for rc in arc.uses if granted_s < math.inf else ():
+                coming[rc].append((arc, granted_s))
+        return Schedule(
+            at_s=now_s,
+            rcs=[self._rc_view(rc, coming[rc.name], now_s) for rc in self._state.rcs.values()],
+            requests=[
+                self._request_view(arc, slot_of.get(arc), grants_s.get(arc, math.inf), now_s)
+                for arc in self._state.arcs.values()
+            ],
+            groups=[[arc.name for arc in group] for group in groups],
+        )
+
+    def _rc_view(self, rc: RcEntry, coming: Sequence[tuple[ArcEntry, float]], now_s: float) -> RcView:
+        holders = [*rc.holders]
+        return RcView(
+            rc=rc.name,
+            kind=rc.kind,
+            state="up" if rc.up else "down",
+            sharable=rc.sharable,
+            capacity=rc.capacity,
+            holders=[Holder(arc.name, arc.epochs[rc.name], arc.since_s, now_s + LEASE_S) for arc in holders],
+            last_epoch=rc.epoch,
+            next=[arc.name for arc, _ in coming],
+            until_s=[self._until_s(arc) for arc in holders],
+            next_s=[granted_s for _, granted_s in coming],
+        )
+
+    def _request_view(self, arc: ArcEntry, slot: Slot | None, granted_s: float, now_s: float) -> RequestView:
+        blockers = self._blockers.direct(slot, now_s) if slot is not None else []
+        answer = self._answer(arc, slot, blockers, granted_s, now_s)
+        return RequestView(
+            arc=arc.name,
+            owner=arc.request.owner,
+            state=arc.state,
+            rcs=list(arc.uses),
+            since_s=arc.since_s,
+            until_s=self._until_s(arc),
+            expected_start_s=_expected_s(arc, granted_s),
+            because=f"{arc.name} {arc.state}: {answer.lines[0]}",
+            blockers=[other.name for other in blockers],
+            minimum_runtime_s=arc.minimum_s,
+            priority="/".join(f"{name}:{number}" for name, number in arc.path),
+            turns=arc.turns,
+            rule=answer.rule,
+            would_change=answer.would_change,
+            raised=arc.raised,
+        )
+
+    # Why.
+
+    def why(self, name: str, now_s: float) -> Why:
+        """Return the reasons for an ARC, an owner or an RC.
+
+        Raises:
+            UnknownRequest: There is none of this name.
+        """
+        if name in self._state.arcs:
+            arc = self._state.arcs[name]
+            return self._why_arc(arc, now_s)
+        owned = [
+            arc for arc in self._state.arcs.values() if name in (arc.request.owner, component_of(arc.request.owner))
+        ]
+        if owned:
+            return self._why_owner(name, owned, now_s)
+        if name in self._state.rcs:
+            return self._why_rc(self._state.rcs[name], now_s)
+        raise UnknownRequest(f"nothing named {name!r} asks for run time, and no RC is named so", name=name)
+
+    def _why_owner(self, name: str, owned: Sequence[ArcEntry], now_s: float) -> Why:
+        """Return the reasons for all its ARCs; state and rule are those of the one that waits longest."""
+        answers = [self._why_arc(arc, now_s) for arc in owned]
+        first = min(answers, key=lambda why: (why.state != RequestState.WAITING, why.name))
+        return Why(
+            name=name,
+            state=first.state,
+            lines=[line for answer in answers for line in answer.lines],
+            rule=first.rule,
+            blockers=first.blockers,
+            expected_start_s=first.expected_start_s,
+            would_change=first.would_change,
+        )
+
+    def _why_rc(self, rc: RcEntry, now_s: float) -> Why:
+        users = [arc for arc in self._state.arcs.values() if rc.name in arc.uses]
+        holders = [arc for arc in users if arc.holds]
+        waiting = [(arc, self._place(arc, now_s)[1]) for arc in users if arc.queued]
+        coming = sorted(waiting, key=lambda item: item[1])
+        lines = [f"{rc.name} is {'up' if rc.up else 'down' if rc.failed else 'not started'}"]
+        if rc.fault:
+            lines = [f"{rc.name} is put aside: {rc.fault}"]
+        lines += [
+            f"{arc.name} holds it under epoch {arc.epochs[rc.name]} since {_at(arc.began_s)}: {self._where(arc, now_s)}"
+            for arc in holders
+        ]
+        lines += [
+            f"{arc.name} gets it at about {_at(granted_s)}"
+            if granted_s < math.inf
+            else f"{arc.name} waits for it without a predicted time"
+            for arc, granted_s in coming
+        ]
+        if not holders and not coming:
+            lines.append("no ARC asks for it")
+        return Why(
+            name=rc.name,
+            state="held" if holders else "free" if rc.up else "down",
+            lines=lines,
+            rule="11" if not rc.up else "3",
+            blockers=[arc.name for arc in holders],
+            expected_start_s=next((granted_s for _, granted_s in coming if granted_s < math.inf), UNKNOWN_S),
+            would_change=_what_brings_back(rc) if not rc.up else "a request, or the end of one, that names it",
+        )
+
+    def _why_arc(self, arc: ArcEntry, now_s: float) -> Why:
+        slot, granted_s = self._place(arc, now_s)
+        if slot is not None and len(self._state.arcs) <= MOST_REHEARSED:
+            granted_s = self._granted_s(arc, now_s)
+        blockers = self._blockers.direct(slot, now_s) if slot is not None else []
+        answer = self._answer(arc, slot, blockers, granted_s, now_s)
+        lines, would_change = [*answer.lines], answer.would_change
+        lines += [self._stands(other, arc, now_s) for other in blockers]
+        if arc.state is RequestState.WAITING:
+            blockers = self._blockers.altogether(arc, now_s, grace_s=self._rules.grace_s)
+            would_change = self._would_let_it_start(arc, blockers, answer.would_change)
+        if arc.swapped_out and arc.state is RequestState.WAITING:
+            lines.append(f"it lost its RCs last because {_reason(arc)}")
+        if arc.raised:
+            lines.append(f"it rose by {_levels(arc.raised)} because it waits long; it comes down again once served")
+        return Why(
+            name=arc.name,
+            state=arc.state,
+            lines=[f"{arc.name} {arc.state}: {lines[0]}", *lines[1:]],
+            rule=answer.rule,
+            blockers=[other.name for other in blockers],
+            expected_start_s=_expected_s(arc, granted_s),
+            would_change=would_change,
+        )
+
+    def _answer(
+        self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
+    ) -> _Answer:
+        match arc.state:
+            case RequestState.WAITING:
+                return self._waits(arc, slot, blockers, granted_s, now_s)
+            case RequestState.RUNNING:
+                return self._runs(arc, now_s)
+            case RequestState.CONNECTING:
+                settled_s = arc.began_s + arc.settle_s
+                what = f"its RCs are being connected since {_at(arc.began_s)}, settled at {_at(settled_s)}"
+                return _Answer([what], "6", "its RCs settle, or a higher ARC asks")
+            case RequestState.REVOKING:
+                what = f"its RCs are being disconnected since {_at(arc.since_s)}: {_reason(arc)}"
+                return _Answer([what], "6", "its RCs are free")
+            case RequestState.IDLE if arc.retry_s is not None:
+                return _Answer([f"{arc.retry_why}; again at {_at(arc.retry_s)}"], "6", "that time comes")
+            case RequestState.IDLE:
+                return _Answer([f"it wants no time since {_at(arc.since_s)}"], "14", "its owner wants time again")
+
+    def _waits(
+        self, arc: ArcEntry, slot: Slot | None, blockers: Sequence[ArcEntry], granted_s: float, now_s: float
+    ) -> _Answer:
+        age = f"since {_at(arc.since_s)} ({now_s - arc.since_s:.1f} s)"
+        down = [rc for rc in arc.uses if not self._state.rcs[rc].up]
+        if down:
+            faults = [f"{rc} is put aside: {self._state.rcs[rc].fault}" for rc in down if self._state.rcs[rc].fault]
+            reason = "; ".join([f"{age} for {', '.join(down)}, not up", *faults])
+            return _Answer([reason], "11", f"{', '.join(down)} answers")
+        if slot is None or not self._table.usable(arc):
+            crowded = ", ".join(rc for rc in arc.uses if self._state.rcs[rc].sharable)
+            return _Answer(
+                [f"{age}: {crowded} could not serve it even alone"], "11", f"the capacity of {crowded} grows"
+            )
+        if not blockers:
+            return _Answer([f"{age}; it is next, its RCs are coming free"], "6", "its RCs are free")
+        whom = _names(blockers)
+        fits_now = slot.start_s <= now_s + INSTANT_S
+        if self._table.strict and fits_now and all(o.queued and higher(o.path, arc.path) for o in blockers):
+            what = f"{age}: none starts while {whom}, higher in its group, waits (policy strict)"
+            return _Answer([what], "8", f"{whom} starts or idles")
+        if granted_s == math.inf:
+            what = f"{age} for {whom}, without a predicted start: no gap is long enough for it"
+            remedy = f"{_release(blockers)}, or a shorter minimum run time"
+            return _Answer([what], "9", remedy)
+        if not self._schedule.planner_of(arc).is_exact and all(other.queued for other in blockers):
+            what = f"{age}; first in line before it: {whom}; granted at about {_at(granted_s)}"
+            return _Answer([what], "15", f"{_release(blockers)} earlier, or a higher ARC asks")
+        what = f"{age} for {whom}, granted at about {_at(granted_s)}"
+        return _Answer([what], "3", f"{_release(blockers)} earlier, or a higher ARC asks")
+
+    def _would_let_it_start(self, arc: ArcEntry, blockers: Sequence[ArcEntry], otherwise: str) -> str:
+        """Return with what the ARC would start after one hand-over."""
+        needs = [f"{rc} answers" for rc in arc.uses if not self._state.rcs[rc].up]
+        if not needs and not self._table.usable(arc):
+            needs = [otherwise]
+        if blockers:
+            needs.append(_release(blockers))
+        return ", and ".join(needs) or otherwise
+
+    def _runs(self, arc: ArcEntry, now_s: float) -> _Answer:
+        if arc.served(now_s):
+            what = f"since {_at(arc.granted_s)}; its slice is over, and no waiting ARC is entitled to its RCs"
+            return _Answer([what], "5", "an equal or higher ARC asks for its RCs")
+        what = f"since {_at(arc.granted_s)}, its slice ends at {_at(arc.end_s)}"
+        return _Answer([what], "3", f"at {_at(arc.end_s)} an equal may take over; a higher ARC at once")
+
+    def _stands(self, other: ArcEntry, arc: ArcEntry, now_s: float) -> str:
+        if higher(other.path, arc.path):
+            rank = "higher"
+        elif higher(arc.path, other.path):
+            rank = "lower"
+        else:
+            rank = "equal"
+        shared = ", ".join(rc for rc in arc.uses if rc in other.uses)
+        sharing = f"shares {shared}" if shared else "in its group"
+        return f"{other.name} ({rank}, {sharing}) {self._where(other, now_s)}"
+
+    def _where(self, arc: ArcEntry, now_s: float) -> str:
+        match arc.state:
+            case RequestState.RUNNING:
+                over = "was over" if arc.served(now_s) else "ends"
+                return f"runs, its slice {over} at {_at(arc.end_s)}"
+            case RequestState.CONNECTING:
+                return f"is being connected since {_at(arc.began_s)}"
+            case RequestState.REVOKING:
+                return f"is being disconnected since {_at(arc.since_s)}"
+            case RequestState.WAITING:
+                return "waits before it"
+            case RequestState.IDLE:
+                return "wants no time"
+
+    def _place(self, arc: ArcEntry, now_s: float) -> tuple[Slot | None, float]:
+        """Return the place of the ARC in the plan, if it is queued, and its foreseen grant."""
+        if not arc.queued:
+            return None, math.inf
+        slots = self._schedule.planner_of(arc).slots_around(arc, now_s)
+        own = next(slot for slot in slots if slot.arc is arc)
+        return own, self._prediction.grants_s(slots, now_s)[arc]
+
+    def _until_s(self, arc: ArcEntry) -> float:
+        match arc.state:
+            case RequestState.RUNNING:
+                return arc.end_s
+            case RequestState.CONNECTING:
+                return arc.began_s + arc.length_s
+            case _:
+                return UNKNOWN_S
+
+
+def _what_brings_back(rc: RcEntry) -> str:
+    if rc.fault:
+        return f"it makes sense again; a restart helps: 'scout-backbone stop {rc.name}', then 'start {rc.kind}'"
+    return "its process answers again"
+
+
+def _expected_s(arc: ArcEntry, granted_s: float) -> float:
+    """Return when the next grant is foreseen; negative: it has one, or none can be foreseen."""
+    if arc.state is RequestState.CONNECTING:
+        return arc.began_s + arc.settle_s
+    return granted_s if granted_s < math.inf else UNKNOWN_S
+
+
+def _reason(arc: ArcEntry) -> str:
+    return _REASONS.get(arc.swapped_out, arc.swapped_out).format(by=arc.swapped_out_by)
+
+
+def _names(arcs: Sequence[ArcEntry]) -> str:
+    """Return the names of at least one ARC."""
+    *firsts, last = [arc.name for arc in arcs]
+    return f"{', '.join(firsts)} and {last}" if firsts else last
+
+
+def _release(arcs: Sequence[ArcEntry]) -> str:
+    return f"{_names(arcs)} {'releases or idles' if len(arcs) == 1 else 'release or idle'}"
+
+
+def _levels(count: int) -> str:
+    return f"{count} level" if count == 1 else f"{count} levels"
+
+
+def _at(time_s: float) -> str:
+    return f"{time_s:.2f} s"

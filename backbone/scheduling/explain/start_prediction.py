@@ -1,0 +1,100 @@
+"""StartPrediction: when those who wait will be granted, hand-overs included.
+
+The plan is made of slices only: it decides what may start, and a hand-over must not cost an ARC its gap.
+Here the time is added that it takes until what was held before is free.
+
+Rule of this file: it predicts and decides nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from backbone.scheduling.entries import INSTANT_S, ArcEntry
+from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.planner import Slot
+from backbone.scheduling.prefix_maximum import PrefixMaximum
+from backbone.scheduling.priority import higher
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.rules import SchedulingRules
+
+
+class StartPrediction:
+    """Predicts grants from one master schedule."""
+
+    def __init__(self, schedule: MasterSchedule, rules: SchedulingRules) -> None:
+        """Predict for this schedule.
+
+        Args:
+            schedule: Nothing in it changes.
+            rules: With which it is decided; of the time to stop cleanly half is expected to be taken.
+        """
+        self._schedule = schedule
+        self._table = schedule.table
+        self._pause_s = rules.grace_s / 2
+        self._rules = rules
+
+    def grants_s(self, slots: Sequence[Slot], now_s: float) -> dict[ArcEntry, float]:
+        """Return when each of these will be granted if nothing else happens; infinite: not foreseeable.
+
+        Args:
+            slots: Places of all queued ARCs of a group, in order.
+            now_s: Time of the question.
+        """
+        starts_s: dict[ArcEntry, float] = {}
+        for slot in sorted(slots, key=lambda slot: slot.start_s):  # whom one waits for starts earlier
+            start_s = slot.start_s
+            if start_s < math.inf and self._schedule.planner_of(slot.arc).is_exact:
+                start_s = max([start_s, *self._frees_s(slot, starts_s, now_s)])
+            starts_s[slot.arc] = start_s
+        if self._table.strict:
+            self._let_higher_go_first(slots, starts_s)
+        return {arc: start_s + arc.settle_s for arc, start_s in starts_s.items()}
+
+    def _frees_s(self, slot: Slot, starts_s: dict[ArcEntry, float], now_s: float) -> list[float]:
+        """Return when what the ARC waits for will be free."""
+        arc = slot.arc
+        times_s = []
+        for other, begin_s, end_s in slot.against:
+            if end_s > slot.start_s + INSTANT_S:
+                continue  # it runs beside or after it
+            if begin_s > -math.inf:
+                over_s = self._end_s(starts_s.get(other, begin_s) + other.settle_s, other)
+            elif other.state is RequestState.REVOKING:
+                continue  # its release is in the plan
+            else:
+                over_s = end_s
+            if abs(end_s - slot.start_s) <= INSTANT_S or not self._table.fits(arc, [other]):
+                times_s.append(over_s + self._release_s(other, arc))
+        for holder in dict.fromkeys(holder for rc in arc.uses for holder in self._table.state.rcs[rc].holders):
+            displaced = slot.start_s <= now_s + INSTANT_S and holder is not arc
+            if displaced and holder.state is not RequestState.REVOKING and not self._table.fits(arc, [holder]):
+                times_s.append(now_s + self._release_s(holder, arc))
+        return times_s
+
+    def _end_s(self, granted_s: float, arc: ArcEntry) -> float:
+        return self._rules.slice_end_s(granted_s, arc.minimum_s)
+
+    def _release_s(self, held_by: ArcEntry, arc: ArcEntry) -> float:
+        overridden = higher(arc.path, held_by.path) or held_by.request.stops_at_once
+        return held_by.release_s + (0.0 if overridden else self._pause_s)
+
+    def _let_higher_go_first(self, slots: Sequence[Slot], starts_s: dict[ArcEntry, float]) -> None:
+        above = PrefixMaximum()
+        for slot in slots:  # in order: the higher ones' starts are known
+            start_s = above.largest(slot.arc.path)
+            if start_s > starts_s[slot.arc]:
+                starts_s[slot.arc] = self._beside_reserved_s(slot, start_s)
+            if self._table.usable(slot.arc):
+                above.add(slot.arc.path, starts_s[slot.arc])
+
+    def _beside_reserved_s(self, slot: Slot, start_s: float) -> float:
+        """Return the first time from then on at which what is reserved for others leaves the ARC its room."""
+        for other, begin_s, end_s in sorted(slot.against, key=lambda hold: hold[1]):
+            meets = (
+                begin_s < start_s + slot.arc.length_s and end_s > start_s and not self._table.fits(slot.arc, [other])
+            )
+            if meets:
+                start_s = math.inf if higher(other.path, slot.arc.path) else end_s + self._release_s(other, slot.arc)
+        return start_s

@@ -1,0 +1,143 @@
+"""Fairness: which of several equals comes first (rule 13).
+
+* ``turns``: the one that waits longest since it came or was last served. Each gets its own minimum run time in turn.
+* ``time``: the one that has had the least time. Each asks for one more minimum run time and has to have it by a
+  virtual deadline; of those that have not had more than the average of their rivals, the earliest deadline comes
+  first. An ARC that asks for short slices is served more often, not longer.
+
+Rule of this file: pure; others say which ARCs are rivals, and what time it is.
+
+Source: IROS 2001, "RC manager" (turns). Stoica and Abdel-Wahab, "Earliest Eligible Virtual Deadline
+First", 1995 (time).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from statistics import fmean
+from typing import Literal, Protocol
+
+from backbone.scheduling.entries import ArcEntry
+from backbone.scheduling.requests import RequestState
+
+Discipline = Literal["turns", "time"]
+
+Seniority = tuple[bool, float, float, int]
+"""Key among equals: smaller comes first."""
+
+ROUNDING_S = 1e-6  # chosen: an ARC that is ahead of the average by no more than this is not ahead
+
+
+class Fairness(Protocol):
+    """A discipline among equals."""
+
+    discipline: Discipline
+
+    def seniority(self, arc: ArcEntry, now_s: float) -> Seniority:
+        """Return the key of the ARC among its equals; ARCs with a reservation come first."""
+
+    def joined(self, arc: ArcEntry, now_s: float) -> None:
+        """Count an ARC that became active."""
+
+    def stopped(self, arc: ArcEntry, now_s: float) -> None:
+        """Count the time of an ARC that runs no longer."""
+
+    def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
+        """Say whether an ARC whose slice is over gets one more at once, before these equals that wait for its RCs."""
+
+
+class Turns:
+    """Each its own minimum run time in turn."""
+
+    discipline: Discipline = "turns"
+
+    def seniority(self, arc: ArcEntry, now_s: float) -> Seniority:
+        """Return its stamp."""
+        del now_s
+        return _of_reservation(arc) or (False, 0.0, *arc.stamp)
+
+    def joined(self, arc: ArcEntry, now_s: float) -> None:
+        """Count nothing."""
+
+    def stopped(self, arc: ArcEntry, now_s: float) -> None:
+        """Count nothing."""
+
+    def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
+        """Give no ARC two turns in a row while equals wait."""
+        del arc, waiting, now_s
+        return False
+
+
+class EqualTime:
+    """Equal time for rivals, earliest eligible virtual deadline first."""
+
+    discipline: Discipline = "time"
+
+    def __init__(self, rivals: Callable[[ArcEntry], list[ArcEntry]], tolerance_s: float) -> None:
+        """Count nothing yet.
+
+        Args:
+            rivals: ARC → its equals that cannot run beside it.
+            tolerance_s: By so much no timer is exact.
+        """
+        self._rivals = rivals
+        self._tolerance_s = tolerance_s
+
+    def seniority(self, arc: ArcEntry, now_s: float) -> Seniority:
+        """Return whether it had more than its rivals, its deadline, and its stamp."""
+        reserved = _of_reservation(arc)
+        if reserved:
+            return reserved
+        had_s = _had_s(arc, now_s)
+        late = not eligible(had_s, self._others_had_s(arc, now_s), self._tolerance_s)
+        if arc.state is RequestState.RUNNING:  # a rival with as much time, but for what timers miss, comes before it
+            return (late, deadline_s(had_s, arc.minimum_s) + self._tolerance_s, now_s, 0)
+        return (late, deadline_s(had_s, arc.minimum_s), *arc.stamp)
+
+    def joined(self, arc: ArcEntry, now_s: float) -> None:
+        """Give no credit for the time it was away."""
+        arc.had_s = joining_s(arc.had_s, self._others_had_s(arc, now_s))
+
+    def stopped(self, arc: ArcEntry, now_s: float) -> None:
+        """Count the time since its grant."""
+        arc.had_s = _had_s(arc, now_s)
+
+    def runs_on(self, arc: ArcEntry, waiting: Iterable[ArcEntry], now_s: float) -> bool:
+        """Let it run on while it comes before all rivals that wait."""
+        own, rivals = self.seniority(arc, now_s), {*self._rivals(arc)}
+        keys = [self.seniority(other, now_s) for other in waiting if other in rivals]
+        return bool(keys) and all(own < key for key in keys)
+
+    def _others_had_s(self, arc: ArcEntry, now_s: float) -> list[float]:
+        return [_had_s(other, now_s) for other in self._rivals(arc)]
+
+
+def eligible(had_s: float, rivals_s: Iterable[float], tolerance_s: float = 0.0) -> bool:
+    """Say whether an ARC that had this much time may ask for more before its rivals.
+
+    Args:
+        had_s: Time it had.
+        rivals_s: Times its rivals had.
+        tolerance_s: By so much no timer is exact: an ARC that is ahead of the average by no more is not ahead.
+    """
+    return had_s <= fmean([had_s, *rivals_s]) + max(ROUNDING_S, tolerance_s)
+
+
+def joining_s(had_s: float, rivals_s: Iterable[float]) -> float:
+    """Return what an ARC that comes (again) counts as having had: no credit for the time it was away."""
+    others = [*rivals_s]
+    return max(had_s, fmean(others)) if others else had_s
+
+
+def deadline_s(had_s: float, minimum_s: float) -> float:
+    """Return the virtual time by which it has to have had one more minimum run time."""
+    return had_s + minimum_s
+
+
+def _had_s(arc: ArcEntry, now_s: float) -> float:
+    return arc.had_s + (now_s - arc.granted_s if arc.state is RequestState.RUNNING else 0.0)
+
+
+def _of_reservation(arc: ArcEntry) -> Seniority | None:
+    return None if arc.reservation is None else (False, -math.inf, -math.inf, arc.reservation)

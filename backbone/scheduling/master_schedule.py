@@ -1,0 +1,76 @@
+"""Master schedule: which planner plans which group, and the turns they find where something changed.
+
+A decision looks only at groups in which something has happened since the last one (rule 7: what happens in one group
+changes no time in another). A group of up to ``exact_up_to`` ARCs is planned whole, a larger one beside each RC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from backbone.scheduling.entries import ArcEntry
+from backbone.scheduling.large_group import LargeGroupPlanner
+from backbone.scheduling.planner import Planner, Slot, Turn
+from backbone.scheduling.state import ScheduleState
+from backbone.scheduling.table import Table
+from backbone.scheduling.whole_group import WholeGroupPlanner
+
+EXACT_UP_TO = 64  # chosen: such a group is planned in a few milliseconds
+
+
+class MasterSchedule:
+    """The plans for one state.
+
+    Attributes:
+        state: What is so now.
+        table: What can be asked of it.
+        whole: Plans groups whole; also groups that are only supposed.
+    """
+
+    def __init__(self, state: ScheduleState, *, strict: bool, tolerance_s: float, exact_up_to: int) -> None:
+        """Plan for this state.
+
+        Args:
+            state: What is so.
+            strict: No ARC starts while a higher usable one of its group waits.
+            tolerance_s: By how much two reservations may overlap.
+            exact_up_to: Groups of at most this size are planned whole.
+        """
+        self.state = state
+        self.table = Table(state, strict=strict)
+        self.whole = WholeGroupPlanner(self.table, slack_s=tolerance_s)
+        self._large = LargeGroupPlanner(self.table, slack_s=tolerance_s)
+        self._exact_up_to = exact_up_to
+
+    def planner_of(self, arc: ArcEntry) -> Planner:
+        """Return what plans the group of an active ARC."""
+        return self.whole if len(self.state.groups.of(arc)) <= self._exact_up_to else self._large
+
+    def due(self, now_s: float) -> Turn | None:
+        """Return an ARC whose time is now, and who must go for it; None if there is none.
+
+        Looks where something changed since there was none; asked again after the turn was carried out.
+        """
+        self._look_where_it_changed()
+        return self.whole.due(now_s) or self._large.due(now_s)
+
+    def _look_where_it_changed(self) -> None:
+        changed = [rc for rc in self.state.take_changed() if self.state.users(rc)]
+        planners = [self.planner_of(next(iter(self.state.users(rc)))) for rc in changed]
+        for rc, planner in zip(changed, planners, strict=True):
+            planner.look_near(rc)
+        if self.table.strict and self._large in planners:  # the change may have held back any ARC of a large group
+            for rc in self.state.rcs.keys() - {*changed}:
+                self._large.look_near(rc)
+
+    def forgotten(self, now_s: float) -> ArcEntry | None:
+        """Return an ARC whose time is now although no turn was found for it; for checks."""
+        for group in self.state.in_groups():
+            arc = self.planner_of(group[0]).forgotten(group, now_s)
+            if arc is not None:
+                return arc
+        return None
+
+    def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+        """Return the place of every queued ARC of a group, in order."""
+        return self.planner_of(group[0]).slots(group, now_s)

@@ -1,0 +1,163 @@
+"""Plan: when each queued ARC of a group can start, one after the other in their order (rule 3).
+
+Each gets the earliest start at which it fits for its whole settling and minimum run time, given who
+holds its RCs and what is reserved for those before it. Places are found on demand: a question about the first in order
+does not pay for the last.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import insort
+from collections.abc import Iterable, Sequence
+
+from backbone.scheduling.entries import CONNECTED, INSTANT_S, ArcEntry
+from backbone.scheduling.planner import Hold, Slot
+from backbone.scheduling.priority import higher, rank
+from backbone.scheduling.table import Table
+
+_Reservation = tuple[float, int, float, ArcEntry]
+"""From when, whose place in the order, until when, and for whom."""
+
+
+class Plan:
+    """The places of the queued ARCs of one group, as long as nothing changes."""
+
+    def __init__(
+        self,
+        table: Table,
+        order: Sequence[ArcEntry],
+        group: Iterable[ArcEntry],
+        now_s: float,
+        *,
+        slack_s: float,
+        handed_over: bool = False,
+        among_equals: bool = True,
+    ) -> None:
+        """Plan for these.
+
+        Args:
+            table: What fits together.
+            order: Queued ARCs of the group, in order.
+            group: Active ARCs.
+            now_s: From when on.
+            slack_s: By how much an ARC may overlap those before it, but not by more than half its slice.
+            handed_over: Plan as if all RCs that are being freed were free already.
+            among_equals: False: what is reserved from later on binds those below, and equals only if it is reserved.
+        """
+        self._table = table
+        self._order = order
+        self._now_s = now_s
+        self._slack_s = slack_s
+        self._handed_over = handed_over
+        self._among_equals = among_equals
+        self._holders = [arc for arc in group if arc.state in CONNECTED or (arc.holds and not handed_over)]
+        self._starts_s: dict[ArcEntry, float] = {}
+        self._reserved: list[_Reservation] = []
+
+    def start_s(self, arc: ArcEntry) -> float:
+        """Return when an ARC of the order can start; infinite: never, as things are."""
+        while arc not in self._starts_s:
+            self._find_next()
+        return self._starts_s[arc]
+
+    def starts_now(self, arc: ArcEntry) -> bool:
+        """Say whether an ARC of the order can start at once."""
+        return self.start_s(arc) <= self._now_s + INSTANT_S
+
+    def slots(self) -> list[Slot]:
+        """Return all places, in order."""
+        return [Slot(arc, self.start_s(arc), self._against(arc, place)) for place, arc in enumerate(self._order)]
+
+    def _find_next(self) -> None:
+        place = len(self._starts_s)
+        arc = self._order[place]
+        start_s = self._starts_s[arc] = self._earliest_s(arc, place) if self._table.usable(arc) else math.inf
+        if start_s < math.inf:
+            insort(self._reserved, (start_s, place, start_s + arc.length_s, arc))
+
+    def _earliest_s(self, arc: ArcEntry, place: int) -> float:
+        """Return the first time from which the ARC fits for its whole length; infinite if there is none.
+
+        A higher ARC stays once it runs: an ARC that overlaps its slot never starts.
+        """
+        now_s, table = self._now_s, self._table
+        touches, excludes = arc.touches, arc.excludes
+        start_s = table.free_s(arc, now_s) if arc.holds and not self._handed_over else now_s
+        for holder in self._holders:
+            if (holder.touches & excludes or holder.excludes & touches) and holder is not arc:
+                until_s = table.stands_until_s(holder, arc, now_s)
+                start_s = max(start_s, until_s)
+        if start_s == math.inf:
+            return math.inf
+        length_s = arc.length_s - min(self._slack_s, arc.minimum_s / 2)
+        too_late_s = start_s + length_s - INSTANT_S
+        for begin_s, _, end_s, other in self._reserved:
+            if begin_s >= too_late_s:
+                break
+            if not (other.touches & excludes or other.excludes & touches):
+                continue
+            if not (self._among_equals or self._binds(begin_s, other, arc)):
+                continue
+            if rank(other.path, arc.path) > 0:
+                return math.inf
+            if end_s > start_s:
+                start_s = end_s
+                too_late_s = start_s + length_s - INSTANT_S
+        if not arc.shares or all(table.has_room_for_all(rc) for rc in arc.shares):
+            return start_s
+        return self._earliest_in_a_crowd_s(arc, start_s, length_s, self._against(arc, place))
+
+    def _binds(self, begin_s: float, other: ArcEntry, arc: ArcEntry) -> bool:
+        """Say whether what is reserved for the other binds the ARC."""
+        if begin_s <= self._now_s + INSTANT_S or other.reservation is not None:
+            return True
+        return rank(other.path, arc.path) != 0
+
+    def _against(self, arc: ArcEntry, place: int) -> list[Hold]:
+        """Return who shares an RC with the ARC and stands in its way, as it was when its place was found."""
+        touches, soon_s = arc.touches, self._now_s + INSTANT_S
+        against: list[Hold] = []
+        for holder in self._holders:
+            if holder.touches & touches and holder is not arc:
+                until_s = self._table.stands_until_s(holder, arc, self._now_s)
+                if until_s > soon_s:
+                    against.append((holder, -math.inf, until_s))
+        before = sorted((at, begin_s, end_s, other) for begin_s, at, end_s, other in self._reserved if at < place)
+        against += [
+            (other, begin_s, end_s)
+            for _, begin_s, end_s, other in before
+            if other.touches & touches and (self._among_equals or self._binds(begin_s, other, arc))
+        ]
+        return against
+
+    def _earliest_in_a_crowd_s(self, arc: ArcEntry, from_s: float, length_s: float, against: Sequence[Hold]) -> float:
+        """Return the first time from which also the sharable RCs have room for the ARC's streams."""
+        lasting = [
+            (other, begin_s, math.inf if begin_s > -math.inf and higher(other.path, arc.path) else end_s)
+            for other, begin_s, end_s in against
+        ]
+        times = sorted({from_s, *(end_s for _, _, end_s in lasting if from_s < end_s < math.inf)})
+        return next(
+            (time_s for time_s in times if self._fits_between(arc, time_s, time_s + length_s, lasting)), math.inf
+        )
+
+    def _fits_between(self, arc: ArcEntry, start_s: float, end_s: float, against: Sequence[Hold]) -> bool:
+        met = meeting(against, start_s, end_s)
+        moments = {start_s, *(begin_s for _, begin_s, _ in met if begin_s > start_s)}
+        return all(
+            self._table.fits(
+                arc,
+                [
+                    other
+                    for other, begin_s, over_s in met
+                    if begin_s <= moment_s + INSTANT_S and over_s > moment_s + INSTANT_S
+                ],
+            )
+            for moment_s in moments
+        )
+
+
+def meeting(holds: Iterable[Hold], start_s: float, end_s: float) -> list[Hold]:
+    """Return the holds that overlap this span."""
+    return [hold for hold in holds if hold[1] < end_s - INSTANT_S and hold[2] > start_s + INSTANT_S]

@@ -1,0 +1,85 @@
+"""Priority events: the behavior tree, its numbers, and ARCs that rise because they wait long (rules 2 and 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from backbone.scheduling.events import RenewLeases
+from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.priority_tree import PriorityTree, carried
+from backbone.scheduling.requests import RequestState, SchedulingRequest
+from backbone.scheduling.rules import ROUNDING, SchedulingRules
+from backbone.scheduling.transitions import Transitions
+
+Place = tuple[str, ...]
+"""Names from the root to a node."""
+
+
+def _stays(place: Place) -> Place:
+    return place
+
+
+class PriorityEvents:
+    """Applies changes of the tree."""
+
+    def __init__(
+        self, transitions: Transitions, schedule: MasterSchedule, tree: PriorityTree, rules: SchedulingRules
+    ) -> None:
+        self._transitions = transitions
+        self._state = schedule.state
+        self._table = schedule.table
+        self._tree = tree
+        self._aging_s = rules.aging_s
+
+    def place(self, request: SchedulingRequest) -> Place:
+        """Take note of the nodes of a request; return the names from the root to its owner."""
+        names, renumbered = self._tree.place(request.path, console=request.console)
+        if renumbered:
+            self._renumber()
+        self._transitions.trace.introduce_nodes(self._tree.path(names), self._transitions.now_s)
+        return names
+
+    def priority_changed(self, node: str, priority: int) -> None:
+        """A node or console has another number."""
+        self._tree.change(node, priority)
+        self._changed()
+
+    def node_moved(self, node: str, parent: str) -> None:
+        """A node stands below another parent, if it can."""
+        if self._tree.obstacle(node, parent):
+            return
+        old, new = self._tree.move(node, parent)
+        self._transitions.trace.nodes_moved(old, new)
+        self._changed(lambda place: carried(place, old, new))
+
+    def age(self) -> None:
+        """Raise ARCs that wait long; they keep their level until they were served or want no time any more."""
+        if not self._aging_s:
+            return
+        for arc in self._state.arcs.values():
+            if arc.state is RequestState.WAITING:
+                self._state.raise_to(arc, int((self._transitions.now_s - arc.since_s) / self._aging_s + ROUNDING))
+            elif arc.served(self._transitions.now_s) or not arc.active:
+                self._state.raise_to(arc, 0)
+        if self._tree.age((arc.place_in_tree, arc.raised) for arc in self._state.arcs.values() if arc.raised):
+            self._changed()
+
+    def next_aging_s(self) -> float | None:
+        """Return when the next ARC rises; None if none does."""
+        if not self._aging_s:
+            return None
+        waiting = [arc for arc in self._state.arcs.values() if arc.state is RequestState.WAITING]
+        return min((arc.since_s + (arc.raised + 1) * self._aging_s for arc in waiting), default=None)
+
+    def _changed(self, moved: Callable[[Place], Place] = _stays) -> None:
+        self._renumber(moved)
+        for names in self._transitions.trace.nodes():
+            self._transitions.trace.introduce_nodes(self._tree.path(names), self._transitions.now_s)
+        for rc in self._state.rcs.values():
+            for holder in self._table.overloading(rc.name) if rc.sharable else ():
+                self._transitions.revoke(holder, "order", rc.name)
+        self._transitions.instruct(RenewLeases())
+
+    def _renumber(self, moved: Callable[[Place], Place] = _stays) -> None:
+        places = [(arc, moved(arc.place_in_tree)) for arc in self._state.arcs.values()]
+        self._state.set_paths((arc, place, self._tree.path(place)) for arc, place in places)

@@ -1,0 +1,152 @@
+"""Priority tree: the places and numbers of the nodes of the behavior tree and of the consoles.
+
+Source: IROS 2001 and RAM 2002, "behavior manager". What follows from them is decided by ``priority.higher``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from backbone.scheduling.priority import CONSOLE, Path
+from backbone.scheduling.requests import PathNode
+
+
+class PriorityTree:
+    """The places and numbers of all nodes and consoles that ever asked.
+
+    A number or a place set by an operator holds until the operator sets another; a request's own
+    numbers and places hold for all other nodes. A request goes on naming the way its owner was
+    started with: the moves since then lead from there to where it is now.
+    """
+
+    def __init__(self, mission: str, priority: int) -> None:
+        self._mission = mission
+        self._numbers: dict[tuple[str, ...], int] = {(mission,): priority}
+        self._set: dict[str, int] = {}
+        self._raised: dict[tuple[str, ...], int] = {}
+        self._shared: dict[tuple[str, int], tuple[str, int]] = {}
+        self._moves: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+
+    def place(self, nodes: Iterable[PathNode], *, console: bool) -> tuple[tuple[str, ...], bool]:
+        """Take note of the nodes on this way.
+
+        Returns:
+            Their names, root first, and whether a node known before has another number now.
+        """
+        way = list(nodes)
+        if console:
+            way = [PathNode(CONSOLE + node.name, node.priority) for node in way]
+        elif not way or way[0].name != self._mission:
+            way.insert(0, PathNode(self._mission, self._numbers[self._mission,]))
+        way = self._moved(way)
+        names: tuple[str, ...] = ()
+        renumbered = False
+        for node in way:
+            names = (*names, node.name)
+            number = self._set.get(node.name.removeprefix(CONSOLE), node.priority)
+            renumbered |= self._numbers.setdefault(names, number) != number
+            self._numbers[names] = number
+        return names, renumbered
+
+    def path(self, names: tuple[str, ...]) -> Path:
+        """Return the way with its present numbers; what two ways have in common are the same objects."""
+        numbered = [
+            (name, self._numbers[way] + self._raised.get(way, 0))
+            for name, way in ((name, names[: depth + 1]) for depth, name in enumerate(names))
+        ]
+        return tuple(self._shared.setdefault(node, node) for node in numbered)
+
+    def nodes(self, names: tuple[str, ...]) -> list[PathNode]:
+        """Return the way as a request names it, with its numbers as they were set, without aging."""
+        return [
+            PathNode(name.removeprefix(CONSOLE), self._numbers[names[: depth + 1]]) for depth, name in enumerate(names)
+        ]
+
+    def age(self, levels: Iterable[tuple[tuple[str, ...], int]]) -> bool:
+        """Raise nodes whose ARCs wait long by some levels, others by none any more; return whether that changed any.
+
+        A node rises with all above it, or it would rise among its siblings only. The mission's own node
+        does not: a console is not outwaited. Neither do consoles.
+
+        Args:
+            levels: Ways of the nodes and by how much they rise; of several for one node the largest counts.
+        """
+        raised: dict[tuple[str, ...], int] = {}
+        for names, by in levels:
+            for depth in range(2, len(names) + 1):
+                way = names[:depth]
+                raised[way] = max(by, raised.get(way, 0))
+        changed = raised != self._raised
+        self._raised = raised
+        return changed
+
+    def change(self, node: str, priority: int) -> None:
+        """Give the node, or the console, of this name another number from now on."""
+        self._set[node] = priority
+        for names in self._numbers:
+            if names[-1].removeprefix(CONSOLE) == node:
+                self._numbers[names] = priority
+
+    def obstacle(self, node: str, parent: str) -> str:
+        """Return why the node of this name cannot be moved below the other one; empty if it can."""
+        for name in (node, parent):
+            ways = self._ways(name)
+            if (CONSOLE + name,) in self._numbers:
+                return f"{name} is a console, which stands beside the mission's tree"
+            if not ways:
+                return f"nothing at or below a node named {name!r} has asked for run time"
+            if len(ways) > 1:
+                return f"there are {len(ways)} nodes named {name!r}"
+        [way], [above] = self._ways(node), self._ways(parent)
+        if len(way) == 1:
+            return f"{node} is the root of the tree"
+        if above[: len(way)] == way:
+            return f"{parent} is {node} itself, or below it"
+        if (*above, node) in self._numbers and (*above, node) != way:
+            return f"{parent} has a child named {node!r} already"
+        return ""
+
+    def move(self, node: str, parent: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Put the node of this name, with all below it, below the other one.
+
+        Its number stays: it counts among its new siblings from now on.
+
+        Returns:
+            The way to it as it was and as it is now.
+
+        Raises:
+            ValueError: There is an ``obstacle``.
+        """
+        obstacle = self.obstacle(node, parent)
+        if obstacle:
+            raise ValueError(obstacle)
+        [old], [above] = self._ways(node), self._ways(parent)
+        new = (*above, node)
+        if old != new:
+            self._moves.append((old, new))
+            self._numbers = {carried(way, old, new): number for way, number in self._numbers.items()}
+            self._raised = {carried(way, old, new): levels for way, levels in self._raised.items()}
+        return old, new
+
+    def _ways(self, node: str) -> list[tuple[str, ...]]:
+        return [way for way in self._numbers if way[-1] == node]
+
+    def _moved(self, way: list[PathNode]) -> list[PathNode]:
+        """Return the way as it is after all moves; what is above a moved node has its present numbers."""
+        names, own = tuple(node.name for node in way), len(way)
+        for old, new in self._moves:
+            if names[: len(old)] == old:
+                own = min(own, len(names) - len(old) + 1)
+                names = carried(names, old, new)
+        above = len(names) - own
+        return [PathNode(names[depth], self._numbers[names[: depth + 1]]) for depth in range(above)] + way[-own:]
+
+
+def carried(way: tuple[str, ...], old: tuple[str, ...], new: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the way after what stood at ``old`` was moved to ``new``.
+
+    Example:
+        >>> carried(("m", "a", "n", "leaf"), ("m", "a", "n"), ("m", "b", "n"))
+        ('m', 'b', 'n', 'leaf')
+    """
+    return new + way[len(old) :] if way[: len(old)] == old else way

@@ -1,0 +1,69 @@
+"""RC events: what follows from news of RCs (rule 11).
+
+An ARC that lost an RC is revoked; the rest of the schedule goes on.
+"""
+
+from __future__ import annotations
+
+from backbone.scheduling import trace
+from backbone.scheduling.entries import CONNECTED
+from backbone.scheduling.events import RcKnown
+from backbone.scheduling.master_schedule import MasterSchedule
+from backbone.scheduling.transitions import Transitions
+
+
+class RcEvents:
+    """Applies events of RCs."""
+
+    def __init__(self, transitions: Transitions, schedule: MasterSchedule) -> None:
+        self._transitions = transitions
+        self._state = schedule.state
+        self._table = schedule.table
+
+    def known(self, event: RcKnown) -> None:
+        """An RC exists; of one that is known this is news of how it is."""
+        if event.rc not in self._state.rcs:
+            rc = self._state.add_rc(event)
+            if rc.up:
+                self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
+            return
+        if event.up:
+            self.came_back(event.rc, event.last_epoch)
+        else:
+            self.went_down(event.rc)
+        self.capacity_changed(event.rc, event.capacity)
+
+    def went_down(self, name: str, lost_by: str = "", fault: str = "") -> None:
+        """The RC does not answer, or is put aside: its holders lose all their RCs, as ``lost_by`` did already."""
+        rc = self._state.rcs.get(name)
+        if rc is None or not self._state.rc_down(rc, None if lost_by else fault):
+            return
+        cause = f"it is put aside: {fault} (rule 11)" if fault else "it does not answer"
+        self._transitions.trace.record(trace.rc_state(self._transitions.now_s, name, up=False), cause)
+        for arc in [*self._state.arcs.values()]:
+            if arc.state in CONNECTED and name in arc.uses and arc.name != lost_by:
+                self._transitions.revoke(arc, "rc", name)
+
+    def came_back(self, name: str, last_epoch: int) -> None:
+        """The RC answers, and holds no ARC."""
+        rc = self._state.rcs.get(name)
+        if rc is None:
+            return
+        if rc.up and any(arc.state in CONNECTED and name in arc.uses for arc in self._state.arcs.values()):
+            self.went_down(name)  # it was away for a moment and forgot its holders
+        if not self._state.rc_up(rc, last_epoch):
+            return
+        if self._transitions.trace.has_introduced(name):
+            self._transitions.trace.record(trace.rc_state(self._transitions.now_s, name, up=True), "it answers")
+        self._transitions.trace.introduce_rc(rc, self._transitions.now_s)
+
+    def capacity_changed(self, name: str, capacity: float) -> None:
+        """The RC gives another share of its time; the last in order go until the rest fits."""
+        rc = self._state.rcs.get(name)
+        if rc is None or rc.capacity == capacity or not 0 <= capacity <= 1:
+            return
+        self._state.set_capacity(rc, capacity)
+        if self._transitions.trace.has_introduced(name):
+            self._transitions.trace.record(trace.rc_capacity(self._transitions.now_s, name, capacity))
+        for holder in self._table.overloading(name):
+            self._transitions.revoke(holder, "capacity", name)

@@ -1,0 +1,88 @@
+"""The rules of a mission that the RC manager decides by, where more than one is right.
+
+Rule of this file: plain data with its ranges, so that a mission file is checked by the very types the
+RC manager starts with.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, get_args
+
+from msgspec import Meta, Struct
+
+from backbone.scheduling.fairness import Discipline
+from backbone.scheduling.response_time import Analysis
+
+Policy = Literal["no_delay", "strict"]
+
+ROUNDING = 1e-9  # chosen: a slice that ends on the grid but for rounding ends on it
+LONGEST_S = 86_400.0  # chosen: a day, as for all other times of a mission file
+
+
+class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """With which rules the RC manager decides; the descriptions are also what ``check`` tells people.
+
+    Raises:
+        ValueError: A rule is not known, or a time is below 0.
+    """
+
+    policy: Annotated[
+        Policy,
+        Meta(
+            description="no_delay: lower ones fill gaps that cost nobody; strict: none starts while a higher one waits"
+        ),
+    ] = "no_delay"
+    discipline: Annotated[
+        Discipline, Meta(description="turns: equals each get their minimum run time in turn; time: they get equal time")
+    ] = "turns"
+    admission: Annotated[
+        Analysis,
+        Meta(description="exact: a sharable resource serves what is always in time; sum: what adds up to its capacity"),
+    ] = "exact"
+    aging_s: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=LONGEST_S,
+            description="who waits rises one level each time this many seconds have passed; 0: never",
+        ),
+    ] = 0.0
+    grid_s: Annotated[
+        float, Meta(ge=0, le=LONGEST_S, description="slices end at multiples of this many seconds; 0: no grid")
+    ] = 0.0
+    grace_s: Annotated[
+        float,
+        Meta(ge=0, le=LONGEST_S, description="seconds a decision process has to stop cleanly at the end of a slice"),
+    ] = 0.2
+
+    def slice_end_s(self, granted_s: float, minimum_s: float) -> float:
+        """Return when a slice that is granted at this time ends, unless it is ended or extended.
+
+        Example:
+            >>> SchedulingRules().slice_end_s(1.5, 5.0), SchedulingRules(grid_s=4.0).slice_end_s(1.5, 5.0)
+            (6.5, 8.0)
+        """
+        end_s = granted_s + minimum_s
+        return math.ceil(end_s / self.grid_s - ROUNDING) * self.grid_s if self.grid_s else end_s
+
+    def __post_init__(self) -> None:
+        for rule in ("policy", "discipline", "admission"):
+            if getattr(self, rule) not in values_of(rule):
+                known = " and ".join(values_of(rule))
+                raise ValueError(f"unknown {rule} {getattr(self, rule)!r}; there are {known}")
+        for rule in ("aging_s", "grid_s", "grace_s"):
+            if not 0 <= getattr(self, rule) < math.inf:
+                raise ValueError(f"{rule} is {getattr(self, rule)}; it must be at least 0")
+
+
+def values_of(rule: str) -> tuple[str, ...]:
+    """Return the words a rule may be; none if it is a time.
+
+    Example:
+        >>> values_of("policy"), values_of("grid_s")
+        (('no_delay', 'strict'), ())
+    """
+    return {"policy": get_args(Policy), "discipline": get_args(Discipline), "admission": get_args(Analysis)}.get(
+        rule, ()
+    )

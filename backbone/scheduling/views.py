@@ -1,0 +1,138 @@
+"""What the scheduler says of itself: the schedule, the reasons, what counts for each request."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from backbone.ranges import FEW, MANY, Count, Epoch, Instant, Mention, RunTime, Share, Text
+from backbone.scheduling.requests import Holder, PathNode, RcUse, RequestState
+from backbone.wire import Message
+
+
+class RcView(Message, frozen=True):
+    """One RC in the master schedule.
+
+    Attributes:
+        rc: Its name.
+        kind: Its type.
+        state: ``up`` or ``down``.
+        sharable: True if several ARCs may hold it.
+        capacity: Share of its time it can give.
+        holders: Who holds it, with epoch and since when.
+        last_epoch: Largest epoch given so far.
+        next: ARCs that get it, in the order of their predicted starts.
+        until_s: Mission time at which the slice of each holder ends; negative: it is being disconnected.
+        next_s: Mission times of their predicted starts, for each of ``next``.
+    """
+
+    rc: Mention
+    kind: Mention
+    state: Mention
+    sharable: bool
+    capacity: Share
+    holders: Annotated[list[Holder], MANY]
+    last_epoch: Epoch
+    next: Annotated[list[Mention], MANY]
+    until_s: Annotated[list[Instant], MANY] = []
+    next_s: Annotated[list[Instant], MANY] = []
+
+
+class RequestView(Message, frozen=True):
+    """One request in the master schedule.
+
+    Attributes:
+        arc: The ARC.
+        owner: Its decision process.
+        state: Where it is.
+        rcs: Its RCs.
+        since_s: Mission time at which it entered that state.
+        until_s: End of its slice; negative if it holds nothing.
+        expected_start_s: Predicted grant; negative if it runs or none can be predicted.
+        because: One line: why it runs or waits.
+        blockers: ARCs that stand directly in its way; ``why`` tells all that would have to go.
+        minimum_runtime_s: As asked for.
+        priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
+        turns: Slices so far.
+        rule: Rule of SCHEDULING.md that decides it.
+        would_change: What would end this, for people.
+        raised: Levels by which it rose because it waits long.
+    """
+
+    arc: Mention
+    owner: Mention
+    state: RequestState
+    rcs: Annotated[list[Mention], FEW]
+    since_s: Instant
+    until_s: Instant
+    expected_start_s: Instant
+    because: Text
+    blockers: Annotated[list[Mention], MANY]
+    minimum_runtime_s: RunTime
+    priority: Text
+    turns: Count
+    rule: Mention = ""
+    would_change: Text = ""
+    raised: Count = 0
+
+
+class Schedule(Message, frozen=True):
+    """Answer to ``AskSchedule``; also published on every change."""
+
+    at_s: Instant
+    rcs: Annotated[list[RcView], MANY]
+    requests: Annotated[list[RequestView], MANY]
+    groups: Annotated[list[Annotated[list[Mention], MANY]], MANY]
+
+
+class Why(Message, frozen=True):
+    """Answer to ``AskWhy``.
+
+    Attributes:
+        name: What was asked about.
+        state: Where it is.
+        lines: The reasons for people, most important first.
+        rule: Rule of SCHEDULING.md that decides it.
+        blockers: ARCs because of which; of a waiting one: without them it starts as soon as its RCs are up and free.
+        expected_start_s: Predicted grant; negative if none.
+        would_change: What would end the wait, for people.
+    """
+
+    name: Mention
+    state: Mention
+    lines: Annotated[list[Text], MANY]
+    rule: Mention
+    blockers: Annotated[list[Mention], MANY]
+    expected_start_s: Instant
+    would_change: Text
+
+
+class RequestAttributes(Message, frozen=True):
+    """What one ARC asks for, as it counts now.
+
+    Attributes:
+        arc: The ARC.
+        owner: Address of its decision process.
+        state: Where the request is.
+        uses: RC → how it is used.
+        minimum_runtime_s: Shortest slice.
+        maximum_runtime_s: End of all extensions.
+        path: Names and priorities from the mission's root to the decision process, or of the console alone.
+        console: True if the owner is a console.
+        stops_at_once: True if the end of a slice need not wait for the decision process.
+    """
+
+    arc: Mention
+    owner: Mention
+    state: RequestState
+    uses: Annotated[dict[Mention, RcUse], FEW]
+    minimum_runtime_s: RunTime
+    maximum_runtime_s: RunTime
+    path: Annotated[list[PathNode], FEW]
+    console: bool
+    stops_at_once: bool
+
+
+class Attributes(Message, frozen=True):
+    """Answer to ``AskAttributes``: at least one request."""
+
+    requests: Annotated[list[RequestAttributes], MANY]

@@ -1,0 +1,238 @@
+"""Whole group: each queued ARC of a group has a start reserved, so that none is overtaken to its cost (rule 3).
+
+This is conservative backfilling (see ``planner``), with priorities and with sets of RCs instead of one number of
+processors. It costs a plan of the whole group whenever something in it changed.
+
+Rules of this file (numbers as in docs and ``why``):
+
+* 3  Plan: earliest start at which an ARC fits whole; a later start is reserved.
+* 4  Holders that are lower, or equal and served, go for whom it is time.
+* 8  Under ``strict`` no ARC starts while a higher usable one of its group waits.
+
+Source: IROS 2001, "RC manager"; RAM 2002, "The RC Scheduler", last paragraphs.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Collection, Iterable, Sequence
+
+from backbone.scheduling.entries import CONNECTED, ArcEntry
+from backbone.scheduling.groups import Group
+from backbone.scheduling.plan import Plan
+from backbone.scheduling.planner import Slot, Turn
+from backbone.scheduling.priority import by_precedence
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.table import Table
+
+
+class WholeGroupPlanner:
+    """Plans each group whole."""
+
+    is_exact = True
+
+    def __init__(self, table: Table, *, slack_s: float) -> None:
+        """Begin with nowhere to look.
+
+        Args:
+            table: What is asked.
+            slack_s: By how much two reservations may overlap. Hand-over takes time: without it an ARC never fits a
+                gap that is exactly as long as its slice.
+        """
+        self._table = table
+        self._state = table.state
+        self._slack_s = slack_s
+        self._among_equals = table.state.fairness.discipline == "turns"
+        self._near: dict[str, None] = {}
+        self._plans: dict[Group[ArcEntry], _Plans] = {}
+        self._planned = -1
+
+    @property
+    def reserves(self) -> bool:
+        """A later start binds equals, but under the discipline ``time``."""
+        return self._among_equals
+
+    def look_near(self, rc: str) -> None:
+        """Look anew at the group that uses the RC."""
+        self._near[rc] = None
+
+    def due(self, now_s: float) -> Turn | None:
+        """Return an ARC whose time is now, and who must go for it; None if there is none in the groups looked at."""
+        while self._near:
+            rc = next(iter(self._near))
+            users = self._state.users(rc)
+            if not users:
+                del self._near[rc]
+                continue
+            group = self._state.groups.of(next(iter(users)))
+            turn = self._due_in(group, now_s)
+            if turn is not None:
+                return turn
+            for looked_at in {used for arc in group.arcs for used in arc.uses}:
+                self._near.pop(looked_at, None)
+        return None
+
+    def forgotten(self, group: Sequence[ArcEntry], now_s: float) -> ArcEntry | None:
+        """Return an ARC of the group whose time is now.
+
+        Where RCs are freed late, plans change as time passes; such a group is looked at when they are.
+        """
+        if any(self._table.is_overdue(arc, now_s) for arc in group):
+            return None
+        self._plans.clear()
+        turn = self._due_in(self._state.groups.of(group[0]), now_s)
+        return turn.arc if turn is not None else None
+
+    def _due_in(self, group: Group[ArcEntry], now_s: float) -> Turn | None:
+        holders = [arc for arc in group.arcs if arc.holds]
+        waiting = (arc for arc in group.arcs if arc.state is RequestState.WAITING)
+        possible = {arc for arc in waiting if self._table.could_start(arc, holders, now_s)}
+        if not possible:
+            return None
+        plans = self._plans_of(group, now_s)
+        last = max(place for place, arc in enumerate(plans.order) if arc in possible)
+        queued = plans.order[: last + 1]  # who comes after them changes nothing for them
+        if self._among_equals:
+            return self._due_of(queued, possible, plans, now_s)
+        while queued:
+            by_time = _Plans(self._table, queued, group.arcs, now_s, slack_s=self._slack_s, among_equals=False)
+            turn = self._due_of(queued, possible, by_time, now_s)
+            if turn is None or self._in_turn(turn, group, now_s):
+                return turn
+            queued.remove(turn.arc)
+        return None
+
+    def _plans_of(self, group: Group[ArcEntry], now_s: float) -> _Plans:
+        if self._planned != self._state.version:
+            self._plans.clear()
+            self._planned = self._state.version
+        plans = self._plans.get(group)
+        if plans is None:
+            order = self._queued_in_order(group.arcs)
+            plans = self._plans[group] = _Plans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
+        return plans
+
+    def _due_of(
+        self, queued: Sequence[ArcEntry], possible: Collection[ArcEntry], plans: _Plans, now_s: float
+    ) -> Turn | None:
+        """Return whose time is now of these, given in order.
+
+        A slice is ended only for an ARC that fits without forgiveness, however early the hand-overs under way may
+        end: else it might be ended for a gap that closes meanwhile.
+        """
+        now = plans.now
+        if not any(now.starts_now(arc) for arc in queued if arc in possible):
+            return None
+        before: list[ArcEntry] = []
+        for arc in queued:
+            if arc.state is not RequestState.WAITING or self._table.must_let_higher_go_first(arc):
+                continue
+            if arc in possible and (
+                now.starts_now(arc) or (plans.exact.starts_now(arc) and plans.certain.starts_now(arc))
+            ):
+                pending = [other for other in before if plans.certain.starts_now(other)]
+                in_the_way = self._table.in_the_way(arc, pending, plans.group, now_s)
+                if in_the_way and plans.certain.starts_now(arc):
+                    return Turn(arc, in_the_way)
+                if not in_the_way and now.starts_now(arc) and self._table.fits(arc, plans.holders()):
+                    return Turn(arc, [])
+            before.append(arc)
+        return None
+
+    def _in_turn(self, turn: Turn, group: Group[ArcEntry], now_s: float) -> bool:
+        """Say whether an ARC would displace each that must go for this turn also if equals took turns.
+
+        RCs come free as whole sets: an ARC that had least time, but would not get all its RCs so, ends no slice.
+        """
+        order = by_precedence([arc for arc in group.arcs if arc.queued], lambda arc: arc.path, lambda arc: arc.stamp)
+        plan = Plan(self._table, order, group.arcs, now_s, slack_s=0.0, handed_over=True)
+        entitled = [arc for arc in order if plan.starts_now(arc)]
+        holders = [holder for holder in group.arcs if holder.state in CONNECTED]
+        return all(
+            any(arc.touches & holder.touches and not self._table.fits(arc, holders) for arc in entitled)
+            for holder in turn.in_the_way
+        )
+
+    # Views: which ARCs wait before which, and when an ARC will start.
+
+    def plan(
+        self, group: Iterable[ArcEntry], now_s: float, *, handed_over: bool = False, slack_s: float | None = None
+    ) -> list[Slot]:
+        """Return the place of every queued ARC of the group, in order.
+
+        Args:
+            group: Active ARCs; all of a group, or without some of them, to see what would be.
+            now_s: From when on.
+            handed_over: Plan as if all RCs that are being freed were free already.
+            slack_s: By how much an ARC may overlap those before it, but not by more than half its slice;
+                None: by the tolerance of this run.
+        """
+        arcs = [*group]
+        slack_s = self._slack_s if slack_s is None else slack_s
+        order = self._queued_in_order(arcs)
+        return Plan(self._table, order, arcs, now_s, slack_s=slack_s, handed_over=handed_over).slots()
+
+    def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
+        """Return the place of every queued ARC of the group, in order."""
+        return self.plan(group, now_s)
+
+    def slots_around(self, arc: ArcEntry, now_s: float) -> list[Slot]:
+        """Return the places of all queued ARCs of its group, in order."""
+        return self.plan(self._state.group_of(arc), now_s)
+
+    def start_s(self, arc: ArcEntry, now_s: float) -> float:
+        """Return when the RCs of a queued ARC will begin to settle, as the decision being made sees it."""
+        return self._plans_of(self._state.groups.of(arc), now_s).now.start_s(arc)
+
+    def before(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return the queued ARCs of its group that come before a queued one, in order."""
+        order = self._queued_in_order(self._state.group_of(arc))
+        return order[: order.index(arc)]
+
+    def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
+        """Return none: every queued ARC has a start reserved."""
+        del arc
+        return []
+
+    def _queued_in_order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
+        return self._table.in_order([arc for arc in arcs if arc.queued])
+
+
+class _Plans:
+    """The plans a decision about one group looks at, each made when it is first needed."""
+
+    def __init__(
+        self,
+        table: Table,
+        order: list[ArcEntry],
+        group: Iterable[ArcEntry],
+        now_s: float,
+        *,
+        slack_s: float,
+        among_equals: bool = True,
+    ) -> None:
+        self.order = order
+        self.group = [*group]
+        self._make = functools.partial(Plan, table, order, self.group, now_s, among_equals=among_equals)
+        self._slack_s = slack_s
+
+    def holders(self) -> list[ArcEntry]:
+        """Return the ARCs of the group that hold their RCs."""
+        return [arc for arc in self.group if arc.holds]
+
+    @functools.cached_property
+    def now(self) -> Plan:
+        """The plan as things are, with the tolerance of this run."""
+        return self._make(slack_s=self._slack_s)
+
+    @functools.cached_property
+    def exact(self) -> Plan:
+        """The plan in which no ARC overlaps another."""
+        return self._make(slack_s=0.0)
+
+    @functools.cached_property
+    def certain(self) -> Plan:
+        """The same, as if all that is being freed were free already."""
+        if not any(arc.state is RequestState.REVOKING for arc in self.group):
+            return self.exact
+        return self._make(slack_s=0.0, handed_over=True)

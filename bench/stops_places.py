@@ -1,0 +1,210 @@
+"""Where a stop can be given: every screen, dialog and focus of every console, and how to get there.
+
+Rule of this file: data only. ``tests/ui_console/test_stops_table.py`` compares it with the consoles' own lists, so
+that a new table, dialog or control without a place fails that test.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+ROBOT = "scout3"
+"""The robot of the console that is tried."""
+OTHERS = ("scout1", "scout2")
+"""Robots that other operators drive meanwhile."""
+
+
+class Link(StrEnum):
+    """What is with the console while the stop is given."""
+
+    UP = "up"  # connected; the console drives the robot if it can
+    OTHER = "other holds"  # connected; another operator drives the robot
+    CUT = "cut"  # no byte passes between the console and the mission
+    FROZEN = "frozen"  # the console's process, or the browser's of its page, is stopped
+
+
+class Gesture(StrEnum):
+    """How the stop is given."""
+
+    ONE = "one"
+    ALL = "all"
+    RED_ONE = "red button of the robot"
+    RED_MINE = "red button of the hand"
+    RED_ALL = "red button of all"
+    PAD_ONE = "gamepad, one"
+    PAD_ALL = "gamepad, all"
+
+    @property
+    def is_for_all(self) -> bool:
+        """Whether it stops all robots."""
+        return self in (Gesture.ALL, Gesture.RED_ALL, Gesture.PAD_ALL)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A screen, dialog or focus.
+
+    Attributes:
+        name: For the table.
+        of: What of the code it shows: a table's name, the method that opens a dialog, an id or a class of the page.
+        open: Keys of a terminal, or a script of the page.
+        shows: What stands on the terminal, or holds of the page, once it is open; empty: nothing is waited for.
+        close: Keys or script that lead back.
+        needs: What has to be there first: "stopped" (another robot is stopped), "asked" (another operator asks).
+        meant: The robot a stop of one means here while another operator holds ``ROBOT``.
+    """
+
+    name: str
+    of: str
+    open: str = ""
+    shows: str = ""
+    close: str = ""
+    needs: str = ""
+    meant: str = ROBOT
+
+
+def _table(number: int, name: str) -> Place:
+    return Place(name, f"panel:{name}", "Tab " * number, close="BTab " * number)
+
+
+TABLES = ("robots", "tree", "schedule", "timeline", "alarms", "links", "parameters", "components", "log")
+PANELS = tuple(_table(number, name) for number, name in enumerate(TABLES))
+READING = (
+    Place("dialog of keys", "action_keys", "?", "these keys|EMERGENCY STOP of all", "Escape"),
+    Place("dialog of reasons", "_why", "y", r"why scout\d\?", "Escape"),
+)
+LIFTING = (Place("dialog to lift", "action_lift", "c", "lift the stop of", "Escape", "stopped", OTHERS[1]),)
+WRITING = (
+    Place("field of the log's search", "action_search", "/", "search the log", "Escape"),
+    Place("field of a parameter", "action_edit", "i e", "x and X stop robots here too", "Escape" + " BTab" * 6),
+)
+DRIVING = (
+    Place("picture alone", "action_bare", "v", close="v"),
+    Place("dialog of robots", "action_pick", "p Down Down", "which robot", "Escape"),
+    Place("field of a reason", "action_ask_consent_because", "M", "may I have it", "Escape"),
+)
+TERMINAL = (*PANELS, *DRIVING, *READING, *WRITING, *LIFTING)
+MONITOR = (*PANELS, *READING, *WRITING, *LIFTING)
+PENDANT = (Place("the screen", "screen"), READING[0], *LIFTING)
+SCRIPT = (Place("a drive runs", "drive"), Place("nothing is due", "pause"))
+
+
+def _focus(selector: str, reveal: str = "") -> Place:
+    script = f"{reveal}document.querySelector('{selector}')?.focus()"
+    return Place(f"focus on {selector}", selector, script, close="document.activeElement.blur()")
+
+
+def _revealed(area: str, selector: str) -> Place:
+    area = f"document.getElementById('{area}')"
+    shown = _focus(selector, f"{area}.hidden = false; ")
+    return Place(shown.name, shown.of, shown.open, close=f"{shown.close}; {area}.hidden = true")
+
+
+def _tab(name: str) -> Place:
+    return Place(f"table of {name}", f"tab:{name}", f"document.getElementById('tab-{name}').click()")
+
+
+def _card(part: str, robot: str, needs: str = "") -> Place:
+    selector = f".robot[data-robot={robot}] {CARD[part]}"
+    script = f"document.querySelector('{selector}').focus()"
+    return Place(f"card of {robot}, {part}", part, script, "", "document.activeElement.blur()", needs, robot)
+
+
+CARD = {
+    "take": ".row button:nth-child(1)",
+    "stop_robot": ".row button:nth-child(2)",
+    "why": ".row button:nth-child(3)",
+    "enlarge": ".enlarge",
+    "lift": ".lift",
+}
+CONTROLS = ("theme", "stop-all", "pad", "stop-mine", "halt", "jump", "take", "may-i", "release", "speed", "panel")
+CLOSE = "document.getElementById('reading').close()"
+PAGE = (
+    Place("nothing has the focus", "body"),
+    *map(_tab, TABLES),
+    *(_focus(f"#{control}") for control in CONTROLS),
+    *(_revealed("login", selector) for selector in ("#login-token", "#login-user", "#login button")),
+    *(_revealed("lost", selector) for selector in ("#retake", "#dismiss")),
+    *(replace(_focus(selector), needs="asked") for selector in ("#consent-yes", "#consent-no")),
+    *(_card(part, ROBOT) for part in ("take", "stop_robot", "why")),
+    *(_card(part, OTHERS[0]) for part in ("take", "stop_robot", "why", "enlarge")),
+    _card("lift", OTHERS[1], "stopped"),
+    Place(
+        "dialog of reasons",
+        "#reading",
+        f"document.querySelector('.robot[data-robot={ROBOT}] {CARD['why']}').click()",
+        "document.getElementById('reading').open",
+        CLOSE,
+    ),
+    Place(
+        "field of a parameter",
+        "input",
+        "document.getElementById('tab-components').click();"
+        f"document.querySelector('[data-key=\"parameters:{ROBOT}\"]').click()",
+        "(document.querySelector('#panel input') ?? document.body).focus() || document.activeElement.matches('input')",
+        "document.activeElement.blur(); document.getElementById('tab-alarms').click()",
+    ),
+    Place("alarm's buttons", "#alarm-bar", "document.querySelector('#alarm-bar button')?.focus()"),
+)
+
+KEYS = (Gesture.ONE, Gesture.ALL)
+RED = (Gesture.RED_ONE, Gesture.RED_MINE, Gesture.RED_ALL)
+PAD = (Gesture.PAD_ONE, Gesture.PAD_ALL)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A console as it is tried.
+
+    Attributes:
+        places: Of this console.
+        gestures: It can be stopped by.
+        drives: Whether it holds a robot.
+        size: Columns and lines of a terminal; (0, 0) for what has none.
+        words: Of its command.
+    """
+
+    places: tuple[Place, ...]
+    gestures: tuple[Gesture, ...]
+    drives: bool = True
+    size: tuple[int, int] = (0, 0)
+    words: tuple[str, ...] = ()
+
+
+ATTACH = ("attach", ROBOT)
+KINDS = {
+    "terminal": Kind(TERMINAL, KEYS, size=(120, 40), words=ATTACH),
+    "terminal 80x24": Kind(TERMINAL, KEYS, size=(80, 24), words=ATTACH),
+    "pendant": Kind(PENDANT, KEYS, size=(80, 24), words=(*ATTACH, "--profile", "pendant")),
+    "monitor": Kind(MONITOR, KEYS, drives=False, size=(80, 24), words=("monitor",)),
+    "gamepad": Kind(TERMINAL, PAD, size=(120, 40), words=(*ATTACH, "--gamepad")),
+    "page desktop": Kind(PAGE, (*KEYS, *RED, *PAD)),
+    "page tablet": Kind(PAGE, (*KEYS, *RED)),
+    "page phone": Kind(PAGE, (*KEYS, *RED)),
+    "script": Kind(SCRIPT, KEYS, words=(*ATTACH, "--json")),
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of the table."""
+
+    console: str
+    place: Place
+    gesture: Gesture
+    link: Link
+
+
+def cells(console: str) -> list[Cell]:
+    """Return all cells of a console, in the order in which they are best tried."""
+    kind = KINDS[console]
+    return [
+        Cell(console, place, gesture, link)
+        for link in Link
+        for place in kind.places
+        for gesture in kind.gestures
+        if not (link is not Link.UP and gesture is Gesture.RED_MINE)  # it is shown beside the hands that drive only
+        and not (link is Link.UP and not kind.drives)
+        and not (console == "script" and link is Link.OTHER and place.of == "drive")
+    ]

@@ -1,0 +1,337 @@
+"""Consoles in a terminal, and scripts on a pipe, as the table of stops tries them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import re
+import signal
+import sys
+import time
+from abc import ABC, abstractmethod
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import psutil
+from stops_link import Relay
+from stops_places import KINDS, ROBOT, Gesture, Place
+from stops_world import TURN, NotSeen, until
+
+from ui_console.driving import KEYS_LET_GO_S
+from ui_console.gamepad import ABS_X, BTN_EAST, BTN_NORTH, BTN_TR, EV_ABS, EV_KEY
+
+BIN = Path(sys.executable).parent
+HERE = Path(__file__).parent
+REPEAT_EVERY_S = 0.05  # chosen: about as fast as keyboards repeat
+LET_GO_S = KEYS_LET_GO_S + 0.1  # a little more, for the terminal takes a moment to hand keys on
+ESCAPE_S = 0.15  # chosen: a terminal tells escape from the begin of another key by a pause
+MOST_ESCAPES = 5
+SHOWN_S = 0.5  # chosen: what a key did is drawn by then
+ANSWERED_S = 0.5  # chosen: a component has told its parameters by then
+SHOWN_WITHIN_S = 10.0
+FRAMES = re.compile(r"[\u2500-\u259f].*")
+CANNOT = r"NO LINK|CANNOT STOP|MAY NOT ARRIVE|no_answer"
+"""What consoles say when they are cut off."""
+
+
+class TriedConsole(ABC):
+    """A console and the hands at it."""
+
+    def __init__(self, name: str, relay: Relay) -> None:
+        self.name, self.kind, self.relay = name, KINDS[name], relay
+        self._holding: asyncio.Task[None] | None = None
+        self._let_go_s = 0.0
+
+    async def drive(self) -> None:
+        """Hold what drives down, until ``let_go``; not before what was held counts as let go."""
+        if self._holding is None:
+            await asyncio.sleep(self._let_go_s + LET_GO_S - time.monotonic())
+            self._holding = asyncio.create_task(self._hold(), name="a hand")
+
+    async def let_go(self) -> None:
+        """Hold nothing any more."""
+        holding, self._holding = self._holding, None
+        if holding is not None:
+            holding.cancel()
+            await asyncio.wait({holding})
+            await self._release()
+            self._let_go_s = time.monotonic()
+
+    async def aim(self, gestures: Sequence[Gesture]) -> None:  # noqa: B027  keys are found without looking
+        """Get ready to give these without looking. When: the console is about to be frozen."""
+
+    @abstractmethod
+    async def take(self) -> None:
+        """Be at the first screen and ask for the robot, if it does not."""
+
+    @abstractmethod
+    async def go(self, place: Place) -> None:
+        """Open a place."""
+
+    @abstractmethod
+    async def leave(self, place: Place) -> None:
+        """Close it."""
+
+    @abstractmethod
+    async def give(self, gesture: Gesture) -> float:
+        """Give the stop; return when, monotonic clock of this machine."""
+
+    @abstractmethod
+    async def says(self) -> str:
+        """Return what the console says of itself."""
+
+    @abstractmethod
+    async def freeze(self) -> None:
+        """Stop its process."""
+
+    @abstractmethod
+    async def thaw(self) -> None:
+        """Let it go on."""
+
+    @abstractmethod
+    async def _hold(self) -> None:
+        """Hold what drives until cancelled."""
+
+    async def _release(self) -> None:  # noqa: B027  keys are let go by not being pressed any more
+        """Let go what ``_hold`` held."""
+
+
+class Terminal(TriedConsole):
+    """A console in tmux."""
+
+    def __init__(self, name: str, relay: Relay, folder: Path) -> None:
+        super().__init__(name, relay)
+        self._socket, self._fifo, self._pid = folder / "tmux", folder / "gamepad", 0
+
+    @property
+    def _has_gamepad(self) -> bool:
+        return "--gamepad" in self.kind.words
+
+    @asynccontextmanager
+    async def present(self, environment: dict[str, str], mission: str) -> AsyncIterator[Terminal]:
+        """Run the console until the block ends."""
+        program = [str(BIN / "scout-console")]
+        if self._has_gamepad:
+            os.mkfifo(self._fifo)
+            program = [sys.executable, str(HERE / "stops_gamepad.py"), str(self._fifo)]
+        words = " ".join([*program, *self.kind.words, "--user", "tina", "--mission", mission])
+        columns, lines = self.kind.size
+        size = ["-x", str(columns), "-y", str(lines)]
+        given = [f"-e{name}={value}" for name, value in environment.items()]
+        await self._tmux("new-session", "-d", *size, *given, f"{words}; cat")
+        try:
+            await self._shows(r"you hold|watching|waiting")
+            shell = psutil.Process(int(await self._tmux("display-message", "-p", "#{pane_pid}")))
+            [console] = shell.children()  # tmux continues its own child when that is stopped, so it is not that one
+            self._pid = console.pid
+            if self.name == "monitor":
+                await self._press("BTab " * 3)  # it begins at the timeline
+                await self._shows(ROBOT)
+                await self._press("] ]")  # and its cursor goes to the robot that is meant
+                await self._shows(f"STOP {ROBOT}")
+            yield self
+        finally:
+            await self.let_go()
+            await self._tmux("kill-server")
+
+    async def take(self) -> None:
+        """See ``TriedConsole``."""
+        if self.kind.drives and re.search(r"watching|hold no robot", await self._screen()):
+            await self._press("Enter" if self.name == "pendant" else "t")
+
+    async def go(self, place: Place) -> None:
+        """See ``TriedConsole``."""
+        if place.open and not place.of.startswith(("panel:", "action_bare")):
+            await self._hold_no_key()
+        if place.needs == "stopped":
+            await self._shows("STOPPED")
+        for key in place.open.split():
+            await self._press(key)
+            await asyncio.sleep(ANSWERED_S if key == "i" else 0.0)
+        if place.shows:
+            await self._shows(place.shows)
+
+    async def leave(self, place: Place) -> None:
+        """See ``TriedConsole``."""
+        await self._hold_no_key()
+        for key in place.close.split():
+            await self._press(key)
+            await asyncio.sleep(ESCAPE_S if key == "Escape" else 0.0)
+            if key == "Escape":
+                await self._closed(place)
+
+    async def give(self, gesture: Gesture) -> float:
+        """See ``TriedConsole``."""
+        at_s = time.monotonic()
+        match gesture:
+            case Gesture.ONE:
+                await self._press("x")
+            case Gesture.ALL:
+                await self._press("X")
+            case Gesture.PAD_ONE:
+                self._feel(f"{EV_KEY} {BTN_EAST} 1", f"{EV_KEY} {BTN_EAST} 0")
+            case Gesture.PAD_ALL:
+                self._feel(f"{EV_KEY} {BTN_NORTH} 1", f"{EV_KEY} {BTN_NORTH} 0")
+            case _:
+                raise ValueError(f"a terminal has no {gesture}")
+        return at_s
+
+    async def says(self) -> str:
+        """See ``TriedConsole``."""
+        lines = (await self._screen()).splitlines()
+        return " / ".join(FRAMES.sub("", line).strip() for line in lines[:2])
+
+    async def freeze(self) -> None:
+        """See ``TriedConsole``."""
+        os.kill(self._pid, signal.SIGSTOP)
+
+    async def thaw(self) -> None:
+        """See ``TriedConsole``."""
+        os.kill(self._pid, signal.SIGCONT)
+
+    async def _hold_no_key(self) -> None:
+        if not self._has_gamepad:
+            await self.let_go()
+
+    async def _hold(self) -> None:
+        if self._has_gamepad:
+            self._feel(f"{EV_ABS} {ABS_X} 100", f"{EV_KEY} {BTN_TR} 1")
+            await asyncio.Event().wait()
+        while True:
+            await self._press("d")
+            await asyncio.sleep(REPEAT_EVERY_S)
+
+    async def _release(self) -> None:
+        if self._has_gamepad:
+            self._feel(f"{EV_KEY} {BTN_TR} 0")
+
+    def _feel(self, *events: str) -> None:
+        with self._fifo.open("r+b", buffering=0) as fifo:
+            fifo.write("".join(f"{event}\n" for event in events).encode())
+
+    async def _press(self, keys: str) -> None:
+        if keys.split():
+            await self._tmux("send-keys", *keys.split())
+
+    async def _screen(self) -> str:
+        return await self._tmux("capture-pane", "-p")
+
+    async def _shows(self, pattern: str) -> None:
+        async def is_shown() -> bool:
+            return re.search(pattern, await self._screen()) is not None
+
+        try:
+            await until(is_shown, f"{pattern!r} on the screen", SHOWN_WITHIN_S)
+        except NotSeen as error:
+            raise NotSeen(f"{error}\n{await self._screen()}") from None
+
+    async def _closed(self, place: Place) -> None:
+        """Press escape again where a busy console took it for the begin of another key."""
+        for _ in range(MOST_ESCAPES):
+            if re.search(place.shows, await self._screen()) is None:
+                return
+            await asyncio.sleep(SHOWN_S)
+            if re.search(place.shows, await self._screen()) is not None:
+                await self._press("Escape")
+
+    async def _tmux(self, *words: str) -> str:
+        command = ["tmux", "-S", str(self._socket), "-f", "/dev/null", *words]
+        environment = {**os.environ, "TERM": "xterm-256color"}
+        pipe = asyncio.subprocess.PIPE
+        done = await asyncio.create_subprocess_exec(*command, env=environment, stdout=pipe, stderr=pipe)
+        return (await done.communicate())[0].decode()
+
+
+class Script(TriedConsole):
+    """A console that reads lines from a pipe."""
+
+    def __init__(self, name: str, relay: Relay) -> None:
+        super().__init__(name, relay)
+        self._heard: list[str] = []
+        self._process: asyncio.subprocess.Process | None = None
+        self._command: tuple[list[str], dict[str, str]] = ([], {})
+        self._reading: asyncio.Task[None] | None = None
+
+    @asynccontextmanager
+    async def present(self, environment: dict[str, str], mission: str) -> AsyncIterator[Script]:
+        """Run the console until the block ends."""
+        words = [str(BIN / "scout-console"), *self.kind.words, "--user", "sam", "--mission", mission]
+        self._command = words, {**os.environ, **environment}
+        try:
+            yield self
+        finally:
+            await self.let_go()
+            await self._end()
+
+    async def take(self) -> None:
+        """See ``TriedConsole``."""
+        if self._process is None or self._process.returncode is not None:
+            await self._end()
+            words, environment = self._command
+            pipe = asyncio.subprocess.PIPE
+            self._process = await asyncio.create_subprocess_exec(*words, env=environment, stdin=pipe, stdout=pipe)
+            self._reading = asyncio.create_task(self._read(), name="script's lines")
+
+    async def go(self, place: Place) -> None:
+        """See ``TriedConsole``."""
+        if place.of == "pause":
+            await self.let_go()
+
+    async def leave(self, place: Place) -> None:  # noqa: ARG002  a script has no screen
+        """See ``TriedConsole``."""
+        await self.let_go()
+
+    async def give(self, gesture: Gesture) -> float:
+        """See ``TriedConsole``."""
+        self._heard.clear()
+        at_s = time.monotonic()
+        await self._write({"stop_all": True} if gesture is Gesture.ALL else {"stop_robot": ROBOT})
+        return at_s
+
+    async def says(self) -> str:
+        """See ``TriedConsole``."""
+        told = [json.loads(line) for line in self._heard]
+        return "; ".join(
+            " ".join(str(one[key]) for key in ("event", "code", "detail") if key in one) for one in told[-3:]
+        )
+
+    async def freeze(self) -> None:
+        """See ``TriedConsole``."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGSTOP)
+
+    async def thaw(self) -> None:
+        """See ``TriedConsole``."""
+        assert self._process is not None
+        self._process.send_signal(signal.SIGCONT)
+
+    async def _hold(self) -> None:
+        await self._write({"at_s": 0, "halt": True})
+        await self._write({"at_s": 0, "left_rad_s": TURN.left_rad_s, "right_rad_s": TURN.right_rad_s})
+        await asyncio.Event().wait()
+
+    async def _release(self) -> None:
+        await self._write({"at_s": 0, "halt": True})
+
+    async def _write(self, line: dict[str, object]) -> None:
+        process = self._process
+        if process is not None and process.returncode is None and process.stdin is not None:
+            process.stdin.write(json.dumps(line).encode() + b"\n")
+            await process.stdin.drain()
+
+    async def _read(self) -> None:
+        assert self._process is not None
+        assert self._process.stdout is not None
+        async for line in self._process.stdout:
+            self._heard.append(line.decode())
+
+    async def _end(self) -> None:
+        process, self._process = self._process, None
+        if process is None or self._reading is None:
+            return
+        if process.returncode is None:
+            process.kill()
+        await process.wait()
+        await self._reading

@@ -1,0 +1,240 @@
+"""The mission of the table of stops: where its robots are, who drives them meanwhile, who lifts their stops."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
+from contextlib import asynccontextmanager, suppress
+
+from stops_places import OTHERS, ROBOT
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Bus
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.component.launch import Launch
+from backbone.errors import LinkError
+from backbone.naming import Subsystem, address
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule, Schedule
+from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
+from resource_pool.messages import AskPose, Pose
+from ui_console.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
+from ui_console.teleoperation import Teleoperation
+
+ROBOTS = (*OTHERS, ROBOT)
+TURN = Drive(3.0, -3.0)  # on the spot, so that no wall is in the way
+LOOK_EVERY_S = 0.015  # chosen: twice in each frame of the world
+KEPT_S = 8.0  # chosen: longer than a cell is watched
+STILL_RAD, STILL_M = 0.004, 0.001  # chosen: a thirtieth of what a robot turns or drives in a tenth of a second
+TURNING_WITHIN_S = 0.25  # chosen: at this speed a robot turns fifteen times ``STILL_RAD`` meanwhile
+SAY_EVERY_S = 0.08  # chosen: three times within ``STICK_LASTS_S``
+LATE_S = 0.3  # chosen: an order that waited on a link is there long before
+WITHIN_S = 15.0
+HIGH, LOW = 200, 50  # of those who take the robot, and of those who only ask for it; consoles have 100
+
+
+class NotSeen(Exception):
+    """What a cell needs did not come in time."""
+
+
+async def until(holds: Callable[[], bool | Awaitable[bool]], what: str, within_s: float = WITHIN_S) -> None:
+    """Return once it holds.
+
+    Raises:
+        NotSeen: It did not in time.
+    """
+    try:
+        async with asyncio.timeout(within_s):
+            while True:
+                answer = holds()
+                if answer is True or (not isinstance(answer, bool) and await answer):
+                    return
+                await asyncio.sleep(LOOK_EVERY_S)
+    except TimeoutError:
+        raise NotSeen(f"not within {within_s:g} s: {what}") from None
+
+
+class Poses:
+    """Where the robots were in the last seconds, asked of the world."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus = bus
+        self._seen: dict[str, deque[Pose]] = {name: deque(maxlen=int(KEPT_S / LOOK_EVERY_S)) for name in ROBOTS}
+
+    async def watch(self) -> None:
+        """Look again and again; until cancelled."""
+        while True:
+            with suppress(LinkError):
+                await asyncio.gather(*map(self._look, ROBOTS))
+            await asyncio.sleep(LOOK_EVERY_S)
+
+    def turns(self, robot: str) -> bool:
+        """Return whether the robot turned or moved in the last moment."""
+        seen = self._seen[robot]
+        return bool(seen) and self.moved_last_s(robot, seen[-1].at_s - TURNING_WITHIN_S) is not None
+
+    def moved_last_s(self, robot: str, since_s: float) -> float | None:
+        """Return the last time since then at which it was not yet where it is now; None: it stood."""
+        seen = self._seen[robot]
+        return max((pose.at_s for pose in seen if pose.at_s >= since_s and _differs(pose, seen[-1])), default=None)
+
+    def moved_by(self, robot: str, last_s: float) -> tuple[float, float]:
+        """Return how far it turned and went in the last moment: radians and meters."""
+        now = self._seen[robot][-1]
+        then = next(pose for pose in self._seen[robot] if pose.at_s >= now.at_s - last_s)
+        turned_rad = math.remainder(now.heading_rad - then.heading_rad, math.tau)
+        return round(turned_rad, 4), round(math.hypot(now.x_m - then.x_m, now.y_m - then.y_m), 4)
+
+    async def _look(self, robot: str) -> None:
+        self._seen[robot].append(await self._bus.ask("resource_pool/world", AskPose(robot), Pose, within_s=1.0))
+
+
+def _differs(one: Pose, other: Pose) -> bool:
+    turned_rad = abs(math.remainder(one.heading_rad - other.heading_rad, math.tau))
+    return turned_rad > STILL_RAD or math.hypot(one.x_m - other.x_m, one.y_m - other.y_m) > STILL_M
+
+
+class Operator:
+    """Another operator, in this process, on a bus of their own; keeps the ARC, so that taking is quick."""
+
+    def __init__(self, name: str, robot: str, priority: int, found: run_files.RunFile, clock: MissionClock) -> None:
+        parameters = {"robot": robot, "kind": "drive", "priority": priority, "minimum_runtime_s": 0.1}
+        self.robot, self._clock, self._found = robot, clock, found
+        self.launch = Launch(
+            *(found.mission, Subsystem.UI_CONSOLE, name, "console", "in this process", found.host, found.endpoint),
+            *(found.clock_origin_monotonic_s, found.clock_rate, parameters),
+        )
+        self.console: Teleoperation
+        self._turning: asyncio.Task[None] | None = None
+
+    @asynccontextmanager
+    async def present(self) -> AsyncIterator[Operator]:
+        """Be there until the block ends."""
+        bus = await ZenohBus.open_when_up(
+            self._found.mission, self.launch.address, self._clock, client_config(self._found.endpoint)
+        )
+        self.console = Teleoperation(
+            self.launch, bus, self._clock, show=lambda _event: None, takes=False, watches=False, keeps_arc=True
+        )
+        living = asyncio.create_task(self.console.run(), name=self.launch.name)
+        try:
+            await until(lambda: self.console.is_ready, f"{self.launch.name} is ready")
+            yield self
+        finally:
+            await self.rest()
+            self.console.end("the table is full")
+            await living
+
+    async def turn(self) -> None:
+        """Hold the robot, and turn it until ``rest``; what was held before is let go first."""
+        await self.rest()
+        self.console.take()
+        await until(lambda: self.console.is_held, f"{self.launch.name} holds {self.robot}")
+        self._turning = asyncio.create_task(self._turn(), name=f"{self.launch.name} turns")
+
+    async def rest(self) -> None:
+        """Let the stick go."""
+        if self._turning is not None:
+            self._turning.cancel()
+            await asyncio.wait({self._turning})
+            self._turning = None
+            self.console.stop()
+
+    async def leave(self) -> None:
+        """Give the robot back."""
+        await self.rest()
+        await self.console.give_back()
+
+    async def ask_for_it(self) -> None:
+        """Ask whoever holds the robot for it."""
+        self.console.take()
+        await asyncio.sleep(KEYS_LET_GO_S)
+        self.console.begin_ask_consent("the table of stops")
+
+    async def _turn(self) -> None:
+        while True:
+            self.console.hold(TURN, STICK_LASTS_S)
+            await asyncio.sleep(SAY_EVERY_S)
+
+
+class World:
+    """What a cell needs of the mission."""
+
+    def __init__(self, bus: Bus, clock: MissionClock, operators: list[Operator]) -> None:
+        self.bus, self.clock, self.poses = bus, clock, Poses(bus)
+        self._drivers, self.holder, self.asker = operators[: len(OTHERS)], *operators[len(OTHERS) :]
+        self._own = {operator.launch.address for operator in operators}
+        self._stops: dict[str, StopState] = {}
+        watch_stops(bus, self._heard)
+
+    def _heard(self, state: StopState) -> None:
+        self._stops[state.rc] = state
+
+    def stopped_s(self, robot: str, since_s: float) -> float | None:
+        """Return when an order to stop that was given since then reached the robot's RC; None: none did.
+
+        An order to a robot that is stopped already is no new stop, but has a number: see ``orders``.
+        """
+        state = self._stops.get(robot)
+        return state.at_s if state is not None and state.is_stopped and state.at_s >= since_s else None
+
+    def orders(self, robot: str) -> int:
+        """Return how many orders to stop the robot has had."""
+        state = self._stops.get(robot)
+        return 0 if state is None else state.number
+
+    async def stop(self, robot: str) -> None:
+        """Stop it as another operator does."""
+        await stop_robot(self.bus, robot, "somebody stands there", "olga")
+
+    async def all_may_move(self) -> None:
+        """Lift every stop, also one that was given while a link was cut and arrives only now."""
+        while any([await self._lift(robot) for robot in ROBOTS]):  # noqa: ASYNC110  a late order gives no event
+            await asyncio.sleep(LATE_S)
+
+    async def _lift(self, robot: str) -> bool:
+        """Lift the stop of a robot; return whether it may have been given without a link."""
+        state = await ask_stop(self.bus, robot)
+        was_stopped = state.is_stopped
+        while state.is_stopped:
+            state = await lift_stop(self.bus, state, "olga")
+        return was_stopped
+
+    async def console_holds(self) -> bool:
+        """Return whether the console that is tried has the robot."""
+        schedule = await self.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=2.0)
+        owners = {request.arc: request.owner for request in schedule.requests}
+        holders = [owners.get(one.arc, "") for rc in schedule.rcs if rc.rc == ROBOT for one in rc.holders]
+        return any(owner.startswith("ui_console/") and owner not in self._own for owner in holders)
+
+    async def others_turn(self, robots: Iterable[str]) -> None:
+        """Have these other robots turn."""
+        await asyncio.gather(*(self._turn(driver) for driver in self._drivers if driver.robot in robots))
+
+    async def _turn(self, driver: Operator) -> None:
+        if not self.poses.turns(driver.robot):
+            await driver.turn()
+            await until(lambda: self.poses.turns(driver.robot), f"{driver.robot} turns")
+
+
+@asynccontextmanager
+async def world_of(mission: str) -> AsyncIterator[World]:
+    """Watch the mission's robots, and have other operators there, until the block ends."""
+    found = run_files.find(mission)
+    clock = MissionClock(found.clock_origin_monotonic_s, found.clock_rate)
+    name = address(Subsystem.UI_CONSOLE, "table")
+    bus = await ZenohBus.open_when_up(mission, name, clock, client_config(found.endpoint))
+    wishes = [*((f"driver-{robot}", robot, HIGH) for robot in OTHERS), ("holder", ROBOT, HIGH), ("asker", ROBOT, LOW)]
+    operators = [Operator(*wish, found, clock) for wish in wishes]
+    world = World(bus, clock, operators)
+    watching = asyncio.create_task(world.poses.watch(), name="poses")
+    try:
+        async with operators[0].present(), operators[1].present(), operators[2].present(), operators[3].present():
+            yield world
+    finally:
+        watching.cancel()
+        await asyncio.wait({watching})
+        await bus.close()

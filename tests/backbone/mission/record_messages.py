@@ -1,0 +1,32 @@
+"""What the reader says of every broken file, beside this program in ``messages.json``; run to record it anew.
+
+The record is what a person has read and found good: a message that changes shows in it.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from backbone.mission.reader import MissionInvalid, read_mission
+
+HERE = Path(__file__).parent
+MESSAGES = HERE / "messages.json"
+
+
+def messages() -> dict[str, list[str]]:
+    """Return for each broken file its faults, as ``line:column: message (remedy)``."""
+    return {path.stem: messages_of(path) for path in sorted((HERE / "broken").glob("*.xml"))}
+
+
+def messages_of(path: Path) -> list[str]:
+    """Return the faults of one file, without its name."""
+    try:
+        read_mission(path)
+    except MissionInvalid as invalid:
+        return [str(fault).removeprefix(f"{path}:").replace(str(path.parent), ".") for fault in invalid.faults]
+    return []
+
+
+if __name__ == "__main__":
+    MESSAGES.write_text(json.dumps(messages(), indent=1, ensure_ascii=False) + "\n")

@@ -1,0 +1,172 @@
+"""Parameters are those of the classes the mission names; the classes are asked in another process."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from backbone.mission import class_asking
+from backbone.mission.class_asking import ask_classes
+from backbone.mission.class_facts import ClassFacts, ParameterFacts, parameters_of, shipped_classes
+from backbone.mission.generate import generated
+from backbone.mission.reader import Fault, MissionInvalid, read_mission, read_mission_bytes
+from backbone.mission.tables import parameter_value
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
+SMALL = (HERE / "small.xml").read_text()
+OWN_TYPE = '    <type name="own" class="{path}" subsystem="mission_control"/>\n  </types>'
+GOOD = """
+import msgspec
+from backbone.component.component import Component
+
+class Parameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    '''Own.
+
+    Attributes:
+        depth_m: How deep.
+    '''
+
+    depth_m: float = 1.0
+
+class Own(Component):
+    parameters_type = Parameters
+"""
+
+
+def with_own_type(path: str, **parameters: str) -> str:
+    given = "".join(f'<parameter name="{name}" value="{value}"/>' for name, value in parameters.items())
+    behavior = f'    <behavior type="own" name="mine" priority="1">{given}</behavior>\n  </behaviors>'
+    return SMALL.replace("  </types>", OWN_TYPE.format(path=path)).replace("  </behaviors>", behavior)
+
+
+def faults_in(folder: Path, text: str) -> list[Fault]:
+    file = folder / "m.xml"
+    file.write_text(text)
+    try:
+        read_mission(file)
+    except MissionInvalid as invalid:
+        return list(invalid.faults)
+    return []
+
+
+@pytest.fixture
+def modules(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder whose modules can be imported."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return tmp_path
+
+
+@pytest.mark.parametrize("file", generated(), ids=lambda path: path.name)
+def test_a_generated_file_is_what_its_declaration_makes(file: Path) -> None:
+    assert file.read_text("utf-8") == generated()[file], "run: python -m backbone.mission.generate"
+
+
+def test_a_class_of_ones_own_is_asked_for_its_parameters(modules: Path) -> None:
+    (modules / "own_good.py").write_text(GOOD)
+    text = with_own_type("own_good:Own", dept_m="2")
+    [fault] = faults_in(modules, text)
+    assert text.splitlines()[fault.line - 1][fault.column - 1 :].startswith('name="dept_m"')
+    assert fault.message == "own has no parameter 'dept_m' (did you mean 'depth_m'?)"
+    assert fault.remedy == "There is: depth_m"
+    assert not faults_in(modules, with_own_type("own_good:Own", depth_m="2"))
+    assert "own_good" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        ("import no_such_module\nclass Own: ...", "its module cannot be imported: ModuleNotFoundError"),
+        ("class Own:\n  1 / 0", "its module cannot be imported: ZeroDivisionError"),
+        ("print('Own')\nimport os\nos._exit(3)", "the process that imports its module ends without an answer"),
+        ("import sys\nsys.exit('Own')", "the process that imports its module ends without an answer"),
+    ],
+    ids=["import", "error", "exit", "sys.exit"],
+)
+def test_a_class_that_cannot_be_imported_is_a_fault_at_its_type(
+    modules: Path, code: str, reason: str, request: pytest.FixtureRequest
+) -> None:
+    name = f"own_{request.node.callspec.id}".replace(".", "_")
+    (modules / f"{name}.py").write_text(code)
+    text = with_own_type(f"{name}:Own", any="thing").replace('name="view_s"', 'name="veiw_s"')
+    at_type, at_parameter = faults_in(modules, text)
+    assert text.splitlines()[at_type.line - 1][at_type.column - 1 :].startswith(f'class="{name}:Own"')
+    assert reason in at_type.message
+    assert at_type.remedy
+    assert "veiw_s" in at_parameter.message
+
+
+def test_a_module_that_hangs_is_a_fault_and_holds_up_nothing_else(
+    modules: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(class_asking, "WITHIN_S", 5.0)
+    (modules / "own_hanging.py").write_text("import time\ntime.sleep(60)\nclass Own: ...")
+    (modules / "own_after.py").write_text(GOOD)
+    found = ask_classes(["own_hanging:Own", "own_after:Own"])
+    assert "not imported within 5 s" in found["own_hanging:Own"].failure
+    assert [one.name for one in found["own_after:Own"].parameters] == ["depth_m"]
+
+
+def test_a_class_on_another_machine_may_be_one_that_cannot_be_imported_here(modules: Path) -> None:
+    (modules / "own_elsewhere.py").write_text("import no_such_module\nclass Own: ...")
+    text = with_own_type("own_elsewhere:Own", any="thing")
+    text = text.replace('address="127.0.0.1"', 'address="192.0.2.1"')
+    text = text.replace("  </hosts>", '    <host name="attic" address="192.0.2.7"/>\n  </hosts>')
+    text = text.replace("  </core>", '    <service type="creator" host="attic"/>\n  </core>')
+    assert not faults_in(modules, text)
+
+
+def test_bytes_are_read_without_running_a_module_if_the_caller_says_which_classes_are_known(modules: Path) -> None:
+    (modules / "own_unasked.py").write_text("from pathlib import Path\nPath(__file__).with_name('ran').touch()")
+    text = with_own_type("own_unasked:Own", any="thing").replace('name="view_s"', 'name="veiw_s"')
+    with pytest.raises(MissionInvalid) as caught:
+        read_mission_bytes(text.encode(), "m.xml", {})
+    assert [fault.message for fault in caught.value.faults if "no class" not in fault.message] == [
+        "watch has no parameter 'veiw_s' (did you mean 'view_s'?)"
+    ]
+    known = {"own_unasked:Own": ClassFacts(parameters=(ParameterFacts("some", {"type": "integer"}),))}
+    with pytest.raises(MissionInvalid, match="own mine lacks parameter some"):
+        read_mission_bytes(text.encode(), "m.xml", known)
+    assert not (modules / "ran").exists()
+
+
+def test_a_parameter_under_a_driver_that_nobody_knows_here_is_not_judged(tmp_path: Path) -> None:
+    grabber = '<resource type="framegrabber" name="grabber">'
+    given = '<parameter name="device" value="/dev/video0"/><parameter name="frame_rate_hz" value="fast"/>'
+    text = SMALL.replace(grabber, f'{grabber[:-1]} driver="v4l2">{given}')
+    [fault] = faults_in(tmp_path, text)
+    assert fault.message == "frame_rate_hz='fast' is illegal"
+
+
+@pytest.mark.parametrize("text", ["15", "-0.5", "3.0", "1e-3", "true", "gl", "auto", "", "NaN", "1e400", "-1", "31"])
+def test_a_value_passes_exactly_if_the_class_would_start_with_it(text: str) -> None:
+    for path, facts in shipped_classes().items():
+        module, _, name = path.partition(":")
+        if not path.startswith("resource_pool.rcs"):
+            continue
+        struct = getattr(__import__(module, fromlist=[name]), name).parameters_type
+        types = {field.encode_name: field.type for field in msgspec.structs.fields(struct)}
+        for one in facts.parameters:
+            assert one.accepts(parameter_value(text)) == fits(parameter_value(text), types[one.name]), (path, one.name)
+
+
+def fits(value: object, kind: object) -> bool:
+    try:
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
+        return False
+    return True
+
+
+def test_facts_of_a_type_name_what_it_takes_for_people() -> None:
+    class Kinds(msgspec.Struct):
+        a: int | None
+        b: list[str] = []
+        c: bool = True
+
+    assert [one.legal_values for one in parameters_of(Kinds)] == ["integer or null", "array", "true or false"]
+    assert [one.told for one in parameters_of(Kinds)][2] == "boolean, default true"
+    assert [one.accepts(None) for one in parameters_of(Kinds)] == [True, False, False]

@@ -1,0 +1,195 @@
+"""Faults that somebody could put into the scheduling core: each a change of one place, each caught by the tests."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ROOM = "backbone/scheduling"
+
+
+class Planted(NamedTuple):
+    """One fault.
+
+    Attributes:
+        name: What is wrong then.
+        file: Below ``ROOM``.
+        right: As it stands in the file, once.
+        wrong: What stands there instead.
+    """
+
+    name: str
+    file: str
+    right: str
+    wrong: str
+
+
+FAULTS = [
+    Planted(
+        "the youngest goes first",
+        "fairness.py",
+        "(False, 0.0, *arc.stamp)",
+        "(False, 0.0, -arc.stamp[0], -arc.stamp[1])",
+    ),
+    Planted(
+        "an aborted slice costs its place",
+        "state.py",
+        "        if arc.served(now_s):\n            arc.stamp = self._stamp(now_s)\n        arc.swapped_out",
+        "        arc.stamp = self._stamp(now_s)\n        arc.swapped_out",
+    ),
+    Planted(
+        "a served ARC keeps its place",
+        "state.py",
+        "        if arc.served(now_s):\n            arc.stamp = self._stamp(now_s)\n        arc.swapped_out",
+        "        arc.swapped_out",
+    ),
+    Planted("an epoch is given twice", "state.py", "self.rcs[rc].epoch += 1", "self.rcs[rc].epoch += 0"),
+    Planted(
+        "an RC that comes back forgets epochs",
+        "state.py",
+        "rc.epoch = max(rc.epoch, last_epoch)",
+        "rc.epoch = last_epoch",
+    ),
+    Planted(
+        "a reservation lasts after the connection",
+        "state.py",
+        "        arc.reservation = None\n        arc.began_s",
+        "        arc.began_s",
+    ),
+    Planted(
+        "a new slice keeps its old place",
+        "state.py",
+        "        arc.stamp = self._stamp(now_s)\n        arc.slice_s",
+        "        arc.slice_s",
+    ),
+    Planted(
+        "leases are not renewed when ranks change",
+        "transitions.py",
+        "            self.instruct(RenewLeases())",
+        "            pass",
+    ),
+    Planted(
+        "ranks count lower holders",
+        "transitions.py",
+        "higher(other.path, arc.path) for",
+        "higher(arc.path, other.path) for",
+    ),
+    Planted("an overridden ARC has time to stop", "transitions.py", 'if why == "slice" and not', "if not"),
+    Planted("those that stay begin no new slice", "schedule_manager.py", "        self._do.renew_slices()\n", ""),
+    Planted("a revoked ARC hears no expected time", "schedule_manager.py", "        self._do.expect()\n", ""),
+    Planted(
+        "who is overridden goes before whose slice is over",
+        "schedule_manager.py",
+        "key=lambda holder: higher(turn.arc.path, holder.path))",
+        "key=lambda holder: not higher(turn.arc.path, holder.path))",
+    ),
+    Planted("nothing is reserved for an ARC that overrides", "schedule_manager.py", "if forced or not", "if not"),
+    Planted("an ARC that could not open is not asked again", "schedule_manager.py", "        self._arcs.retry()\n", ""),
+    Planted("slack eats a short slice", "plan.py", "min(self._slack_s, arc.minimum_s / 2)", "self._slack_s"),
+    Planted(
+        "a lower ARC overlaps what a higher one reserved", "plan.py", "if rank(other.path, arc.path) > 0:", "if False:"
+    ),
+    Planted(
+        "an ARC whose RC is down has a start",
+        "plan.py",
+        "if self._table.usable(arc) else math.inf",
+        "if arc else math.inf",
+    ),
+    Planted(
+        "a higher holder stands only until now", "table.py", "return math.inf if before > 0 else now_s", "return now_s"
+    ),
+    Planted(
+        "a slice counts before its grant", "table.py", "max(now_s + SOON_S, holder.began_s + holder.length_s)", "now_s"
+    ),
+    Planted(
+        "pending starts are left out",
+        "table.py",
+        "            p for p in pending if p.touches & arc.touches\n",
+        "            p for p in pending if False\n",
+    ),
+    Planted(
+        "the ARC granted last goes first",
+        "table.py",
+        "(-holder.granted_s, *_later(holder))",
+        "(holder.granted_s, *holder.stamp)",
+    ),
+    Planted(
+        "a reservation gives no precedence",
+        "table.py",
+        "                ordered.insert(0, reserved)",
+        "                ordered.append(reserved)",
+    ),
+    Planted(
+        "strict looks at lower ARCs",
+        "table.py",
+        "and other.goes_before(arc) and self.usable(other)\n            for",
+        "and arc.goes_before(other) and self.usable(other)\n            for",
+    ),
+    Planted(
+        "aging never comes down",
+        "priority_events.py",
+        "                self._state.raise_to(arc, 0)",
+        "                pass",
+    ),
+    Planted(
+        "a child goes before its parent",
+        "priority.py",
+        "return (len(a) < len(b)) - (len(a) > len(b))",
+        "return (len(a) > len(b)) - (len(a) < len(b))",
+    ),
+    Planted(
+        "holders keep an RC that is down",
+        "rc_events.py",
+        '                self._do.revoke(arc, "rc", name)',
+        "                pass",
+    ),
+    Planted(
+        "a lowered capacity revokes nobody",
+        "rc_events.py",
+        '            self._do.revoke(holder, "capacity", name)',
+        "            pass",
+    ),
+    Planted(
+        "an RC that forgot its holders is trusted",
+        "rc_events.py",
+        "            self.went_down(name)  #",
+        "            pass  #",
+    ),
+    Planted("an extension has no end", "arc_events.py", "min(until_s, arc.slice_s + arc.maximum_s)", "until_s"),
+    Planted(
+        "an idle ARC waits again once free",
+        "arc_events.py",
+        "                self._state.set_afterwards(arc, Afterwards.IDLE)",
+        "                pass",
+    ),
+    Planted("a successor is forgotten", "arc_events.py", "            self.requested(successor)", "            pass"),
+    Planted(
+        "new demand is not looked at",
+        "compatibility.py",
+        "            self._roomy.pop(rc, None)\n            if len",
+        "            if len",
+    ),
+    Planted(
+        "blocking is not counted",
+        "response_time.py",
+        "        blockings[place] = longest_us - 1",
+        "        blockings[place] = 0",
+    ),
+    Planted(
+        "slices end off the grid",
+        "rules.py",
+        "self.grid_s if self.grid_s else end_s",
+        "self.grid_s if not self.grid_s else end_s",
+    ),
+    Planted(
+        "the first in line of a large group is overtaken",
+        "large_group.py",
+        "        if any(from_one(first) for first in firsts):\n            return True\n",
+        "",
+    ),
+    Planted(
+        "a slice ends although it is awaited by none",
+        "state.py",
+        "wanted = stands and self._is_waited_for(arc)",
+        "wanted = stands",
+    ),
+]

@@ -1,0 +1,54 @@
+"""Every fault planted in the scheduling core is caught by the default tests beside this one."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from planted_faults import FAULTS, ROOM, Planted
+
+TOP = Path(__file__).parents[3]
+LEFT_OUT = shutil.ignore_patterns(".*", "__pycache__", "pictures", "test_planted_faults.py")
+FOUND = 1  # pytest's exit code when a test failed
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_planted_fault_has_its_place(fault: Planted) -> None:
+    assert (TOP / ROOM / fault.file).read_text().count(fault.right) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_what_is_not_planted_is_not_caught(tmp_path: Path) -> None:
+    done = tested(copied(tmp_path))
+    assert done.returncode == 0, done.stdout[-2000:]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
+def test_a_planted_fault_is_caught(fault: Planted, tmp_path: Path) -> None:
+    copy = copied(tmp_path)
+    planted = copy / ROOM / fault.file
+    planted.write_text(planted.read_text().replace(fault.right, fault.wrong))
+    done = tested(copy)
+    assert done.returncode == FOUND, done.stdout[-2000:]
+
+
+def copied(to: Path) -> Path:
+    """Return a copy of the project."""
+    return shutil.copytree(TOP, to / "copy", ignore=LEFT_OUT)
+
+
+def tested(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run the tests of the room in this copy, until one fails."""
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "tests/backbone/scheduling"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )

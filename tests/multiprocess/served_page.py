@@ -1,0 +1,51 @@
+"""The page of a mission that is up, served by the real command."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from running_mission import BIN, RunningMission
+
+
+@dataclass
+class Served:
+    """A mission with its web console.
+
+    Attributes:
+        mission: The mission.
+        port: Where the page is served.
+        token: What opens it.
+        process: The server's.
+    """
+
+    mission: RunningMission
+    port: int
+    token: str
+    process: subprocess.Popen[str]
+
+
+@contextlib.contextmanager
+def serving(mission: RunningMission, port: int = 0) -> Iterator[Served]:
+    """Serve the mission's console until the block ends."""
+    process = subprocess.Popen(
+        [str(BIN / "scout-console"), "serve", "--port", str(port), "--mission", mission.name],
+        env=mission.environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/#token=(\S+)\n", process.stdout.readline())
+        assert found is not None
+        yield Served(mission, int(found[1]), found[2], process)
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.wait(10)
+        assert process.stdout is not None
+        process.stdout.close()

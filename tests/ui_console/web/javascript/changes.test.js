@@ -1,0 +1,46 @@
+// Changes of the draft go out one by one, each made when its turn comes.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { Changes } from "../../../../ui_console/web/page/design_changes.js";
+
+function stage() {
+  const on = { said: [], refusals: [], isUp: true, revision: 1 };
+  on.changes = new Changes({
+    say: (message) => on.isUp && on.said.push(message) > 0,
+    revision: () => on.revision,
+    refused: (text) => on.refusals.push(text),
+  });
+  return on;
+}
+
+test("the next is made when the one before it is done, for the revision of then", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "undo" }));
+  on.changes.add(() => null);
+  on.changes.add(() => ({ do: "redo" }));
+  assert.deepEqual(on.said, [{ revision: 1, do: "undo" }]);
+  on.revision = 2;
+  on.changes.handled();
+  assert.deepEqual(on.said[1], { revision: 2, do: "redo" });
+});
+
+test("without a connection the change is refused, and what waits is forgotten", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "undo" }));
+  on.changes.add(() => ({ do: "redo" }));
+  on.isUp = false;
+  on.changes.handled();
+  assert.equal(on.refusals.length, 1);
+  on.isUp = true;
+  on.changes.handled();
+  assert.equal(on.said.length, 1);
+});
+
+test("before the draft is known nothing is said", () => {
+  const on = stage();
+  on.revision = undefined;
+  on.changes.add(() => ({ do: "undo" }));
+  assert.deepEqual(on.said, []);
+});

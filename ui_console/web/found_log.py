@@ -1,0 +1,60 @@
+"""What a page found in the mission's log, handed out in parts.
+
+Rules of this file: no socket, no bus, no clock. A part is small, so that no answer delays the pictures and beats of the
+same page: ten thousand events are two megabytes, which a slow link carries in twenty seconds.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from backbone.log_lines import timed_event_json
+from backbone.mission_log import Log
+from backbone.moments import Now
+
+PART_EVENTS = 100  # chosen: more than a screen shows
+PART_BYTES = 24_576  # chosen: no more than a picture and a half
+
+
+class FoundLog:
+    """The answer to one search.
+
+    Args:
+        number: Of the search; the page compares it with its newest.
+        log: The launcher's answer.
+        now: When it came.
+    """
+
+    def __init__(self, number: int, log: Log, now: Now) -> None:
+        self.number = number
+        self._log, self._now = log, now
+
+    def part(self, first: int) -> dict[str, Any]:
+        """Return some events, the newest first.
+
+        Args:
+            first: How many newer ones the page has.
+
+        Returns:
+            ``events`` with these; ``total``, how many there are; ``left_out``, how many older fit too; ``since_s``,
+            what was before is not kept; ``asked_s``, when it was asked.
+        """
+        events: list[msgspec.Raw] = []
+        size = 0
+        for event in reversed(self._log.events[: max(0, len(self._log.events) - first)]):
+            line = msgspec.json.encode(timed_event_json(event, self._now))
+            size += len(line)
+            if events and (size > PART_BYTES or len(events) >= PART_EVENTS):
+                break
+            events.append(msgspec.Raw(line))
+        return {
+            "number": self.number,
+            "first": first,
+            "events": events,
+            "total": len(self._log.events),
+            "left_out": self._log.left_out,
+            "since_s": self._log.since_s,
+            "asked_s": self._now.mission_s,
+        }

@@ -1,0 +1,471 @@
+// What the page and its server send each other. Written by ui_console/web/page_types.py; change the structs.
+
+export type AlarmKind =
+  | "absent"
+  | "deadline"
+  | "link"
+  | "lost"
+  | "no_answer"
+  | "not_recorded"
+  | "overload"
+  | "rc_down"
+  | "refused"
+  | "stale_video"
+  | "starving"
+  | "stopped"
+  | "taken"
+  | "unsafe"
+  | "visitor";
+
+export interface AlarmView {
+  key: string;
+  kind: AlarmKind;
+  severity: Severity;
+  subject: string;
+  line: string;
+  remedy: string;
+  first_s: number;
+  last_s: number;
+  count: number;
+  is_active: boolean;
+  acknowledged_by: string;
+  while_away: boolean;
+  where: string;
+  robot: string;
+  also: string[];
+  keys: string[];
+}
+
+export type Certainty =
+  | "next"
+  | "now"
+  | "past";
+
+export interface ComponentRow {
+  name: string;
+  address: string;
+  subsystem: string;
+  type: string;
+  host: string;
+  pid: number;
+  state: string;
+  since_s: number;
+  feedback: string;
+}
+
+export interface ConsentView {
+  user: string;
+  robot: string;
+  why: string;
+  left_s: number;
+  others: number;
+  topic: string;
+  line: string;
+}
+
+export interface HealthView {
+  word: string;
+  lines: string[];
+}
+
+export interface HostView {
+  host: string;
+  cpu: number;
+  memory: number;
+  cores: number;
+  components: number;
+  age_s: number;
+}
+
+export interface LinkView {
+  name: string;
+  is_up: boolean;
+  latency_s: number;
+  feedback: string;
+}
+
+export interface LogFound {
+  number: number;
+  first: number;
+  events: LoggedEvent[];
+  total: number;
+  left_out: number;
+  since_s: number;
+  asked_s: number;
+}
+
+export interface LogRefused {
+  number: number;
+  code: string;
+  refused: string;
+  remedy: string;
+}
+
+export interface LogRow {
+  at_s: number;
+  subject: string;
+  what: string;
+  where: string;
+  level: string;
+  person: string;
+}
+
+export interface LoggedEvent {
+  at_s: number;
+  level: string;
+  subject: string;
+  what: string;
+  person: string;
+  where: string;
+  cause: string;
+  time: string;
+}
+
+export interface LostView {
+  robot: string;
+  why: string;
+  at_s: number;
+  may_retake: boolean;
+}
+
+export type NodeState =
+  | "failure"
+  | "idle"
+  | "lost"
+  | "running"
+  | "starting"
+  | "success"
+  | "waiting";
+
+export interface NodeView {
+  name: string;
+  type: string;
+  parent: string;
+  depth: number;
+  priority: number | null;
+  state: NodeState;
+  since_s: number;
+  feedback: string;
+  arc: string;
+  because: string;
+}
+
+export interface OwnView {
+  console: string;
+  user: string;
+  robot: string;
+  is_held: boolean;
+  is_asked: boolean;
+  status: string;
+  epoch: number;
+  until_s: number;
+  taken_because: string;
+  applied: string;
+  stop: StopView | null;
+  away_since_s: number;
+  consent: ConsentView | null;
+  asked: string;
+  other_screens: string[];
+  must_let_go: boolean;
+  lost: LostView | null;
+  link_down_s: number;
+  moment: number;
+}
+
+export interface ParameterView {
+  component: string;
+  address: string;
+  name: string;
+  value: string;
+  before: string;
+  changed_by: string;
+  changed_s: number;
+}
+
+export interface ParametersAnswer {
+  parameters: string;
+  told: boolean;
+}
+
+export interface RefusedAnswer {
+  refused: string;
+}
+
+export interface RequestRow {
+  arc: string;
+  who: string;
+  is_console: boolean;
+  state: string;
+  rcs: string[];
+  priority: string;
+  since_s: number;
+  until_s: number;
+  expected_start_s: number;
+  because: string;
+  would_change: string;
+  blockers: string[];
+}
+
+export interface RobotView {
+  robot: string;
+  number: number;
+  is_up: boolean;
+  holder: string;
+  arc: string;
+  is_console: boolean;
+  is_mine: boolean;
+  priority: string;
+  epoch: number;
+  since_s: number;
+  until_s: number;
+  lease_left_s: number;
+  lease_age_s: number;
+  because: string;
+  waiting: WaitingView[];
+  stop: StopView | null;
+  video: VideoView | null;
+  feedback: string;
+}
+
+export interface SetAnswer {
+  set: string;
+  parameter: string;
+  done: boolean;
+}
+
+export type Severity =
+  | "alarm"
+  | "notice"
+  | "warning";
+
+export interface SliceView {
+  who: string;
+  arc: string;
+  epoch: number;
+  from_s: number;
+  to_s: number;
+  certainty: Certainty;
+  is_console: boolean;
+}
+
+export interface StopView {
+  number: number;
+  by: string;
+  reason: string;
+  age_s: number;
+  is_confirmed: boolean;
+  by_user: string;
+  also: string[];
+  since_s: number;
+  is_mine: boolean;
+  lift_line: string;
+}
+
+export interface TimelineRow {
+  rc: string;
+  kind: string;
+  is_sharable: boolean;
+  slices: SliceView[];
+}
+
+export interface TimelineView {
+  from_s: number;
+  now_s: number;
+  to_s: number;
+  rows: TimelineRow[];
+}
+
+export interface VideoView {
+  robot: string;
+  age_s: number;
+  rate_hz: number;
+  latency_s: number;
+  is_stale: boolean;
+}
+
+export interface View {
+  welcome: Welcomed;
+  own: OwnView;
+  robots: RobotView[];
+  links: LinkView[];
+  alarms: AlarmView[];
+  drawn: Record<string, number>;
+  tree: NodeView[];
+  requests: RequestRow[];
+  timeline: TimelineView;
+  hosts: HostView[];
+  health: HealthView | null;
+  parameters: ParameterView[];
+  components: ComponentRow[];
+  log: LogRow[];
+  now_s: number;
+  beat: number | null;
+}
+
+export interface WaitingView {
+  who: string;
+  arc: string;
+  start_s: number;
+}
+
+export interface Welcomed {
+  user: string;
+  priority: number;
+  mission: string;
+}
+
+export interface WhyAnswer {
+  why: string;
+  lines: string[];
+}
+
+export interface Acknowledge {
+  do: "acknowledge";
+  key?: string;
+}
+
+export interface AskParameters {
+  do: "parameters";
+  name: string;
+}
+
+export interface AskWhy {
+  do: "why";
+  name: string;
+}
+
+export interface Beat {
+  do: "beat";
+  number: number;
+}
+
+export interface Decide {
+  do: "decide";
+  is_given: boolean;
+}
+
+export interface DismissLost {
+  do: "dismiss_lost";
+}
+
+export interface Drawn {
+  do: "drawn";
+  robot: string;
+  number: number;
+}
+
+export interface Hello {
+  do: "hello";
+  token: string;
+  user?: string;
+  priority?: number | null;
+  page?: string;
+}
+
+export interface Here {
+  do: "here";
+  is_there: boolean;
+}
+
+export interface JumpOnce {
+  do: "jump";
+  moment: number;
+}
+
+export interface LetGo {
+  do: "release";
+}
+
+export interface LiftStop {
+  do: "lift";
+  robot: string;
+  number: number;
+}
+
+export interface MayI {
+  do: "may_i";
+  why?: string;
+}
+
+export interface MoreLog {
+  do: "more_log";
+  number: number;
+  first: number;
+}
+
+export interface SearchLog {
+  do: "search_log";
+  number: number;
+  text?: string;
+  robot?: string;
+  person?: string;
+  level?: string;
+  since?: string;
+  until?: string;
+}
+
+export interface SetParameter {
+  do: "set";
+  name: string;
+  parameter: string;
+  value: unknown;
+}
+
+export interface Steer {
+  do: "drive";
+  moment: number;
+  forward: number;
+  right: number;
+  speed_rad_s: number;
+}
+
+export interface StopAll {
+  do: "stop_all";
+}
+
+export interface StopRobot {
+  do: "stop_robot";
+  robot: string;
+}
+
+export interface StopWheels {
+  do: "stop";
+}
+
+export interface TakeOver {
+  do: "take";
+  robot: string;
+}
+
+export interface Watch {
+  do: "watch";
+  robots: string[];
+}
+
+export type Answer = WhyAnswer | RefusedAnswer | ParametersAnswer | SetAnswer | { log: LogFound | LogRefused };
+
+export type Heard = { view: Partial<View>; answer?: undefined } | { answer: Answer };
+
+export type Said =
+  | Hello
+  | Beat
+  | Steer
+  | StopWheels
+  | JumpOnce
+  | TakeOver
+  | LetGo
+  | MayI
+  | Decide
+  | DismissLost
+  | StopRobot
+  | StopAll
+  | LiftStop
+  | Watch
+  | Drawn
+  | AskWhy
+  | SearchLog
+  | MoreLog
+  | Acknowledge
+  | AskParameters
+  | SetParameter
+  | Here;

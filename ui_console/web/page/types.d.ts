@@ -1,0 +1,28 @@
+// What the modules of the page hand to each other.
+
+import type { Said } from "./messages.d.ts";
+
+/** Sends a message if that is possible now; returns whether it was. */
+export type Say = (message: Said) => boolean;
+
+/** Does what a person wants. */
+export type Act = (what: string, name?: string, more?: { number?: number; parameter?: string; value?: unknown }) => void;
+
+/** A picture as it came. */
+export interface Picture {
+  robot: string;
+  number: number;
+  jpeg: Uint8Array<ArrayBuffer>;
+}
+
+export type LinkState = "fresh" | "old" | "down" | "refused";
+
+/** How the connection is now. */
+export interface LinkChange {
+  is: LinkState;
+  why: string;
+  ageMs: number;
+}
+
+/** Forward and right, each from −1 to 1. */
+export type Stick = [number, number];
