@@ -20,6 +20,7 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from resource_pool.arc_client import StopState
 from ui_console.consent import Settled, Sought, Topic
+from ui_console.losses import why_lost
 
 
 # ---------------------------------------------------------------------- of its own robot
@@ -110,10 +111,17 @@ class CommandRefused:
 
 @dataclass(frozen=True, slots=True)
 class LinkTrouble:
-    """Somebody did not answer: what was asked may or may not have happened."""
+    """A peer did not answer: what was asked may or may not have happened.
+
+    Attributes:
+        at_s: When.
+        detail: What was not answered, for people.
+        command: The command of this console's hands that was not answered; empty: something else.
+    """
 
     at_s: float
     detail: str
+    command: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -502,12 +510,14 @@ def event_json(event: ConsoleEvent) -> bytes:
     """Return the event as one line of JSON, without its end.
 
     Example:
-        >>> event_json(Lost(2.0, "higher", "console-1", -1.0))
-        b'{"event":"suspended","at_s":2.0,"reason":"higher","by":"console-1","expected_start_s":-1.0}'
+        >>> event_json(LinkTrouble(2.0, "scout1 did not answer"))
+        b'{"event":"no_answer","at_s":2.0,"detail":"scout1 did not answer","command":""}'
     """
     plain: dict[str, Any] = msgspec.to_builtins(_by_name(event))
     if isinstance(event, Granted):
         plain["after_s"] = event.after_s
+    if isinstance(event, Lost):
+        plain["why"] = why_lost(event.reason, event.by)
     return msgspec.json.encode({"event": event_word(event), **plain})
 
 

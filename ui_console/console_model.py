@@ -41,7 +41,7 @@ from ui_console.console_events import (
     WhyHeard,
 )
 from ui_console.lifting import question_line
-from ui_console.losses import WANTED, why_lost
+from ui_console.losses import UNDECIDED, WANTED, why_lost
 from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.views import (
     NONE_S,
@@ -60,7 +60,6 @@ from ui_console.views import (
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
 RATE_OVER_S = 2.0  # chosen: a rate a person can read
-UNRENEWED = ("lost", "lease")  # reasons of a loss that nobody decided
 SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
@@ -211,9 +210,9 @@ class ConsoleModel:
         )
 
     def other_screens(self) -> list[str]:
-        """Return where else this console's person sits, and what they hold there, one line each."""
+        """Return for each other screen of this console's person what it does, one line each."""
         own = [screen for screen in self.team.screens_of(self.user) if component_of(screen.address) != self.name]
-        return [f"on {screen.host} {screen.feedback or f'is {screen.state}'}" for screen in own]
+        return [f"your other screen on {screen.host} {screen.feedback or 'watches'}" for screen in own]
 
     def consent(self, now_s: float) -> ConsentView | None:
         """Return what this operator is to decide first; None: nobody asks."""
@@ -285,15 +284,17 @@ class ConsoleModel:
             if stop is not None:
                 return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
             slice_end = _slice_end(self.held.until_s, now_s)
-            return f"you hold {self.robot or 'no robot'} (epoch {max(self.held.epochs.values(), default=0)}){slice_end}"
+            return f"you hold {self.robot or 'no robot'}{slice_end}"
         if self.asked is None:
             if self._refused:
                 return f"you hold no robot: {self._refused}"
-            there = ", the one ".join(self.other_screens())
-            return f"watching; you hold no robot{f' here; your other screen {there}' if there else ''}"
+            there = "; ".join(self.other_screens())
+            return f"watching; you hold no robot{f' here; {there}' if there else ''}"
         wanted = self.robot or "a robot"
         if self.why is not None and self.why.why.lines:
-            return f"waiting for {wanted}: {self.team.people.named(self.why.why.lines[0])}"
+            why = self.why.why
+            reason = why.lines[0].removeprefix(f"{why.name} {why.state}: ")  # which the line says in its own words
+            return f"waiting for {wanted}: {self.team.people.named(reason)}"
         if self.lost is not None:
             return f"waiting for {wanted}: {self._why_lost(self.lost)}"
         return f"waiting for {wanted}"
@@ -325,7 +326,7 @@ class ConsoleModel:
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
             case Lost(at_s=at_s):
                 self.held, self.lost = None, event
-                if event.reason in UNRENEWED:
+                if event.reason in UNDECIDED:
                     self._went = _Went(at_s, self.robot, "the link to it was away for too long")
                 self._pictures.clear()
                 if event.reason != WANTED:

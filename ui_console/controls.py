@@ -123,7 +123,7 @@ class Controls:
             return False
         except LinkError as error:
             self.require_let_go()  # whoever is cut off for a moment does not see what the robot would do next
-            show(LinkTrouble(now_s(), str(error)))
+            show(LinkTrouble(now_s(), str(error), type(command).__name__.lower()))
             return False
         took_s = time.perf_counter() - wanted_s
         self._tell_applied(command, applied)

@@ -5,6 +5,9 @@ from __future__ import annotations
 WANTED = "self"
 """The word for what a console gave away of its own will."""
 
+UNDECIDED = ("lost", "lease")
+"""The words for a loss that nobody decided: the console was cut off, or paused."""
+
 _SENTENCES = {
     "slice": "it is the turn of {by}",
     "higher": "{by} has the higher priority",

@@ -138,13 +138,13 @@ class ScriptPlayer:
         self._ended = steps is not None
         self._drive: Drive | None = None
         self._next_s = 0.0
-        self._over = self._must_let_go = False
+        self._over = self.must_let_go = False
         self.held_back = 0
         """How many lines were left out because no halt came before them."""
 
     def require_let_go(self) -> None:
         """From now on lines move nothing before one of them halts."""
-        self._drive, self._must_let_go = None, True
+        self._drive, self.must_let_go = None, True
 
     @property
     def is_over(self) -> bool:
@@ -168,8 +168,8 @@ class ScriptPlayer:
         wishes: list[Wish] = []
         while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
             wish = self._steps.popleft().wish
-            self._must_let_go = self._must_let_go and not isinstance(wish, Halt)
-            if self._must_let_go and isinstance(wish, Drive | Jump):
+            self.must_let_go = self.must_let_go and not isinstance(wish, Halt)
+            if self.must_let_go and isinstance(wish, Drive | Jump):
                 self.held_back += 1
                 continue
             self._over = isinstance(wish, GiveBack)

@@ -12,14 +12,19 @@ from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import SwappedOut
 from ui_console.console_events import (
     Asked,
+    CommandApplied,
     CommandRefused,
     ConsoleEvent,
+    Granted,
+    LinkTrouble,
+    Lost,
     MomentBegan,
     PictureSeen,
     StopHeard,
     event_json,
 )
 from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
+from ui_console.losses import UNDECIDED
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.teleoperation import Teleoperation
 
@@ -49,18 +54,34 @@ class ScriptDriver:
         self._wrong: WrongScript | None = None
         self._console: Teleoperation | None = None
         self._stops: list[StopRobot | StopAll] = []
-        self._stopped = False
+        self._stopped = self._is_unanswered = False
 
     def show(self, event: ConsoleEvent) -> None:
-        """Write the event, if it is one for scripts."""
-        if isinstance(event, _FOR_SCREENS_ONLY):
+        """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
+        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
             return
+        if isinstance(event, Lost) and event.reason in UNDECIDED:
+            self._player.require_let_go()
         if isinstance(event, StopHeard) and (event.stop.is_stopped or self._stopped):
             self._stopped = event.stop.is_stopped
             self._player.require_let_go()
         if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True
         self._write(event_json(event))
+
+    @property
+    def must_halt(self) -> bool:
+        """Whether its lines move nothing before one that halts."""
+        return self._player.must_let_go
+
+    def _is_told(self, event: ConsoleEvent) -> bool:
+        """Take note of a silence and of its end; return whether the script knows of this silence."""
+        if isinstance(event, LinkTrouble) and event.command:
+            is_told, self._is_unanswered = self._is_unanswered, True
+            return is_told
+        if isinstance(event, CommandApplied | Granted | Lost):
+            self._is_unanswered = False
+        return False
 
     def feed(self, line: str | None) -> None:
         """Take the next line of the script; None: its end. A wrong line ends the script there."""

@@ -23,7 +23,7 @@ from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
-from backbone.spoken import value_text
+from backbone.spoken import counted, value_text
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.console_events import (
@@ -83,10 +83,12 @@ class TeamModel:
 
     Args:
         mission: Its name.
+        lift_remedy: What an operator of this console does about a stop.
     """
 
-    def __init__(self, mission: str = "") -> None:
+    def __init__(self, mission: str = "", lift_remedy: str = "Lift the stop when the robot may move.") -> None:
         self.mission = mission
+        self._lift_remedy = lift_remedy
         self.schedule: Schedule | None = None
         """As last heard."""
         self.alarms = AlarmBook()
@@ -525,15 +527,14 @@ class TeamModel:
         unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
         line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
         if stop.is_stopped:
-            remedy = "Lift the stop when the robot may move."
-            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, remedy)
+            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
         else:
             self.alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
 
     def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
         self._radios[radio] = values
-        counted = {(radio, name.removeprefix("overruns_")) for name in values}
-        self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in counted}
+        known = {(radio, name.removeprefix("overruns_")) for name in values}
+        self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in known}
         for name, count in values.items():
             arc = name.removeprefix("overruns_")
             if arc == name:
@@ -541,7 +542,8 @@ class TeamModel:
             before = self._overruns.get((radio, arc), 0.0)
             self._overruns[radio, arc] = count
             if count > before:
-                line = f"{count:.0f} packets of {arc} on {radio} were late or lost"
+                late = int(count)
+                line = f"{counted(late, 'packet')} of {arc} on {radio} {'was' if late == 1 else 'were'} late or lost"
                 remedy = "Claim with a longer period, or use another radio."
                 self.alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
 

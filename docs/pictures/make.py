@@ -30,6 +30,7 @@ from backbone.mission_picture import look
 from backbone.mission_screen import live_screen
 from backbone.naming import Subsystem
 from mission_control.messages import MotionSeen
+from ui_console.console_events import ConsoleEvent, Granted
 from ui_console.observer import Observer
 from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession
@@ -37,7 +38,7 @@ from ui_console.terminal.session import TerminalSession
 HERE = Path(__file__).parent
 MISSION_XML = HERE.parents[1] / "mission.xml"
 COLUMNS, LINES = 120, 34
-MOTION_WITHIN_S = 90.0
+MOTION_WITHIN_S, GRANT_WITHIN_S = 90.0, 30.0
 PICTURE_STANDS_S, KEY_EVERY_S, KEYS = 2.0, 0.1, 8
 TURNS_PASS_S = 25.0
 
@@ -69,16 +70,25 @@ async def main() -> None:
         {"robot": "scout3", "kind": "capture", "priority": 100},
     )
     session = TerminalSession(launch.name, found.mission, "anna")
+    granted = asyncio.Event()
+
+    def show(event: ConsoleEvent) -> None:
+        session.show(event)
+        if isinstance(event, Granted):
+            granted.set()
 
     async def drive(pilot: Pilot[Any]) -> None:
+        async with asyncio.timeout(GRANT_WITHIN_S):
+            await granted.wait()
         await asyncio.sleep(PICTURE_STANDS_S)
+        await pilot.press("K")
         for _key in range(KEYS):
             await pilot.press("left")
             await asyncio.sleep(KEY_EVERY_S)
         (HERE / "attach.svg").write_text(pilot.app.export_screenshot(title="scout-console attach scout3"))
         await pilot.press("q")
 
-    console = Teleoperation(launch, await join(launch.address), clock, show=session.show, see=session.see, user="anna")
+    console = Teleoperation(launch, await join(launch.address), clock, show=show, see=session.see, user="anna")
     await session.run(console, pilot=drive, size=(COLUMNS, LINES))
 
     launch = msgspec.structs.replace(launch, name="console-2", parameters={})

@@ -11,8 +11,8 @@ from backbone.health import HealthWord, MissionHealth
 from backbone.printable import printable_all
 from ui_console.console_events import HealthHeard, event_json
 from ui_console.console_model import ConsoleModel
+from ui_console.profile import Profile
 from ui_console.terminal.head import head
-from ui_console.terminal.keys import Profile
 from ui_console.views import AlarmKind, AlarmView, view_json
 
 GRABBER = Absence("grabber", 4.0, "killed by SIGKILL", "starts again in 0.1 s")

@@ -158,7 +158,7 @@ def test_the_status_line_follows_a_take_over_from_wish_to_release() -> None:
     shown.apply(WhyHeard(9.97, Why("c", "waiting", ["watch1 has its minimum run time"], "R5", [], 12.0, "")))
     assert shown.status_line(9.97) == "waiting for scout1: watch1 has its minimum run time"
     shown.apply(GRANT)
-    assert shown.status_line(11.0) == "you hold scout1 (epoch 7), slice 4 s"
+    assert shown.status_line(11.0) == "you hold scout1, slice 4 s"
     shown.apply(StopHeard(11.0, STOP))
     assert shown.status_line(11.0) == "scout1 is STOPPED by anna: child in the room"
     shown.apply(Lost(12.0, "higher", "console-2", -1.0))
@@ -242,7 +242,9 @@ def test_a_request_that_waits_long_without_a_prospect_starves_and_stops_starving
 def test_packets_late_on_a_radio_are_an_alarm_each_time_there_are_more() -> None:
     shown = model(RadioCounted(1.0, "radio", {"overruns_a": 0.0}))
     assert alarm_lines(shown) == []
-    for at_s, overruns in ((2.0, 3.0), (3.0, 3.0), (4.0, 5.0)):
+    shown.apply(RadioCounted(1.5, "radio", {"overruns_a": 1.0}))
+    assert alarm_lines(shown) == ["1 packet of a on radio was late or lost"]
+    for at_s, overruns in ((2.0, 1.0), (4.0, 5.0)):
         shown.apply(RadioCounted(at_s, "radio", {"overruns_a": overruns}))
     [alarm] = shown.team.alarms.views()
     assert (alarm.kind, alarm.count, alarm.line) == (
@@ -446,3 +448,10 @@ def test_a_claim_that_was_refused_waits_for_nothing_and_says_why_until_the_next(
     assert not shown.own(100.0).is_asked
     shown.apply(ASK)
     assert shown.status_line(101.0) == "waiting for scout1"
+
+
+def test_a_console_that_waits_says_the_reason_without_repeating_who_waits() -> None:
+    line = "console-1-capture waiting: since 24.54 s (3.5 s) for console-9-capture"
+    why = Why("console-1-capture", "waiting", [line], "3", [], -1.0, "")
+    shown = model(ASK, WhyHeard(2.0, why))
+    assert shown.status_line(3.0) == "waiting for scout1: since 24.54 s (3.5 s) for console-9-capture"

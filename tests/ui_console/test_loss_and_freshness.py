@@ -22,8 +22,9 @@ from ui_console.console_events import (
     StopHeard,
 )
 from ui_console.feed import LINK_FRESH_S
-from ui_console.terminal.app import LINK_LOOK_S, ConsoleApp
-from ui_console.terminal.keys import Profile
+from ui_console.profile import Profile
+from ui_console.terminal.app import ConsoleApp
+from ui_console.terminal.display import LINK_LOOK_S
 from ui_console.views import AlarmKind, LostView
 
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)

@@ -177,8 +177,10 @@ def sits(name: str, user: str, feedback: str = "") -> ComponentState:
 
 def test_a_person_who_is_there_twice_is_told_where() -> None:
     shown = model(ComponentsListed(1.0, [sits("console-1", "anna"), sits("tablet-7", "anna", "drives scout1")], True))
-    assert shown.own(2.0).other_screens == ["on lab drives scout1"]
+    assert shown.own(2.0).other_screens == ["your other screen on lab drives scout1"]
     assert shown.status_line(2.0) == "watching; you hold no robot here; your other screen on lab drives scout1"
+    only_looks = model(ComponentsListed(1.0, [sits("console-1", "anna"), sits("tablet-7", "anna")], True))
+    assert only_looks.own(2.0).other_screens == ["your other screen on lab watches"]
     assert model(ComponentsListed(1.0, [DESK, sits("ben-7", "ben")], True)).own(2.0).other_screens == []
 
 

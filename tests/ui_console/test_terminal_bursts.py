@@ -10,12 +10,14 @@ import pytest
 from bursts import EVERY_KEY, LEAVE, LOOKS, SIZES, burst, press_all_twice
 from console_scenes import STOP, held_model
 from screen_text import screen_text
+from textual.app import App
 from textual.pilot import Pilot
 from written_session import WrittenSession, settle
 
 from ui_console.console_events import StopHeard
+from ui_console.profile import Profile
+from ui_console.terminal import display
 from ui_console.terminal.app import ConsoleApp
-from ui_console.terminal.keys import Profile
 from ui_console.terminal.tables import PanelName
 
 CONSOLE_SCREENS: dict[str, list[str]] = {
@@ -27,10 +29,12 @@ CONSOLE_SCREENS: dict[str, list[str]] = {
     "reason": ["M"],
     "parameter": [*["tab"] * 6, "e"],
     "lift": ["c"],
+    "search": ["slash"],
 }
 
 
 NO_DIALOGS = ("main", "bare")
+QUIET_S = 3.0
 
 
 def console(profile: Profile = Profile.TERMINAL) -> ConsoleApp:
@@ -49,6 +53,20 @@ async def to_main(pilot: Pilot[None]) -> None:
         await pilot.press("v")
     while app.profile is not Profile.PENDANT and app.chosen is not PanelName.ROBOTS:
         await pilot.press("tab")
+
+
+def state_of(app: App[None]) -> object:
+    """Return which screen is shown, and how."""
+    assert isinstance(app, ConsoleApp)
+    return app.screen, app.screen.has_class("-bare"), app.chosen
+
+
+@pytest.fixture
+def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the screen drawn by keys rather than by time, which takes what there is of a busy machine."""
+    monkeypatch.setattr(display, "REDRAW_EVERY_S", QUIET_S)
+    monkeypatch.setattr(display, "TABLES_EVERY_S", QUIET_S)
+    monkeypatch.setattr(display, "MONITOR_EVERY_S", QUIET_S)
 
 
 # ---------------------------------------------------------------------- what was seen to end a console
@@ -107,8 +125,18 @@ async def test_keys_typed_ahead_of_the_end_are_not_heard(key: str) -> None:
     assert app.return_code == LEAVE[key]
 
 
+async def test_a_key_that_arrives_together_with_the_escape_before_it_still_leaves() -> None:
+    """A busy terminal hands over both at once, which reads as one key with alt."""
+    app = console()
+    async with app.run_test(size=(80, 24)) as pilot:
+        burst(pilot, "alt+q")
+        await settle(pilot)
+    assert app.return_code == LEAVE["q"]
+
+
 # ---------------------------------------------------------------------- every key
 @pytest.mark.slow
+@pytest.mark.usefixtures("quiet")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("name", CONSOLE_SCREENS)
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -120,15 +148,16 @@ async def test_every_key_of_the_console_may_come_twice(
         monkeypatch.setenv("NO_COLOR", "1")
     app = console()
     app.theme = theme
-    await press_all_twice(
-        app, size, CONSOLE_SCREENS[name], [*EVERY_KEY, *LEAVE], to_main, is_dialog=name not in NO_DIALOGS
-    )
+    keys, is_dialog = [*EVERY_KEY, *LEAVE], name not in NO_DIALOGS
+    await press_all_twice(app, size, CONSOLE_SCREENS[name], keys, to_main, state_of, is_dialog=is_dialog)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("quiet")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("profile", [Profile.PENDANT, Profile.MONITOR])
 @pytest.mark.parametrize("size", SIZES, ids=str)
 async def test_every_key_of_a_pendant_and_a_monitor_may_come_twice(profile: Profile, size: tuple[int, int]) -> None:
     for opening in ([], ["question_mark"], ["c"]):
-        await press_all_twice(console(profile), size, opening, [*EVERY_KEY, *LEAVE], to_main, is_dialog=bool(opening))
+        keys, is_dialog = [*EVERY_KEY, *LEAVE], bool(opening)
+        await press_all_twice(console(profile), size, opening, keys, to_main, state_of, is_dialog=is_dialog)

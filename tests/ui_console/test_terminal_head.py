@@ -7,8 +7,9 @@ import pytest
 from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 
 from ui_console.console_events import LinkTrouble, ScheduleHeard, StopHeard
+from ui_console.profile import Profile
 from ui_console.terminal.head import Head, head
-from ui_console.terminal.keys import Profile, has, hints, key_lines, keys_help
+from ui_console.terminal.keys import has, hints, key_lines, keys_help
 from ui_console.views import ConsentView, ConsoleView, HealthView, LostView
 
 WIDTHS = [20, 40, 50, 80, 120, 200]
@@ -158,5 +159,7 @@ def test_the_keys_of_a_profile_are_listed_once_each_those_that_stop_first() -> N
 
 
 def test_one_person_at_two_screens_is_told_so() -> None:
-    told = shown_at(own(busy(), other_screens=["you also sit at console-9: it holds scout2"]), 80).says
-    assert "you also sit at console-9: it holds scout2" in [one.plain for one in told]
+    screens = ["your other screen on lab drives scout2"]
+    for is_asked in (True, False):
+        told = [one.plain for one in shown_at(own(busy(), other_screens=screens, is_asked=is_asked), 80).says]
+        assert (screens[0] in told) is is_asked, "once: here, or in the first line of one that watches"

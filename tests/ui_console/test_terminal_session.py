@@ -8,13 +8,18 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from console_scenes import STOP
+from textual.binding import Binding
 from textual.pilot import Pilot
 
 from backbone.bus.clock import MissionClock
 from backbone.cli import ExitCode
 from backbone.component.messages import LifeState
+from ui_console.console_events import StopHeard
 from ui_console.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
 from ui_console.observer import Observer
+from ui_console.terminal.dialogs import LiftQuestion
+from ui_console.terminal.keys import KEYS
 from ui_console.terminal.session import TerminalSession
 
 
@@ -114,3 +119,13 @@ async def test_a_gamepads_buttons_stop_one_robot_and_all_with_a_dialog_in_front(
 
     await session.run(cast(Observer[Any], console), pilot=open_a_dialog)
     assert console.stopped == ["scout1", "all"]
+
+
+def test_the_remedy_of_a_stop_names_the_keys_of_a_terminal() -> None:
+    session = TerminalSession("console-1")
+    session.show(StopHeard(1.0, STOP))
+    [alarm] = session.model.view(2.0).alarms
+    assert alarm.remedy == "When the robot may move, press c, then l."
+    keys = [binding for binding in KEYS if isinstance(binding, Binding)]
+    assert next(binding.action for binding in keys if binding.key == "c") == "lift"
+    assert [binding.action for binding in LiftQuestion.BINDINGS if isinstance(binding, Binding)] == ["lift"]

@@ -14,9 +14,10 @@ from written_session import WrittenSession, settle
 
 from ui_console.console_events import ScheduleHeard, StopHeard
 from ui_console.console_model import ConsoleModel
+from ui_console.profile import Profile
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.dialogs import READ_S
-from ui_console.terminal.keys import Profile, robot_meant, stop_meant
+from ui_console.terminal.keys import robot_meant, stop_meant
 from ui_console.terminal.widgets import DrivePad
 
 SIZE = (80, 24)

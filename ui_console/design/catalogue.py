@@ -12,7 +12,7 @@ from enum import StrEnum
 from functools import lru_cache
 from importlib import resources
 
-from backbone.mission.class_facts import ClassFacts as ClassFacts  # noqa: PLC0414  # the terminal's designer asks here
+from backbone.mission.class_facts import ClassFacts
 from backbone.mission.edit import Node, outline
 from backbone.mission.shipped_types import shipped_text
 from backbone.naming import Subsystem
@@ -89,11 +89,6 @@ def entries(mission: Node) -> list[TypeEntry]:
         _entry(one, world_type, is_stock=True, is_declared=False) for name, one in known.items() if name not in names
     ]
     return own + rest
-
-
-def stock_classes() -> list[str]:
-    """Return the class paths of the project's own types."""
-    return [one.text("class") for one in _types().values()]
 
 
 def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:

@@ -1,7 +1,6 @@
 """A draft as a page shows it: plain values, ready for JSON.
 
-Pure: a draft in, views out. What they say is what the terminal's designer says, for both ask ``offers``,
-``properties``, ``catalogue`` and the draft itself.
+Pure: a draft in, views out.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path
 from backbone.scheduling.rehearsal import Run
+from backbone.spoken import counted
 from ui_console.design.catalogue import Role, TypeEntry, description, entries
 from ui_console.design.draft import Draft
-from ui_console.design.lines import summary
 from ui_console.design.offers import Offer, offers
 from ui_console.design.properties import class_of, properties
 
@@ -190,6 +189,22 @@ def tree_view(draft: Draft) -> list[ElementRow]:
     ]
 
 
+def summary(node: Node) -> str:
+    """Return a few words that distinguish an element from its siblings."""
+    words = [node.text(name) for name in ("name", "type", "kind") if node.text(name)]
+    if node.tag in ("wish", "uses"):
+        words = [part for part in (node.text("type"), node.text("name"), node.text("features")) if part]
+    if node.text("priority"):
+        words.append(f"priority {node.text('priority')}")
+    if node.text("minimum-runtime-s"):
+        words.append(f"at least {node.text('minimum-runtime-s')} s")
+    if node.text("x-m"):
+        words.append(f"at {node.text('x-m')}, {node.text('y-m')}")
+    if node.text("width-m") and not node.text("x-m"):
+        words.append(f"{node.text('width-m')} m × {node.text('depth-m')} m")
+    return " ".join(words)
+
+
 def problems_view(draft: Draft) -> list[ProblemRow]:
     """Return all problems in the order of the text."""
     return [
@@ -276,7 +291,7 @@ def rehearsal_view(dry: DryRun) -> RehearsalView:
         for rc in seen.utilization()
     ]
     told = [
-        f"{one.arc}: {_turns(one.turns)}, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
+        f"{one.arc}: {counted(one.turns, 'turn')}, longest wait {one.worst_wait_s:.1f} s, with {', '.join(one.rcs)}"
         for one in dry.claimed
         if not one.never_runs
     ]
@@ -308,10 +323,6 @@ def _tag(entry: TypeEntry) -> str:
 def _label(entry: TypeEntry) -> str:
     """Return the label of the offer of something of this type."""
     return f"{_tag(entry)} {entry.name}"
-
-
-def _turns(count: int) -> str:
-    return "1 turn" if count == 1 else f"{count} turns"
 
 
 def _turn(run: Run, who: str) -> TurnView:

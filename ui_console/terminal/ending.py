@@ -1,4 +1,4 @@
-"""How the screens of terminals end: what crashed stays a crash, and keys typed ahead of an end do nothing."""
+"""How the screen of a terminal ends: what crashed stays a crash, and keys typed ahead of an end do nothing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from textual.events import Event, InputEvent
 
 
 class EndingApp(App[None]):
-    """Base of the console's and the designer's screen."""
+    """Base of the consoles' screen."""
 
     _is_ending = False
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from backbone.spoken import counted
-from ui_console.terminal.keys import Profile, has
+from ui_console.profile import Profile
+from ui_console.terminal.keys import has
 from ui_console.terminal.lines import ALARM_STYLES
 from ui_console.views import ConsoleView, HealthView, LostView, VideoView
 
@@ -108,8 +109,8 @@ def _says(view: ConsoleView, profile: Profile) -> Iterator[Text]:
         yield Text(f"{own.consent.line} [g: yes, n: no; {own.consent.left_s:.0f} s{others}]", ASKING)
     if own.asked:
         yield Text(own.asked, ASKING)
-    for screen in own.other_screens:
-        yield Text(screen, "bold")
+    if own.is_asked:  # a console that only watches says so in its first line
+        yield from (Text(screen, "bold") for screen in own.other_screens)
     if own.must_let_go:
         yield Text("let go, then press anew", ASKING)
     if own.away_since_s >= 0:

@@ -7,28 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 from rich.style import Style
 from rich.text import Text
 from textual.binding import Binding
 
+from ui_console.profile import Profile
 from ui_console.views import ConsoleView
 
 MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})
 """Keys of the emergency stop: no dialog and no field takes them for anything else."""
-ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x"})
+ARRIVES_AS = frozenset({"alt+x", "alt+shift+x", "shift+x", "alt+q"})
 """What they arrive as when escape was pressed a tenth of a second before, and from terminals that tell keys apart."""
-
-
-class Profile(StrEnum):
-    """How a console looks."""
-
-    TERMINAL = "terminal"  # picture, tables, keys
-    PENDANT = "pendant"  # keys for one hand and the state of one robot; the picture is on a video monitor
-    MONITOR = "monitor"  # tables only; drives nothing
-
 
 DRIVE_KEYS = [
     Binding("up,w", "drive('forward')", "drive forward while held"),
@@ -70,7 +61,7 @@ KEYS = [
     ),
     Binding("v", "bare", "picture alone, and back"),
     Binding("question_mark,f1", "keys", "these keys"),
-    Binding("q", "quit", "give the robot back and leave"),
+    Binding("q,alt+q", "quit", "give the robot back and leave"),
     Binding("ctrl+q", "quit", "give the robot back and leave", priority=True),
     Binding("ctrl+c", "interrupt", "the same from any dialog; exit code 130", priority=True),
 ]

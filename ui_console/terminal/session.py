@@ -24,13 +24,14 @@ from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
 from ui_console.gamepad import Gamepad, PadWish, Stick, play_gamepad
 from ui_console.observer import Observer
+from ui_console.profile import Profile
 from ui_console.team_model import TeamModel
 from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
-from ui_console.terminal.keys import Profile
 from ui_console.terminal.pixels import can_show_pixels
 
+LIFT_REMEDY = "When the robot may move, press c, then l."
 Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
 
 
@@ -58,7 +59,7 @@ class TerminalSession:
         sees: bool = True,
         gamepad: tuple[Gamepad, Mapping[int, tuple[int, int]]] | None = None,
     ) -> None:
-        self.model = ConsoleModel(name, user, TeamModel(mission), sees=sees)
+        self.model = ConsoleModel(name, user, TeamModel(mission, LIFT_REMEDY), sees=sees)
         self._profile, self._is_bare, self._gamepad = profile, is_bare, gamepad
         self._console: Observer[Any] | None = None
         self._frame: Frame | None = None

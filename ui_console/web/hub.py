@@ -42,6 +42,7 @@ TEAM_EVERY = 4  # chosen: every so many of those the tables of the whole mission
 TOLD_EVERY_S = 10.0  # chosen: a visitor that offends a thousand times a second fills no recording
 MAX_USER_IN_NAME = 24  # chosen: leaves room for what makes a component's name its own, and its ARC's
 
+LIFT_REMEDY = "When the robot may move, hold “Hold to lift” on its picture."
 Join = Callable[[Launch], Awaitable[Bus]]
 
 
@@ -61,7 +62,7 @@ class WebHub:
         self, launch: Launch, bus: Bus, clock: Clock, join: Join, *, kind: str = "capture", away_after_s: float = 0.0
     ) -> None:
         self.clock = clock
-        self.team = TeamModel(launch.mission)
+        self.team = TeamModel(launch.mission, LIFT_REMEDY)
         self.observer: Observer[NoParameters] = Observer(
             launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
         )

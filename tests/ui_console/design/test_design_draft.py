@@ -34,9 +34,9 @@ from ui_console.design.commands import (
 from ui_console.design.draft import Draft
 from ui_console.design.effects import Step
 from ui_console.design.file import FileChanged, NotSaved, save
-from ui_console.design.lines import problem_rows, property_rows, tree_rows
 from ui_console.design.offers import free_name, offers
 from ui_console.design.properties import properties
+from ui_console.design.views import element_view, problems_view, tree_view
 
 ROOT = Path(__file__).parents[3]
 EVERYTHING_DECLARED = ROOT / "tests" / "backbone" / "mission" / "everything_declared.xml"
@@ -398,11 +398,10 @@ def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: by
     except MissionInvalid:
         return
     draft = Draft("mission.xml", Step(text))
-    assert len(tree_rows(draft)) == sum(node.tag != "parameter" for node in draft.mission)
-    assert len(problem_rows(draft.problems)) == len(draft.problems)
+    assert len(tree_view(draft)) == sum(node.tag != "parameter" for node in draft.mission)
+    assert len(problems_view(draft)) == len(draft.problems)
     for node in draft.mission:
-        property_rows(properties(draft.mission, node, {}))
-        offers(draft.mission, node.path)
+        element_view(draft, node.path, {})
     assert draft.problems or draft.rehearsal is not None
 
 

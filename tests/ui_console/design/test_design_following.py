@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
-from design_keys import element, tutorial_draft
+from design_tutorial import element, tutorial_draft
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

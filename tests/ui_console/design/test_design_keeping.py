@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from design_keys import tutorial_draft
+from design_tutorial import tutorial_draft
 
 from ui_console.design.commands import SetValue
 from ui_console.design.draft import Draft

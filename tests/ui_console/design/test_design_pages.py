@@ -6,19 +6,19 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from design_keys import FACTS, WATCH, element, tutorial_draft
+from design_tutorial import FACTS, WATCH, element, tutorial_draft
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from backbone.errors import Refusal
 from backbone.mission.edit import outline
+from ui_console.design.changes import MustAsk, changed, sections, sibling_file, touched_by
 from ui_console.design.commands import DesignRefused, Remove
 from ui_console.design.draft import Draft
 from ui_console.design.effects import Step
 from ui_console.design.offers import offer_at, offers
+from ui_console.design.protocol import Change, MoveElement, Redo, RemoveElement, SetProperty, TakeOffer, Undo
 from ui_console.design.views import element_view, palette, places, problems_view, rehearsal_view, tree_view
-from ui_console.web.design_protocol import Change, MoveElement, Redo, RemoveElement, SetProperty, TakeOffer, Undo
-from ui_console.web.designing import MustAsk, changed, sections, sibling_file, touched_by
 
 ROOT = Path(__file__).parents[3]
 TUTORIAL = tutorial_draft()

@@ -24,8 +24,8 @@ from websockets.exceptions import InvalidMessage
 
 from backbone.mission.class_facts import ClassFacts
 from ui_console.cli import app
-from ui_console.web.design_room import DesignRoom
-from ui_console.web.design_server import DesignServer, begin
+from ui_console.design.room import DesignRoom
+from ui_console.design.server import DesignServer, begin
 from ui_console.web.door import Doorkeeper, Pass
 from ui_console.web.encryption import NoCertificate, encryption_with
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from importlib import resources
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from ui_console.console_model import ConsoleModel
 from ui_console.observer import Observer
+from ui_console.views import AlarmKind, AlarmView
 from ui_console.web.door import Welcome
 from ui_console.web.hub import WebHub
 from ui_console.web.operator import Operator
@@ -109,5 +111,21 @@ def test_one_page_asks_another_of_the_same_server_and_reads_the_answer(stage: Ca
         assert anna.model.own(on.clock.now_s()).asked == ""
         anna.obey(LiftStop("scout1", on.robot.latch.state.number))
         await on.until(lambda: not on.robot.latch.state.is_stopped)
+
+    stage(scene)
+
+
+def test_the_remedy_of_a_stop_names_the_pages_button(stage: Callable[[Scene], None]) -> None:
+    page = resources.files("ui_console.web").joinpath("page", "cards.js").read_text()
+
+    async def scene(on: Stage) -> None:
+        await on.terminal.stop_robot("scout1")
+
+        def stopped() -> list[AlarmView]:
+            return [alarm for alarm in on.hub.team.alarms.views() if alarm.kind is AlarmKind.STOPPED]
+
+        await on.until(stopped)
+        assert stopped()[0].remedy == "When the robot may move, hold “Hold to lift” on its picture."
+        assert '"Hold to lift"' in page
 
     stage(scene)

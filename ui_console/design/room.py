@@ -1,6 +1,6 @@
 """One mission file and the people who design it in their browsers: they share the draft, and each has a cursor.
 
-What a change does is decided in ``designing``; here it is done in turn, told to all, and kept beside the file.
+What a change does is decided in ``changes``; here it is done in turn, told to all, and kept beside the file.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
 from ui_console.design.catalogue import entries
+from ui_console.design.changes import ChangedMeanwhile, MustAsk, changed, question, sections, sibling_file, touched_by
 from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
 from ui_console.design.file import FileChanged, save
 from ui_console.design.following import follower
 from ui_console.design.keeping import DraftFile, DraftNotKept
-from ui_console.design.views import RehearsalView, element_view, rehearsal_view
-from ui_console.web.design_protocol import (
+from ui_console.design.protocol import (
     Change,
     DesignIntent,
     LookUp,
@@ -39,7 +39,7 @@ from ui_console.web.design_protocol import (
     TakeOffer,
     Undo,
 )
-from ui_console.web.designing import ChangedMeanwhile, MustAsk, changed, question, sections, sibling_file, touched_by
+from ui_console.design.views import RehearsalView, element_view, rehearsal_view
 from ui_console.web.door import Offence, Welcome
 from ui_console.web.outbox import Outbox
 

@@ -10,8 +10,8 @@ from ssl import SSLContext
 from ui_console.design.draft import Draft
 from ui_console.design.file import NotSaved
 from ui_console.design.keeping import DraftFile
-from ui_console.web.design_protocol import DesignIntent, understand_designer
-from ui_console.web.design_room import Designer, DesignRoom
+from ui_console.design.protocol import DesignIntent, understand_designer
+from ui_console.design.room import Designer, DesignRoom
 from ui_console.web.door import Doorkeeper
 from ui_console.web.reception import Reception, port_of
 from ui_console.web.site import DESIGN_FILES, Site

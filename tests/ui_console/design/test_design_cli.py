@@ -57,10 +57,17 @@ def test_a_port_that_is_taken_is_refused(tmp_path: Path) -> None:
     assert "--port" in told
 
 
+@pytest.mark.parametrize("words", [[], ["guard.xml"], ["--new", "guard.xml"]])
+def test_the_command_of_the_terminals_designer_is_refused_and_names_the_page(words: list[str]) -> None:
+    done = CliRunner().invoke(app, ["design", *words])
+    assert done.exit_code == 2
+    assert f"serve --design {'guard.xml' if words else 'mission.xml'}" in done.stderr
+    assert "design" not in CliRunner().invoke(app, ["--help"]).output.replace("designer", "").replace("--design", "")
+
+
 def test_the_designer_loads_neither_opencv_nor_mujoco_nor_textual() -> None:
     check = (
-        "import sys, ui_console.web.design_server;"
-        "sys.exit(', '.join({'cv2', 'textual', 'mujoco'} & set(sys.modules)) or 0)"
+        "import sys, ui_console.design.server;sys.exit(', '.join({'cv2', 'textual', 'mujoco'} & set(sys.modules)) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", check], check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -1,12 +1,6 @@
-"""Keys of the designer as a tutorial writes them, what it builds, and classes that say little of themselves."""
+"""The mission that the design tutorial builds, and classes that say little of themselves."""
 
 from __future__ import annotations
-
-import re
-from collections.abc import Sequence
-
-from textual.pilot import Pilot
-from textual.widgets import Input
 
 from backbone.mission.class_facts import ClassFacts, ParameterFacts
 from backbone.mission.edit import NewElement, Node
@@ -18,26 +12,6 @@ VIEW_S = {"type": "number", "minimum": 0, "default": 0.0}
 FACTS = {
     WATCH: ClassFacts("Looks for motion.", (ParameterFacts("view_s", VIEW_S, "For how long what moves is in view."),))
 }
-
-
-async def known(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
-    return {path: FACTS.get(path, ClassFacts("Documented elsewhere.")) for path in class_paths}
-
-
-async def press(pilot: Pilot[None], keys: str) -> None:
-    """Press what a line of the tutorial says; what is in quotes is put into the field, in place of what was there."""
-    for typed, key in re.findall(r'"([^"]*)"|(\S+)', keys):
-        if key:
-            await pilot.press(key)
-        else:
-            pilot.app.screen.query_one(Input).value = typed
-            await pilot.pause()
-
-
-async def settle(pilot: Pilot[None]) -> None:
-    """Let what was begun come to its end."""
-    for _ in range(3):
-        await pilot.pause()
 
 
 def tutorial_draft(source: str = "guard.xml") -> Draft:

@@ -20,9 +20,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from backbone.mission.class_facts import ClassFacts
 from ui_console.design.draft import Draft
 from ui_console.design.keeping import path_of_draft
-from ui_console.web.design_protocol import DesignIntent, Select, understand_designer
-from ui_console.web.design_room import DesignRoom
-from ui_console.web.design_server import DesignServer, begin
+from ui_console.design.protocol import DesignIntent, Select, understand_designer
+from ui_console.design.room import DesignRoom
+from ui_console.design.server import DesignServer, begin
 from ui_console.web.door import MAX_MESSAGE_BYTES, Doorkeeper, Hello, Pass
 
 MISSION_XML = (Path(__file__).parents[3] / "mission.xml").read_bytes()

@@ -1,0 +1,48 @@
+"""What a script hears: one line for one cause, and that its robot was lost in words."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ui_console.console_events import CommandApplied, ConsoleEvent, Granted, LinkTrouble, Lost
+from ui_console.script import read_script
+from ui_console.scripted import ScriptDriver
+
+DRIVE = '{"at_s": 0, "left_rad_s": 4, "right_rad_s": 4}\n{"at_s": 2, "left_rad_s": 2, "right_rad_s": 2}'
+UNANSWERED = LinkTrouble(2.0, "nobody answered Drive at resource_pool/console-1-drive", "drive")
+LATE = LinkTrouble(2.1, "resource_pool/console-1-drive did not answer Halt within 0.5 s", "halt")
+APPLIED = CommandApplied(3.0, "scout1", 7, "drive", {"left_rad_s": 4.0}, 0.01)
+GRANTED = Granted(4.0, {"scout": "scout1"}, {"scout1": 8}, 9.0, 1.0, True)
+
+
+def heard(*events: ConsoleEvent) -> list[dict[str, Any]]:
+    lines: list[bytes] = []
+    driver = ScriptDriver(lines.append, read_script(DRIVE))
+    for event in events:
+        driver.show(event)
+    return [json.loads(line) for line in lines]
+
+
+def test_a_silence_is_one_line_until_there_is_an_answer() -> None:
+    assert [line["event"] for line in heard(*[UNANSWERED] * 9)] == ["no_answer"]
+    told = heard(UNANSWERED, LATE, UNANSWERED, APPLIED, LATE, UNANSWERED)
+    assert [line["event"] for line in told] == ["no_answer", "applied", "no_answer"]
+    other = LinkTrouble(2.5, "scout1 did not confirm the stop: nobody answered")
+    assert [line["detail"] for line in heard(UNANSWERED, other, UNANSWERED)] == [UNANSWERED.detail, other.detail]
+
+
+def test_a_robot_that_was_lost_is_told_in_a_sentence() -> None:
+    [line] = heard(Lost(3.0, "lost", "console-1-drive", -1.0))
+    assert line["event"] == "suspended"
+    assert line["why"] == "what held it for this console has ended"
+    [line] = heard(Lost(3.0, "higher", "console-9", -1.0))
+    assert line["why"] == "console-9 has the higher priority"
+
+
+def test_after_a_loss_that_nobody_decided_a_script_moves_nothing_before_a_halt() -> None:
+    for reason, is_held_back in (("lost", True), ("lease", True), ("slice", False), ("higher", False)):
+        driver = ScriptDriver(lambda _line: None, read_script(DRIVE))
+        driver.show(Lost(3.0, reason, "console-9", -1.0))
+        driver.show(GRANTED)
+        assert driver.must_halt is is_held_back, reason

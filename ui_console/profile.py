@@ -1,0 +1,13 @@
+"""How a console looks."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Profile(StrEnum):
+    """How a console looks."""
+
+    TERMINAL = "terminal"  # picture, tables, keys
+    PENDANT = "pendant"  # keys for one hand and the state of one robot; the picture is on a video monitor
+    MONITOR = "monitor"  # tables only; drives nothing

@@ -1,0 +1,87 @@
+"""Consoles with a screen in a terminal: one that drives, one that watches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from backbone.cli import ExitCode
+from backbone.component.component import NoParameters
+from ui_console.gamepad import find_gamepad
+from ui_console.joining import Where, end_on_signals, join
+from ui_console.observer import Observer
+from ui_console.profile import Profile
+from ui_console.teleoperation import Teleoperation
+from ui_console.terminal.session import TerminalSession
+
+
+@dataclass(frozen=True)
+class Looks:
+    """How a console with a screen looks, and who sits at it.
+
+    Attributes:
+        profile: Which of the screens.
+        user: Who sits at it.
+        sees: Whether pictures come to this machine.
+        is_bare: Whether it begins with the picture alone.
+        has_gamepad: Whether the gamepad of this machine drives, too.
+    """
+
+    profile: Profile
+    user: str
+    sees: bool
+    is_bare: bool
+    has_gamepad: bool
+
+
+async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> int:
+    """Drive a robot by keys; return the command's exit code.
+
+    Args:
+        where: The mission.
+        wished: Parameters of ``Teleoperation``.
+        looks: How the screen looks.
+
+    Raises:
+        Refusal: The claim was refused, and no other claim followed.
+    """
+    pad = find_gamepad() if looks.has_gamepad else None
+    joining = await join(where, wished)
+    launch = joining.launch
+    session = TerminalSession(
+        launch.name,
+        launch.mission,
+        looks.user,
+        profile=looks.profile,
+        is_bare=looks.is_bare,
+        sees=looks.sees,
+        gamepad=pad,
+    )
+    see = session.see if looks.sees else None
+    console = Teleoperation(
+        launch,
+        await joining.open_bus(),
+        joining.clock,
+        show=session.show,
+        see=see,
+        keeps_arc=True,
+        user=looks.user,
+    )
+    interrupted = end_on_signals(console)
+    ended = await session.run(console)
+    if console.refusal is not None and console.given_back is None:
+        raise console.refusal
+    return ExitCode.INTERRUPTED if interrupted() else ended
+
+
+async def watch_on_screen(where: Where, user: str) -> int:
+    """Show what happens until a key or a signal ends it; return the command's exit code."""
+    joining = await join(where)
+    launch = joining.launch
+    session = TerminalSession(launch.name, launch.mission, user, sees=False)
+    console: Observer[NoParameters] = Observer(
+        launch, await joining.open_bus(), joining.clock, show=session.show, user=user
+    )
+    interrupted = end_on_signals(console)
+    ended = await session.run(console)
+    return ExitCode.INTERRUPTED if interrupted() else ended
