@@ -47,6 +47,7 @@ from backbone.creator.zygote import Zygote
 from backbone.door import SECRET_NAME, secret_of
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health_watch import HealthWatch
+from backbone.heaps import share_heaps
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
 from backbone.mission_log import AskLog, AskPeople, LogKeeper, PeopleKnown
@@ -402,6 +403,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         BackboneError: The nameserver could not be started.
     """
     began_s = time.monotonic()
+    share_heaps()
     refuse_if_up(description.name)
     if options.trace is not None:
         run_files.require_writable(options.trace)

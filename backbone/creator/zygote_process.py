@@ -38,6 +38,7 @@ from backbone.component.logs import redirect
 from backbone.component.process import EXIT_BUG, run_process
 from backbone.component.shared_process import run_shared_process
 from backbone.creator import process_table
+from backbone.heaps import share_heaps
 from backbone.ranges import ExitCode, Pid, Signal, Text
 from backbone.run_files import ENDED
 from backbone.wire import Message
@@ -133,6 +134,7 @@ def serve(channel: socket.socket, settings: ZygoteSettings) -> NoReturn:
 
 def main() -> NoReturn:
     """Be the zygote in a fresh interpreter: arguments are the channel's descriptor and the settings."""
+    share_heaps()
     settings = msgspec.json.decode(sys.argv[2], type=ZygoteSettings)
     serve(socket.socket(fileno=int(sys.argv[1])), settings)
 
