@@ -10,9 +10,8 @@ import asyncio
 import json
 import os
 import sys
-from collections.abc import Awaitable, Callable, Iterable
-from contextlib import AbstractAsyncContextManager, suppress
-from enum import IntEnum
+from collections.abc import Awaitable, Callable
+from contextlib import AbstractAsyncContextManager
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -35,23 +34,9 @@ from backbone.cli_options import (
     hub_endpoint,
 )
 from backbone.component.messages import LogLevel
-from backbone.errors import BackboneError, HubUnreachable, LinkError, Refusal, code_of
-from backbone.printable import printable_lines
+from backbone.endings import ExitCode, complaint_of, say, show
+from backbone.errors import BackboneError
 from backbone.spoken import counted, value_text
-
-
-class ExitCode(IntEnum):
-    """What the command's end means."""
-
-    DONE = 0
-    UNEXPECTED = 1
-    USAGE = 2
-    MISSION_INVALID = 3
-    NO_BACKBONE = 4
-    REFUSED = 5
-    MISSION_FAILED = 6
-    INTERRUPTED = 130
-
 
 app = typer.Typer(
     cls=WholeHelp,
@@ -80,32 +65,6 @@ def main() -> None:
         app()
     except KeyboardInterrupt:
         sys.exit(ExitCode.INTERRUPTED)
-
-
-def say(line: str) -> None:
-    """Talk to the person, printable; the command goes on also if that cannot be written."""
-    with suppress(OSError):
-        print(printable_lines(line), file=sys.stderr, flush=True)
-
-
-def show(lines: Iterable[str]) -> None:
-    """Print data on stdout, printable and whole."""
-    for line in lines:
-        print(printable_lines(line, most=sys.maxsize), flush=True)
-
-
-def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
-    """Return what a person reads of an error that ended a command, and the command's exit code."""
-    match error:
-        case Refusal():
-            codes = {"run": ExitCode.NO_BACKBONE, "usage": ExitCode.USAGE}
-            code = codes.get(code_of(error).partition(".")[0], ExitCode.REFUSED)
-            return f"refused [{code_of(error)}]: {error}", code
-        case HubUnreachable():
-            return f"{error} (is the mission up there, and --secret-file the mission's?)", ExitCode.NO_BACKBONE
-        case LinkError():
-            return f"no answer: {error} (is the mission up? see 'scout-backbone status')", ExitCode.NO_BACKBONE
-    return str(error), ExitCode.UNEXPECTED
 
 
 def run(work: Callable[[], Awaitable[int]]) -> None:

@@ -15,7 +15,7 @@ from backbone import run_files
 from backbone.bring_up import end_mission
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.cli import ExitCode, say
+from backbone.endings import ExitCode, say
 from backbone.errors import LinkError
 from backbone.operators import OperatorAction, tell_acted
 from backbone.verdict import await_verdict

@@ -14,9 +14,9 @@ from rich.text import Text
 
 from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
-from backbone.cli import ExitCode, complaint_of
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.core_launches import UpOptions
+from backbone.endings import ExitCode, complaint_of
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health import HealthWord, MissionHealth, line
 from backbone.keys import Conversation

@@ -14,8 +14,8 @@ from rich.live import Live
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
-from backbone.cli import ExitCode
 from backbone.component.messages import Absence
+from backbone.endings import ExitCode
 from backbone.errors import HubUnreachable, LinkError
 from backbone.health import HealthWord
 from backbone.mission_picture import MissionPicture, look

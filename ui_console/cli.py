@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from backbone.cli import ExitCode, run, say
+from backbone.cli import run
 from backbone.cli_options import SecretFile, WholeHelp, complete_mission, finite, hub_endpoint, picture_for
+from backbone.endings import ExitCode, say
 from ui_console.profile import Profile
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from backbone.cli import ExitCode, say
 from backbone.component.component import NoParameters
+from backbone.endings import ExitCode, say
 from ui_console.console_events import ConsoleEvent, for_scripts
 from ui_console.console_model import ConsoleModel
 from ui_console.joining import Where, end_on_signals, join, write_line

@@ -4,20 +4,41 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, assert_never
+from typing import Protocol, assert_never
 
+from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.operators import OperatorAction
 from resource_pool.arc_client import OtherStop, Stopper, StopState
 from ui_console.consent import CONSENT_WITHIN_S, Consent, Topic
 from ui_console.console_events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent
+from ui_console.feed import ConsoleFeed
 from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, answer_of, author_name, decide_lift, is_agreed
-
-if TYPE_CHECKING:
-    from ui_console.observer import Observer
 
 ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: who is asked answers by itself before
 LOOK_AGAIN = "Look who stopped the robot and why, then lift that stop if it may move."
+
+
+class Speaks(Protocol):
+    """The console through which a stop is lifted.
+
+    Attributes:
+        bus: To other consoles.
+        clock: The mission's.
+        feed: Knows robots and consoles.
+        address: Its own.
+    """
+
+    bus: Bus
+    clock: Clock
+    feed: ConsoleFeed
+
+    @property
+    def address(self) -> str:
+        """See above."""
+
+    def acted(self, action: OperatorAction, subject: str, detail: str = "", user: str = "") -> None:
+        """Publish what the operator did."""
 
 
 class LiftTalk:
@@ -29,7 +50,7 @@ class LiftTalk:
         show: Called with what that person's screens are to show.
     """
 
-    def __init__(self, console: Observer[Any], user: str, show: Callable[[ConsoleEvent], None]) -> None:
+    def __init__(self, console: Speaks, user: str, show: Callable[[ConsoleEvent], None]) -> None:
         self._console, self._user, self._show = console, user, show
 
     async def lift(self, robot: str, number: int) -> bool:

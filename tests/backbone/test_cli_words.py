@@ -9,10 +9,11 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from backbone.cli import ExitCode, app, complaint_of
+from backbone.cli import app
 from backbone.cli_options import hub_endpoint
 from backbone.completion import names_of, people_of, resources_of
 from backbone.component.messages import ComponentState, LifeState
+from backbone.endings import ExitCode, complaint_of
 from backbone.errors import HubUnreachable
 from backbone.mission_picture import MissionPicture
 from backbone.moments import NoMoment

@@ -13,8 +13,8 @@ from textual.binding import Binding
 from textual.pilot import Pilot
 
 from backbone.bus.clock import MissionClock
-from backbone.cli import ExitCode
 from backbone.component.messages import LifeState
+from backbone.endings import ExitCode
 from ui_console.console_events import StopHeard
 from ui_console.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
 from ui_console.observer import Observer

@@ -11,7 +11,7 @@ from textual import work
 from textual.events import AppBlur, AppFocus, Key, MouseDown
 from textual.widgets import Input
 
-from backbone.cli import ExitCode
+from backbone.endings import ExitCode
 from backbone.errors import Refusal
 from ui_console.driving import Direction, drive_towards
 from ui_console.gamepad import buttons_help

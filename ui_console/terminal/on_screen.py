@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from backbone.cli import ExitCode
 from backbone.component.component import NoParameters
+from backbone.endings import ExitCode
 from ui_console.gamepad import find_gamepad
 from ui_console.joining import Where, end_on_signals, join
 from ui_console.observer import Observer

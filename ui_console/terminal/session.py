@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from textual import pilot as textual_pilot
 
-from backbone.cli import ExitCode
 from backbone.component.messages import LifeState
+from backbone.endings import ExitCode
 from backbone.log_question import LogQuestion
 from backbone.mission_log import AskLog, Log
 from backbone.moments import Now
