@@ -77,9 +77,11 @@ class Page(TriedConsole):
 
     async def aim(self, gestures: Sequence[Gesture]) -> None:
         """See ``TriedConsole``."""
+        is_open = await self._page.evaluate("() => document.querySelector('dialog[open]') !== null")
+        buttons = IN_A_DIALOG if is_open else BUTTONS
         for gesture in gestures:
-            if gesture in BUTTONS:
-                button = self._page.locator(BUTTONS[gesture]).first
+            if gesture in buttons:
+                button = self._page.locator(buttons[gesture]).first
                 await button.evaluate("one => one.scrollIntoView({ block: 'center' })")
                 self._aimed[gesture] = await button.bounding_box()
 
