@@ -17,7 +17,10 @@ from running_mission import MARK, MISSION_XML, marked, wait_gone
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]
 
 BIN = Path(sys.executable).parent
-GRABBER = "resource_pool.rcs.framegrabber:Framegrabber"
+GRABBER = """</hosts>
+  <types>
+    <type name="framegrabber" class="sample_components:Broken" subsystem="resource_pool" uses="video_frequency"/>
+  </types>"""
 TIMES = 20
 
 
@@ -64,7 +67,7 @@ def assert_up_says(exit_code: int, folder: Path, change: dict[str, str]) -> None
     assert not left
 
 
-FAILS = {GRABBER: "sample_components:Broken"}
+FAILS = {"</hosts>": GRABBER, '<parameter name="frame_rate_hz" value="15"/>': ""}
 NO_HUB = {'name="iros2001"': f'name="{"m" * 63}"'}  # no socket has so long a path
 
 
