@@ -16,8 +16,8 @@ from backbone.mission.declaration.reference import reference_text
 from backbone.mission.declaration.xsd import XSD, xsd_text
 from backbone.mission.shipped_types import shipped_types
 
-HERE = Path(__file__).parent
-REFERENCE = HERE.parents[1] / "docs" / "reference" / "mission-file.md"
+REFERENCE = Path("docs/reference/mission-file.md")
+ROOM = Path("backbone/mission")
 
 
 def shipped_classes_text() -> str:
@@ -31,17 +31,17 @@ def shipped_classes_text() -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _reference_text() -> str:
-    return reference_text(REFERENCE.read_text("utf-8"))
-
-
-GENERATED: dict[Path, Callable[[], str]] = {
-    HERE / SHIPPED: shipped_classes_text,
-    HERE / XSD: xsd_text,
-    REFERENCE: _reference_text,
+GENERATED: dict[Path, Callable[[str], str]] = {
+    ROOM / SHIPPED: lambda _old: shipped_classes_text(),
+    ROOM / XSD: lambda _old: xsd_text(),
+    REFERENCE: reference_text,
 }
-"""Every generated file, and what makes its text; the reference has tables made of the facts of classes."""
+"""Every generated file, below the project's top, and what makes its text of the old one.
+
+Tables of the reference are made of the facts of classes; the text around them stays.
+"""
 
 if __name__ == "__main__":
+    top = Path(__file__).parents[2]
     for file, text in GENERATED.items():
-        file.write_text(text(), "utf-8")
+        (top / file).write_text(text((top / file).read_text("utf-8")), "utf-8")
