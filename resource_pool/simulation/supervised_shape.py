@@ -172,11 +172,17 @@ def _tree(dice: Random, name: str, resources: tuple[Resource, ...]) -> Behavior:
     leaves = tuple(
         _node(dice, f"{name}-leaf{number}", resources, process) for number in range(1, dice.randint(1, 3) + 1)
     )
-    return Behavior(type="node", name=name, priority=0, children=leaves, process="" if dice.random() < 0.5 else process)
+    tree = Behavior(type="node", name=name, priority=0, children=leaves)
+    return _sharing(tree, "" if dice.random() < 0.5 else process)
 
 
 def _node(dice: Random, name: str, resources: tuple[Resource, ...], process: str) -> Behavior:
     scouts = [resource.name for resource in resources if resource.type == "scout"]
     wish = {"scout": dice.choice(scouts)} if dice.random() < 0.5 else {}
     arc = ArcWish(kind="drive", wish=wish, minimum_runtime_s=NODE_RUNTIME_S, period_s=0.4, packet_time_s=0.02)
-    return Behavior(type="node", name=name, priority=0, arc=arc if dice.random() < 0.7 else None, process=process)
+    node = Behavior(type="node", name=name, priority=0, arc=arc if dice.random() < 0.7 else None)
+    return _sharing(node, process)
+
+
+def _sharing(node: Behavior, process: str) -> Behavior:
+    return node.model_copy(update={"process": process}) if process else node
