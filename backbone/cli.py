@@ -157,8 +157,13 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
 
     from backbone.dry_run import FIRST_MINUTE_S, dry_run
     from backbone.dry_run_screen import screen
+    from backbone.scheduling.own_planner import WrongPlanner
 
-    dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
+    try:
+        dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
+    except WrongPlanner as refused:
+        say(f"{refused} (remedy: {refused.remedy})")
+        return ExitCode.MISSION_INVALID
     Console(width=_width(), markup=False, emoji=False).print(screen(dry))
     if trace is not None:
         try:

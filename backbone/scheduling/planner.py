@@ -1,18 +1,22 @@
 """Planner: works out whose turn it is in a group of ARCs, and when the others' will be (rule 3).
 
 A planner reads the schedule and changes nothing. There are two: one plans a group whole, the other looks at each RC's
-first in line. What both do is known as backfilling with reservations: *conservative* backfilling reserves a start for
-every job that waits, the EASY kind for the first in line only (Mu'alem and Feitelson, "Utilization, predictability,
-workloads, and user runtime estimates in scheduling the IBM SP2 with backfilling", IEEE TPDS 12, 2001).
+first in line; a mission file can name another class (``own_planner``). What both do is known as backfilling with
+reservations: *conservative* backfilling reserves a start for every job that waits, the EASY kind for the first in line
+only (Mu'alem and Feitelson, "Utilization, predictability, workloads, and user runtime estimates in scheduling the IBM
+SP2 with backfilling", IEEE TPDS 12, 2001).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.priority import higher
+
+if TYPE_CHECKING:
+    from backbone.scheduling.table import Table
 
 Hold = tuple[ArcEntry, float, float]
 """Who stands in the way as one other ARC sees it, from when (minus infinity: it holds its RCs) and until when."""
@@ -95,3 +99,15 @@ class Planner(Protocol):
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return who has the start reserved that the ARC waits for, where only the first in line has one."""
+
+
+class PlannerType(Protocol):
+    """The class of a planner."""
+
+    def __call__(self, table: Table, *, slack_s: float) -> Planner:
+        """Return a planner that has planned nothing yet.
+
+        Args:
+            table: What it may ask of the schedule.
+            slack_s: By how much two reservations may overlap.
+        """
