@@ -26,10 +26,10 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.companion import Companion
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LogLevel, Stop, Stopping
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.component.process import run_with_heartbeat
 from backbone.core_launches import UpOptions, core_launches, launcher_launch, service_launch
 from backbone.creator.messages import (
@@ -303,11 +303,11 @@ class Launcher(Component[NoParameters]):
                 placed.set_result(None)
             self._awaited.discard(order.name)
             self.tell(order.name, f"is not wanted any more: {stopped}")
-            again = Companion(self.bus, component)
+            monitor = PeerMonitor(self.bus, component)
             try:
-                await again.wait_there()
+                await monitor.wait_there()
             finally:
-                again.close()
+                monitor.close()
 
     async def _keep_placed(
         self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]

@@ -22,10 +22,10 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
-from backbone.component.companion import Companion
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
@@ -171,7 +171,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._offering: asyncio.Task[None] | None = None
         self._unfounded: dict[str, int] = {}
         self._unfounded_since_s = 0.0
-        self._manager: Companion | None = None
+        self._manager: PeerMonitor | None = None
         self._commands = self._refused = 0
 
     # ------------------------------------------------------------------ hooks
@@ -625,7 +625,7 @@ class AggregateResourceController(Component[ArcParameters]):
         await self._send_request()
 
     async def _watch_owner(self) -> None:
-        owner = Companion(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
+        owner = PeerMonitor(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
         try:
             await owner.wait_gone()
         finally:
@@ -647,7 +647,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def _watch_rc_manager(self) -> None:
         """Ask anew if a restarted RC manager has not asked for the request by itself."""
-        manager = self._manager = Companion(self.bus, RC_MANAGER)
+        manager = self._manager = PeerMonitor(self.bus, RC_MANAGER)
         try:
             await manager.wait_there()
             while True:

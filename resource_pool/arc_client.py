@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.companion import Companion
 from backbone.component.messages import Stop, Stopping
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
 from backbone.nameserver.messages import NameTaken
@@ -246,15 +246,15 @@ class ArcClient:
             is_there = False
             self.wish.placed()
             on_changed()
-            companion = Companion(self._bus, self.address)
+            monitor = PeerMonitor(self._bus, self.address)
             watching = [
-                asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree"),
-                asyncio.create_task(self._note_absence(companion, clock, on_changed), name=f"{self.arc}:absence"),
+                asyncio.create_task(self._agree_after_absence(monitor), name=f"{self.arc}:agree"),
+                asyncio.create_task(self._note_absence(monitor, clock, on_changed), name=f"{self.arc}:absence"),
             ]
             try:
-                await companion.wait_gone()
+                await monitor.wait_gone()
             finally:
-                companion.close()
+                monitor.close()
                 for task in watching:
                     task.cancel()
                 await asyncio.gather(*watching, return_exceptions=True)
@@ -441,22 +441,22 @@ class ArcClient:
         except LinkError as error:
             log.info("%s: ended without an answer: %s", self.arc, error)
 
-    async def _note_absence(self, companion: Companion, clock: Clock, on_changed: Callable[[], None]) -> None:
-        """Miss the ARC from the moment at which it is out of sight, also while that may be this process's own link."""
-        await companion.wait_risen(1)
+    async def _note_absence(self, monitor: PeerMonitor, clock: Clock, on_changed: Callable[[], None]) -> None:
+        """Report the ARC as absent while its token does not stand, also while only the own link may be down."""
+        await monitor.wait_risen(1)
         while True:
-            await companion.wait_hidden()
+            await monitor.wait_hidden()
             self.wish.missing("it cannot be reached", clock.now_s())
             on_changed()
-            await companion.wait_there()
+            await monitor.wait_there()
             self.wish.placed()
             on_changed()
 
-    async def _agree_after_absence(self, companion: Companion) -> None:
-        """Ask what the ARC holds whenever it is back in sight: notices may have been missed meanwhile."""
-        await companion.wait_there()
+    async def _agree_after_absence(self, monitor: PeerMonitor) -> None:
+        """Ask the ARC for its state whenever its token rises again, because notices may have been lost meanwhile."""
+        await monitor.wait_there()
         while True:
-            await companion.wait_risen(companion.times_risen + 1)
+            await monitor.wait_risen(monitor.times_risen + 1)
             try:
                 state = await self.state()
             except LinkError as error:

@@ -16,8 +16,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.companion import Companion
 from backbone.component.messages import Absence
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import NameTaken
@@ -98,7 +98,7 @@ async def keep_placed(
         Refusal: The very first start was refused: that is for the owner to judge.
     """
     give_up_s = clock.now_s() + patience_s * clock.rate
-    component, placer = Companion(bus, address), Companion(bus, PLACER)
+    component, placer = PeerMonitor(bus, address), PeerMonitor(bus, PLACER)
     try:
         while True:
             try:
@@ -152,7 +152,7 @@ async def _start(
 
 
 async def _wait_missing(
-    bus: Bus, clock: Clock, wish: Wish, component: Companion, placer: Companion, on_changed: Callable[[], None]
+    bus: Bus, clock: Clock, wish: Wish, component: PeerMonitor, placer: PeerMonitor, on_changed: Callable[[], None]
 ) -> NotPlaced:
     """Return the placer's word that it does not have the component; one that cannot be reached is missed meanwhile."""
     compared_with = placer.times_risen
