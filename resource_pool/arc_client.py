@@ -163,7 +163,7 @@ class ArcClient:
         stops_at_once: bool = False,
         not_now: Callable[[], float] | None = None,
     ) -> ArcClient:
-        """Have an ARC of this kind started for the speaker of ``bus`` and its RCs asked for.
+        """Have an ARC of this kind started for the component of ``bus`` and its RCs asked for.
 
         The caller answers ``ArcNotice`` questions by handing them to ``handle``; notices may arrive
         before this returns, so route them by ``notice.arc == arc_name(bus, kind)``.
@@ -545,7 +545,7 @@ async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopS
     Needs no grant, neither ARC nor RC manager; a second stop keeps the first one's author. For operators only.
 
     Raises:
-        NotFromYou: The speaker of ``bus`` is no operator.
+        NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer: whether it stopped is unknown.
     """
     return await _ask_robot(bus, robot, EmergencyStop(reason, user))
@@ -561,7 +561,7 @@ async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
 
     Raises:
         OtherStop: Somebody stopped it anew since.
-        NotFromYou: The speaker of ``bus`` is no operator.
+        NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer.
     """
     return await _ask_robot(bus, stop.rc, LiftStop(stop.number, user))
