@@ -103,7 +103,7 @@ def read_secret_option(secret_file: Path | None) -> str:
     """
     from getpass import getpass
 
-    from backbone.door import read_secret, read_secret_file
+    from backbone.authentication import read_secret, read_secret_file
 
     if secret_file is None:
         return ""

@@ -9,8 +9,8 @@ import asyncio
 import os
 from pathlib import Path
 
+from backbone.authentication import read_secret_file
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.door import read_secret_file
 from backbone.errors import BackboneError
 from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of

@@ -21,6 +21,7 @@ from typing import Any, cast
 
 import zenoh
 
+from backbone.authentication import USER
 from backbone.bus.bus_base import BusBase, settle
 from backbone.bus.interface import (
     Accepted,
@@ -32,7 +33,6 @@ from backbone.bus.interface import (
     Reply,
     Subscription,
 )
-from backbone.door import USER
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
+from backbone.authentication import secret_of
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.asking import ask_until_answered
@@ -44,7 +45,6 @@ from backbone.component.messages import (
     Story,
 )
 from backbone.component.story import StoryBook
-from backbone.door import secret_of
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.shared_bus import SharedSession
@@ -38,7 +39,6 @@ from backbone.component.membership import (
     process_address,
 )
 from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
-from backbone.door import secret_of
 from backbone.wire import Envelope, Message
 
 

@@ -10,6 +10,7 @@ from typing import Protocol
 import msgspec
 
 from backbone import run_files
+from backbone.authentication import keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
@@ -19,7 +20,6 @@ from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPo
 from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
-from backbone.door import keep_secret
 
 READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this

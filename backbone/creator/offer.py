@@ -17,6 +17,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar
 
+from backbone.authentication import read_secret_file
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -30,7 +31,6 @@ from backbone.creator.messages import (
     ProcessFell,
     offer_name,
 )
-from backbone.door import read_secret_file
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.naming import Subsystem, legal
 from backbone.visit import clock_elsewhere, mission_clock

@@ -76,10 +76,10 @@ def _check_hosts(tables: Tables, report: Report) -> None:
             report.fault(
                 host.place_of("name"), "the name is too long for a creator's", f"{name} must fit {MAX_NAME_LENGTH}"
             )
-    _check_door(hosts, report)
+    _check_hub_endpoint(hosts, report)
 
 
-def _check_door(hosts: list[Element], report: Report) -> None:
+def _check_hub_endpoint(hosts: list[Element], report: Report) -> None:
     """Report a first host that other machines cannot reach, and ports of hosts that run no hub."""
     for host in hosts[1:]:
         if host.has("port"):
