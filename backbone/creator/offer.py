@@ -32,8 +32,8 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
+from backbone.mission_connection import clock_elsewhere, mission_clock
 from backbone.naming import Subsystem, legal
-from backbone.visit import clock_elsewhere, mission_clock
 from backbone.wire import Envelope, Message
 
 OFFER_TYPE = "offer"
