@@ -193,7 +193,7 @@ class Launcher(Component[NoParameters]):
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
             case AskLog() as wanted:
-                return self._log.log.told(wanted)
+                return self._log.log.answer(wanted)
             case AskPeople():
                 return PeopleKnown(self._log.log.people.consoles)
         return await super().answer(asked)

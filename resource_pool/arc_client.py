@@ -314,7 +314,7 @@ class ArcClient:
 
     async def halt(self) -> Applied:
         """Stop the wheels; see ``drive``."""
-        return await self._do(Halt())
+        return await self._command(Halt())
 
     async def jump(self) -> Applied:
         """Jump; see ``drive``."""
@@ -363,7 +363,7 @@ class ArcClient:
 
     async def idle(self, idle: bool = True) -> None:
         """Say that no time is wanted now, or that it is wanted again."""
-        await self._say(WantIdle(idle))
+        await self._request(WantIdle(idle))
 
     async def rest(self) -> None:
         """Give the RCs back and keep the ARC, which wants no time until it is kept with ``rests``.
@@ -383,11 +383,11 @@ class ArcClient:
 
     async def want_runtime(self, minimum_runtime_s: float, maximum_runtime_s: float = 0.0) -> None:
         """Ask for other run times from the next slice on."""
-        await self._say(WantRuntime(minimum_runtime_s, maximum_runtime_s))
+        await self._request(WantRuntime(minimum_runtime_s, maximum_runtime_s))
 
     async def want_longer(self, until_s: float) -> None:
         """Let the running slice last until this mission time, at most the maximum run time."""
-        await self._say(WantLonger(until_s))
+        await self._request(WantLonger(until_s))
 
     async def release(self, reason: str = "done") -> None:
         """Give the RCs back and end the ARC. Afterwards it is gone, also if it was gone before."""
@@ -485,15 +485,15 @@ class ArcClient:
 
     async def _move(self, command: Drive | Jump) -> Applied:
         try:
-            return await self._do(command)
+            return await self._command(command)
         except EmergencyStopped as stopped:
             self._stops.refused(stopped)
             raise
 
-    async def _do(self, command: Message) -> Applied:
+    async def _command(self, command: Message) -> Applied:
         return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
 
-    async def _say(self, wish: Message) -> None:
+    async def _request(self, wish: Message) -> None:
         await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)
 
 

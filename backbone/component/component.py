@@ -261,8 +261,8 @@ class Component(Generic[P]):
             self._bug = bug
             self.feedback = _complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
-            is_told = isinstance(bug, BackboneError)  # it says in a sentence what a traceback would only surround
-            log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_told else bug)
+            is_refusal = isinstance(bug, BackboneError)  # it says in a sentence what a traceback would only surround
+            log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_refusal else bug)
         self._end.set()
 
     def component_state(self) -> ComponentState:
@@ -296,7 +296,7 @@ class Component(Generic[P]):
         self.bus.on_bug = self.fail
         try:
             if await self._unless_ended(self._claim_name(), "claim"):
-                await self._live_and_say_so()
+                await self._live_and_report_end()
         finally:
             await self.bus.close()
         if self._bug is not None:
@@ -330,7 +330,7 @@ class Component(Generic[P]):
         pid = taken.facts.get("pid", 0)
         return taken.facts.get("host") == self.launch.host and bool(pid) and not Path(f"/proc/{pid}").exists()
 
-    async def _live_and_say_so(self) -> None:
+    async def _live_and_report_end(self) -> None:
         try:
             await self._live()
         except Exception as bug:

@@ -226,7 +226,7 @@ class ProcessKeeper:
         self._kept[name].end_reason = reason
         ended: asyncio.Future[ProcessEnded] = asyncio.get_running_loop().create_future()
         self._ending.setdefault(name, []).append(ended)
-        self._do(instructions)
+        self._carry_out(instructions)
         return await ended
 
     async def close(self) -> list[ProcessEnded]:
@@ -303,7 +303,7 @@ class ProcessKeeper:
         if self._looking is None and launch.run_directory:
             self._looking = self._task(self._look_for_life(launch.run_directory), "look for signs of life")
         self._failures.pop(name, None)
-        self._do(instructions, forked)
+        self._carry_out(instructions, forked)
 
     async def _readiness(self, name: str) -> int:
         ready: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -314,7 +314,7 @@ class ProcessKeeper:
         name = component_of(address)
         kept = self._kept.get(name)
         if stands and kept is not None and kept.launch.address == address:
-            self._do(self._supervision.ready(name))
+            self._carry_out(self._supervision.ready(name))
 
     def _process_token_changed(self, address: str, stands: bool) -> None:
         try:
@@ -323,7 +323,7 @@ class ProcessKeeper:
             log.info("ignored: %s", illegal.detail)
             return
         if stands and any((k.launch.host, k.launch.process) == (host, process) for k in self._kept.values()):
-            self._do_shared(self._shared.serving(process, pid, self._now_s()))
+            self._carry_out_shared(self._shared.serving(process, pid, self._now_s()))
 
     async def _look_for_life(self, run_directory: str) -> None:
         while True:
@@ -340,10 +340,10 @@ class ProcessKeeper:
                 self.on_changed()
 
     def _observed(self, pid: int, silent_s: float, now_s: float, *, beats: bool) -> None:
-        self._do_shared(self._shared.observed(pid, silent_s, now_s))
+        self._carry_out_shared(self._shared.observed(pid, silent_s, now_s))
         for one in [one for one in self._supervision if one.pid == pid]:
             if beats or one.phase is not Phase.READY:  # a ready process that never beat could not make its file
-                self._do(self._supervision.observed(one.name, silent_s, now_s))
+                self._carry_out(self._supervision.observed(one.name, silent_s, now_s))
 
     def _exited(self, pid: int, returncode: int) -> None:
         self._silences.pop(pid, None)
@@ -351,24 +351,24 @@ class ProcessKeeper:
         if self._kept:
             forget_heartbeat(next(iter(self._kept.values())).launch.run_directory, pid)
         if not self._shared.has(pid):
-            self._do(self._supervision.exited(pid, returncode, self._now_s()))
+            self._carry_out(self._supervision.exited(pid, returncode, self._now_s()))
             return
         for talk in self._talks.pop(pid, set()):
             talk.cancel()
-        self._do_shared(self._shared.exited(pid, returncode))
+        self._carry_out_shared(self._shared.exited(pid, returncode))
 
     async def _fork(self, launch: Launch, forked: asyncio.Future[int] | None) -> None:
         name = launch.name
         try:
             pid = await self._zygote.fork(launch)
         except NoProcess as error:
-            self._do(self._supervision.fork_failed(name, str(error), self._now_s()))
+            self._carry_out(self._supervision.fork_failed(name, str(error), self._now_s()))
             if forked is not None and not forked.done():
                 forked.set_exception(self._failures[name])
             return
         if forked is not None and not forked.done():
             forked.set_result(pid)
-        self._do(self._supervision.forked(name, pid, self._now_s()))
+        self._carry_out(self._supervision.forked(name, pid, self._now_s()))
 
     async def _fork_process(self, process: str, member: Launch) -> None:
         launch = msgspec.structs.replace(
@@ -383,9 +383,9 @@ class ProcessKeeper:
         try:
             pid = await self._zygote.fork(launch)
         except NoProcess as error:
-            self._do_shared(self._shared.fork_failed(process, str(error)))
+            self._carry_out_shared(self._shared.fork_failed(process, str(error)))
             return
-        self._do_shared(self._shared.forked(process, pid, self._now_s()))
+        self._carry_out_shared(self._shared.forked(process, pid, self._now_s()))
 
     async def _share_life(self, bus: Bus, at: str, launch: Launch, life: int) -> None:
         """Have the component admitted and wait for its end; cancelled when the process ends."""
@@ -394,13 +394,13 @@ class ProcessKeeper:
                 bus, self._clock, at, Admit(launch, life), Admitted, each_s=ADMIT_EACH_S, within_s=math.inf
             )
         except Refusal as refusal:
-            self._do_shared(self._shared.refused(life, str(refusal), self._now_s()))
+            self._carry_out_shared(self._shared.refused(life, str(refusal), self._now_s()))
             return
-        self._do_shared(self._shared.admitted(life))
+        self._carry_out_shared(self._shared.admitted(life))
         ended = await ask_until_answered(
             bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
         )
-        self._do_shared(self._shared.member_ended(life, ended.exit_code, self._now_s()))
+        self._carry_out_shared(self._shared.member_ended(life, ended.exit_code, self._now_s()))
 
     async def _end_member(self, bus: Bus, at: str, life: int) -> None:
         try:
@@ -416,18 +416,18 @@ class ProcessKeeper:
             await self._bus.ask(kept.launch.address, stop, Stopping, within_s=within_s)
         except BackboneError as error:
             log.info("%s could not be asked to stop: %s", kept.launch.name, error)
-            self._do(self._supervision.ask_failed(kept.launch.name, self._now_s()))
+            self._carry_out(self._supervision.ask_failed(kept.launch.name, self._now_s()))
 
     async def _ring(self, at_s: float) -> None:
         await self._clock.sleep_until_s(at_s * self._clock.rate)
-        self._do(self._supervision.woken(self._now_s()))
+        self._carry_out(self._supervision.woken(self._now_s()))
 
     async def _ring_shared(self, at_s: float) -> None:
         await self._clock.sleep_until_s(at_s * self._clock.rate)
-        self._do_shared(self._shared.woken(self._now_s()))
+        self._carry_out_shared(self._shared.woken(self._now_s()))
 
     # Instructions
-    def _do(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
+    def _carry_out(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
         for instruction in instructions:
             match instruction:
                 case Fork(name=name):
@@ -435,7 +435,7 @@ class ProcessKeeper:
                 case AskToStop(name=name, within_s=within_s):
                     self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
                 case Signal(name=name, number=number) if self._kept[name].launch.process:
-                    self._do_shared(self._shared.signalled(name, number))
+                    self._carry_out_shared(self._shared.signalled(name, number))
                 case Signal(name=name, pid=pid, number=number):
                     log.info("%s to %s, pid %d", number.name, name, pid)
                     self._zygote.kill(pid, number)
@@ -472,11 +472,11 @@ class ProcessKeeper:
         incarnation = f"{launch.host}.{self._pid}.{self._lives}"
         launch = kept.launch = msgspec.structs.replace(launch, incarnation=incarnation)
         if launch.process:
-            self._do_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))
+            self._carry_out_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))
         else:
             self._task(self._fork(launch, forked), f"fork {launch.name}")
 
-    def _do_shared(self, instructions: list[ProcessInstruction]) -> None:
+    def _carry_out_shared(self, instructions: list[ProcessInstruction]) -> None:
         for instruction in instructions:
             match instruction:
                 case ForkProcess(process=process, name=name):
@@ -492,11 +492,11 @@ class ProcessKeeper:
                     log.info("%s to shared process %s, pid %d", number.name, process, pid)
                     self._zygote.kill(pid, number)
                 case MemberRuns(name=name, pid=pid):
-                    self._do(self._supervision.forked(name, pid, self._now_s()))
+                    self._carry_out(self._supervision.forked(name, pid, self._now_s()))
                 case MemberNotStarted(name=name, why=why, returncode=returncode):
-                    self._do(self._supervision.fork_failed(name, why, self._now_s(), returncode))
+                    self._carry_out(self._supervision.fork_failed(name, why, self._now_s(), returncode))
                 case MemberGone(name=name, returncode=returncode, how=how):
-                    self._do(self._supervision.left(name, returncode, how, self._now_s()))
+                    self._carry_out(self._supervision.left(name, returncode, how, self._now_s()))
                 case ProcessesWakeAt(at_s=at_s):
                     if self._shared_alarm is not None and self._shared_alarm is not asyncio.current_task():
                         self._shared_alarm.cancel()

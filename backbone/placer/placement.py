@@ -48,7 +48,7 @@ class HostView:
     cores: int = 1
 
     @property
-    def burden(self) -> float:
+    def load(self) -> float:
         """Components per core this host would have with one more, a busy processor counted as components."""
         busy = 1.0 if self.memory > FULL_MEMORY else round(self.cpu * BUSY_STEPS) / BUSY_STEPS
         return (self.components + 1) / max(1, self.cores) + busy * BUSY_AS_COMPONENTS
@@ -74,7 +74,7 @@ class Choice:
     reasons: tuple[str, ...]
 
 
-def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView], company: str = "") -> Choice:
+def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView], colocation: str = "") -> Choice:
     """Return the host for one more component.
 
     Args:
@@ -82,36 +82,36 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView],
         tags: Every one must be on the host.
         pin: The only host allowed; empty: any.
         hosts: All that are known; their order does not matter.
-        company: Where those are with whom it shares its process; empty: nowhere.
+        colocation: Where those are with whom it shares its process; empty: nowhere.
 
     Raises:
         NoHost: None can take it; the detail has a line for each.
     """
     known = sorted(hosts, key=lambda host: host.name)
-    company = "" if pin else company
-    obstacles = {host.name: obstacle(host, tags, pin, company) for host in known}
+    colocation = "" if pin else colocation
+    obstacles = {host.name: obstacle(host, tags, pin, colocation) for host in known}
     able = [host for host in known if not obstacles[host.name]]
     if not able:
         raise NoHost(_nobody(name, pin, known, obstacles), name=name)
-    chosen = min(able, key=lambda host: (host.burden, host.name))
+    chosen = min(able, key=lambda host: (host.load, host.name))
 
     def reason(host: HostView) -> str:
         if host is chosen:
-            why = "asked for" if pin else "with the rest of its process" if company else "least burdened"
+            why = "asked for" if pin else "with the rest of its process" if colocation else "least burdened"
             return f"{host.name}: chosen, {why}: {host.describe()}"
         if obstacles[host.name]:
             return f"{host.name}: {obstacles[host.name]}"
-        return f"{host.name}: {'more burdened' if host.burden > chosen.burden else 'as burdened'}: {host.describe()}"
+        return f"{host.name}: {'more burdened' if host.load > chosen.load else 'as burdened'}: {host.describe()}"
 
     return Choice(chosen.name, tuple(reason(host) for host in known))
 
 
-def obstacle(host: HostView, tags: Collection[str], pin: str, company: str = "") -> str:
+def obstacle(host: HostView, tags: Collection[str], pin: str, colocation: str = "") -> str:
     """Return why this host cannot take it, empty if it can."""
     if pin and host.name != pin:
         return f"not {pin}, which was asked for"
-    if company and host.name != company:
-        return f"not {company}, where the rest of its process is"
+    if colocation and host.name != colocation:
+        return f"not {colocation}, where the rest of its process is"
     missing = sorted(set(tags) - host.tags)
     if missing:
         return f"lacks {', '.join(missing)}"

@@ -112,7 +112,7 @@ class PlaceAgain:
 
 
 @dataclass(frozen=True, slots=True)
-class EndStray:
+class EndOrphan:
     """End what runs on this host under this name; it is wanted elsewhere or not at all."""
 
     host: str
@@ -134,7 +134,7 @@ class Note:
     what: str
 
 
-Instruction = PlaceAgain | EndStray | Inspect | Note
+Instruction = PlaceAgain | EndOrphan | Inspect | Note
 
 
 @dataclass(slots=True)
@@ -143,7 +143,7 @@ class _Host:
 
     view: HostView
     creator_pid: int
-    told: tuple[int, int] = (-1, -1)
+    reported: tuple[int, int] = (-1, -1)
     """The counts of components, by its creator and by the book, about which it was asked last."""
 
 
@@ -289,7 +289,7 @@ class PlacementBook:
         """
         record = self.record(name)
         record.host = ""  # it must not count against the host it is leaving
-        choice = place(name, record.spawn.tags, record.pin, self.hosts(), company=self._company(record))
+        choice = place(name, record.spawn.tags, record.pin, self.hosts(), colocation=self._colocation(record))
         record.phase, record.host, record.reasons, record.since_s = Phase.STARTING, choice.host, choice.reasons, now_s
         record.pid, record.lost = 0, False
         return choice
@@ -327,18 +327,18 @@ class PlacementBook:
         self, host: str, tags: Collection[str], creator_pid: int, processes: Collection[ProcessState], asked_s: float
     ) -> list[Instruction]:
         """Take a creator's answer to a question of that mission time, and find hosts for those who wait."""
-        told: list[Instruction] = []
+        instructions: list[Instruction] = []
         if self.is_alive(host) and not self.knows_creator(host, creator_pid):
-            told += self.creator_down(host, asked_s)
+            instructions += self.creator_down(host, asked_s)
         old = self._hosts[host].view if host in self._hosts else HostView(host)
         if not self.is_alive(host):
-            told.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
+            instructions.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
         self._hosts[host] = _Host(replace(old, tags=frozenset(tags), alive=True), creator_pid)
         for process in processes:
-            told += self._found(host, process, asked_s)
+            instructions += self._found(host, process, asked_s)
         self._left_behind = {(where, name) for where, name in self._left_behind if where != host}
-        told += self.inspected(host, processes, asked_s)
-        return told + [
+        instructions += self.inspected(host, processes, asked_s)
+        return instructions + [
             PlaceAgain(record.spawn.name)
             for record in self.records()
             if record.phase is Phase.WAITING and not record.unwanted
@@ -354,7 +354,7 @@ class PlacementBook:
             return []
         known = self._hosts[host]
         known.view = replace(known.view, alive=False)
-        told: list[Instruction] = [Note(host, "lost its creator and all it ran")]
+        instructions: list[Instruction] = [Note(host, "lost its creator and all it ran")]
         for record in self.records():
             if record.host != host:
                 continue
@@ -367,11 +367,11 @@ class PlacementBook:
             if record.phase is Phase.RUNNING and record.spawn.policy.restart and not record.unwanted:
                 record.misses(f"was lost with the creator of {host}", now_s)
                 record.lost = True
-                told += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
+                instructions += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
             else:
                 self.forget(name)
-                told.append(Note(name, f"was lost with {host} and is not started again"))
-        return told
+                instructions.append(Note(name, f"was lost with {host} and is not started again"))
+        return instructions
 
     def load_heard(self, load: HostLoad) -> list[Instruction]:
         """Take over a host's load; its creator is asked if it does not run as many as the book says."""
@@ -386,8 +386,8 @@ class PlacementBook:
             return [Inspect(load.host)]
         counts = (load.components, len(here))
         settled = all(record.phase is not Phase.STARTING for record in here)
-        if settled and load.components != len(here) and counts != known.told:
-            known.told = counts
+        if settled and load.components != len(here) and counts != known.reported:
+            known.reported = counts
             return [Inspect(load.host)]
         return []
 
@@ -408,7 +408,7 @@ class PlacementBook:
     def inspected(self, host: str, processes: Collection[ProcessState], asked_s: float) -> list[Instruction]:
         """Settle the records of this host by what its creator answered to a question of that mission time."""
         listed = {process.spawn.name: process for process in processes}
-        told: list[Instruction] = []
+        instructions: list[Instruction] = []
         for record in self.records():
             name = record.spawn.name
             if record.host != host or record.phase is not Phase.RUNNING or record.since_s > asked_s:
@@ -419,14 +419,14 @@ class PlacementBook:
                     record.runs(process.pid)
             elif record.unwanted or not record.spawn.policy.restart:
                 self.forget(name)
-                told.append(Note(name, f"ended on {host}"))
+                instructions.append(Note(name, f"ended on {host}"))
             else:
                 record.misses(f"its creator on {host} does not have it", asked_s)
-                told += [Note(name, f"is missing on {host}"), PlaceAgain(name)]
-        return told
+                instructions += [Note(name, f"is missing on {host}"), PlaceAgain(name)]
+        return instructions
 
     # ------------------------------------------------------------------
-    def _company(self, record: Record) -> str:
+    def _colocation(self, record: Record) -> str:
         """Return the host of those it shares its process with; empty if they are on none, or it shares with nobody."""
         if not record.spawn.process:
             return ""
@@ -442,7 +442,7 @@ class PlacementBook:
         spawn, record = process.spawn, self._records.get(process.spawn.name)
         if record is None:
             if (host, spawn.name) in self._left_behind or spawn.name in self._stopped:
-                return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
+                return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
             self._remember_number(spawn)
             record = Record(spawn, host if spawn.pinned else "", Phase.RUNNING, host, asked_s)
             self._records[spawn.name] = record
@@ -453,7 +453,7 @@ class PlacementBook:
         if record.lost and not record.unwanted:
             _adopt(record, host, process, asked_s)
             return [Note(spawn.name, f"came back with {host}")]
-        return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
+        return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
 
     def _remember_number(self, spawn: Spawn) -> None:
         """Never give the number of a name that is or was there again."""

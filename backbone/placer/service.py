@@ -71,7 +71,7 @@ from backbone.placer.messages import (
     StoppedMeanwhile,
 )
 from backbone.placer.placement_book import (
-    EndStray,
+    EndOrphan,
     Inspect,
     Instruction,
     Note,
@@ -110,14 +110,14 @@ class Placer(Component[NoParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._book = PlacementBook()
-        self._to_do: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
+        self._queue: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
         self._something_happened = asyncio.Event()
         self._meeting: dict[str, int] = {}
         self._newest: dict[str, int] = {}
         self._inspecting: set[str] = set()
         self._ears: dict[str, list[Subscription]] = {}
         self._type_locks: dict[str, asyncio.Lock] = {}
-        self._starts = self._refused = self._again = self._stops = self._strays = 0
+        self._starts = self._refused = self._again = self._stops = self._orphans = 0
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
@@ -131,7 +131,7 @@ class Placer(Component[NoParameters]):
         """Begin what events led to."""
         self.start_task(self._stop_ownerless(), "stop ownerless")
         while True:
-            begin = await self._to_do.get()
+            begin = await self._queue.get()
             begin()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -167,7 +167,7 @@ class Placer(Component[NoParameters]):
             "starts_refused": float(self._refused),
             "placed_again": float(self._again),
             "stops": float(self._stops),
-            "strays_ended": float(self._strays),
+            "orphans_ended": float(self._orphans),
         }
 
     # ------------------------------------------------------------------ start
@@ -414,20 +414,20 @@ class Placer(Component[NoParameters]):
     def _heard_of_somebody(self, heard: Envelope[Any]) -> None:
         match heard.body:
             case Appeared(component=component) if component.type == CREATOR:
-                self._do(partial(self._begin_meeting, component))
+                self._enqueue(partial(self._begin_meeting, component))
             case Appeared(component=component):
                 self._book.component_appeared(component.address, component.host, component.pid)
                 self._tell_news()
             case Disappeared(address=gone) if gone.startswith(_creator("")):
                 host = gone.removeprefix(_creator(""))
-                self._do(lambda: self._lost_sight_of(host))
+                self._enqueue(lambda: self._lost_sight_of(host))
             case Disappeared(address=gone):
-                self._do(lambda: self._carry_out(self._book.component_disappeared(gone)))
+                self._enqueue(lambda: self._carry_out(self._book.component_disappeared(gone)))
 
     def _nameserver_changed(self, _address: str, alive: bool) -> None:
         """What was told while the link or the hub was down is lost: look again."""
         if alive:
-            self._do(partial(self._begin, self._look_again, "look again"))
+            self._enqueue(partial(self._begin, self._look_again, "look again"))
 
     def _load_heard(self, heard: Envelope[HostLoad]) -> None:
         self._carry_out(self._book.load_heard(heard.body))
@@ -440,9 +440,9 @@ class Placer(Component[NoParameters]):
         if record is not None and fell.restart_in_s < 0:
             self._carry_out(self._book.component_disappeared(record.address))
 
-    def _do(self, begin: Callable[[], None]) -> None:
+    def _enqueue(self, begin: Callable[[], None]) -> None:
         """Have ``serve`` begin this; events come before the component serves."""
-        self._to_do.put_nowait(begin)
+        self._queue.put_nowait(begin)
 
     def _begin(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
         self.start_task(work(), name)
@@ -451,14 +451,14 @@ class Placer(Component[NoParameters]):
         for instruction in instructions:
             match instruction:
                 case PlaceAgain(name=name):
-                    self._do(partial(self._begin, partial(self._place_again, name), f"place {name} again"))
-                case EndStray(host=host, name=name):
-                    self._do(partial(self._begin, partial(self._end_stray, host, name), f"end {name} on {host}"))
+                    self._enqueue(partial(self._begin, partial(self._place_again, name), f"place {name} again"))
+                case EndOrphan(host=host, name=name):
+                    self._enqueue(partial(self._begin, partial(self._end_orphan, host, name), f"end {name} on {host}"))
                 case Inspect(host=host) if host in self._inspecting:
                     pass  # whoever is still suspect after that is asked about again with the next load
                 case Inspect(host=host):
                     self._inspecting.add(host)
-                    self._do(partial(self._begin, partial(self._inspect, host), f"inspect {host}"))
+                    self._enqueue(partial(self._begin, partial(self._inspect, host), f"inspect {host}"))
                 case Note(subject=subject, what=what):
                     self.story.note(subject, what)
                 case _:
@@ -540,7 +540,7 @@ class Placer(Component[NoParameters]):
             )
         except LinkError as error:  # it may only be slow: it is asked again for as long as it is there
             self.story.note(host, f"its creator does not tell what it runs: {error}")
-            self._do(partial(self._begin, partial(self._meet_later, creator), f"meet {host} later"))
+            self._enqueue(partial(self._begin, partial(self._meet_later, creator), f"meet {host} later"))
             return
         finally:
             self._meeting[host] -= 1
@@ -627,13 +627,13 @@ class Placer(Component[NoParameters]):
                 self.story.note(name, f"nobody tells whether its old life ended: {error}")
             await self._news_or(min(until_s, self.clock.now_s() + ANSWER_EACH_S / 5 * self.clock.rate))
 
-    async def _end_stray(self, host: str, name: str) -> None:
+    async def _end_orphan(self, host: str, name: str) -> None:
         try:
             by = await self._end_on(host, name, "it is not wanted here any more")
         except Refusal as refusal:
             self.story.note(name, f"could not be ended on {host}: {refusal.detail}")
             return
-        self._strays += 1
+        self._orphans += 1
         self.story.note(name, f"was ended on {host}, by {by}")
 
     # ------------------------------------------------------------------ waiting for what others tell

@@ -60,7 +60,7 @@ def test_a_chosen_host_lives_has_the_tags_and_is_the_one_asked_for(
         assert choice.host in {view.name for view in able}
         assert [line.partition(":")[0] for line in choice.reasons] == sorted(view.name for view in views)
         chosen = next(view for view in able if view.name == choice.host)
-        assert all(chosen.burden <= view.burden for view in able)
+        assert all(chosen.load <= view.load for view in able)
 
 
 @given(hosts(), WANTED_TAGS, PINS, st.randoms(use_true_random=False))

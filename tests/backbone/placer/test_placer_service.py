@@ -202,7 +202,7 @@ class Mission:
     async def absent(self) -> list[Absence]:
         return (await self.bus.ask(ADDRESS, AskState(), ComponentState, within_s=1.0)).absent
 
-    async def told(self, name: str) -> list[str]:
+    async def story(self, name: str) -> list[str]:
         return [event.what for event in (await self.bus.ask(ADDRESS, AskStory(name), Story, within_s=1.0)).events]
 
 
@@ -276,7 +276,7 @@ async def test_a_placement_tells_who_wanted_it_and_why_it_is_there(one: Mission)
     assert (placed.host, placed.type, placed.requester) == ("b", "scout", "backbone/boss")
     assert placed.reasons[0] == "a: not b, which was asked for"
     assert placed.reasons[1].startswith("b: chosen, asked for")
-    assert (await one.told("scout1"))[-1] == "is ready on b, pid 7"
+    assert (await one.story("scout1"))[-1] == "is ready on b, pid 7"
 
 
 @on("a")
