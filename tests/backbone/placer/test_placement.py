@@ -121,7 +121,7 @@ def test_a_refusal_names_every_host_and_why_not() -> None:
 def test_a_host_that_does_not_exist_is_answered_with_the_nearest_one() -> None:
     with pytest.raises(NoHost, match=r"alhpa is no host with a creator \(did you mean 'alpha'\?\)"):
         place("world", [], "alhpa", [HostView("alpha")])
-    with pytest.raises(NoHost, match="no creator has been heard of"):
+    with pytest.raises(NoHost, match="no creator is known"):
         place("world", [], "", [])
 
 

@@ -477,7 +477,7 @@ async def test_what_a_silent_host_may_still_run_is_started_elsewhere_only_when_i
     one.cut_off("b")
     await one.clock.sleep_s(CUT_OFF_ENDS_WITHIN_S - 1.0)
     assert one.creators["a"].spawns == ["w1"]
-    assert (await one.absent())[0].doing == "waits until the host that fell silent has ended it"
+    assert (await one.absent())[0].doing == "waits until the silent host has ended it"
     await one.creators["b"].kill_child("w2")
     await one.clock.sleep_s(2.0)
     assert one.creators["a"].spawns == ["w1", "w2"]
