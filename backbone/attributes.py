@@ -70,7 +70,9 @@ class Shown:
         if self.parameters is not None and attribute in self.parameters:
             return [f"{self.name}: {attribute} is {value_text(self.parameters[attribute])}"]
         lines = [
-            f"{request.arc}: {attribute} is {told}" for request in self.requests for told in _told(request, attribute)
+            f"{request.arc}: {attribute} is {value}"
+            for request in self.requests
+            for value in _values(request, attribute)
         ]
         if not lines:
             raise WrongAttribute(f"{self.name} has no {attribute}", name=self.name)
@@ -172,13 +174,13 @@ def _plain(request: RequestAttributes) -> dict[str, Any]:
 def _request_lines(request: RequestAttributes) -> Iterator[str]:
     yield f"{request.arc}: {request.state}, for {request.owner}"
     for attribute in (PRIORITY, PARENT, *RUN_TIMES):
-        for told in _told(request, attribute):
-            yield f"  {attribute:<19}{told}"
+        for value in _values(request, attribute):
+            yield f"  {attribute:<19}{value}"
     for rc, use in request.uses.items():
         yield f"  {rc:<19}{_use(use)}"
 
 
-def _told(request: RequestAttributes, attribute: str) -> Iterator[str]:
+def _values(request: RequestAttributes, attribute: str) -> Iterator[str]:
     match attribute:
         case "priority":
             yield f"{request.path[-1].priority} ({_path(request.path)})"

@@ -23,13 +23,14 @@ from typing import Any, ClassVar, Protocol
 import msgspec
 
 from backbone import run_files
+from backbone.authentication import SECRET_NAME, secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.companion import Companion
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LogLevel, Stop, Stopping
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.component.process import run_with_heartbeat
 from backbone.core_launches import UpOptions, core_launches, launcher_launch, service_launch
 from backbone.creator.messages import (
@@ -44,7 +45,6 @@ from backbone.creator.messages import (
 )
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
-from backbone.door import SECRET_NAME, secret_of
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.health_watch import HealthWatch
 from backbone.heaps import share_heaps
@@ -56,11 +56,11 @@ from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.operators import OperatorAction, tell_acted
-from backbone.other_hosts import OtherHosts, door_for_others
+from backbone.other_hosts import OtherHosts, endpoint_for_others
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.preconditions import make_door, refuse_if_up
+from backbone.preconditions import prepare_endpoint, refuse_if_up
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -193,7 +193,7 @@ class Launcher(Component[NoParameters]):
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
             case AskLog() as wanted:
-                return self._log.log.told(wanted)
+                return self._log.log.answer(wanted)
             case AskPeople():
                 return PeopleKnown(self._log.log.people.consoles)
         return await super().answer(asked)
@@ -303,11 +303,11 @@ class Launcher(Component[NoParameters]):
                 placed.set_result(None)
             self._awaited.discard(order.name)
             self.tell(order.name, f"is not wanted any more: {stopped}")
-            again = Companion(self.bus, component)
+            monitor = PeerMonitor(self.bus, component)
             try:
-                await again.wait_there()
+                await monitor.wait_there()
             finally:
-                again.close()
+                monitor.close()
 
     async def _keep_placed(
         self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
@@ -409,7 +409,7 @@ async def run_mission(description: MissionDescription, options: UpOptions, obser
         run_files.require_writable(options.trace)
     directory = run_files.prepare(description.name)
     try:
-        endpoint = make_door(description, directory)
+        endpoint = prepare_endpoint(description, directory)
         clock = MissionClock(began_s, options.speed)
         own = launcher_launch(description, endpoint, clock, directory)
         observer.began("nameserver")
@@ -432,7 +432,7 @@ async def _with_hub(
     began_s: float,
 ) -> Outcome:
     keeper = ProcessKeeper(zygote, clock)
-    others = door_for_others(description)
+    others = endpoint_for_others(description)
     hub = service_launch(own, "nameserver", "nameserver", description, {"listen": [others] if others else []})
     await keeper.start_hub(hub, CORE_POLICY)
     config = client_config(own.endpoint, secret_of(own.run_directory))

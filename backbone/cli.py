@@ -83,16 +83,16 @@ def run(work: Callable[[], Awaitable[int]]) -> None:
     raise typer.Exit(int(code))
 
 
-def visiting(
+def connected(
     mission: str | None, endpoint: str | None, secret_file: Path | None
 ) -> AbstractAsyncContextManager[tuple[Any, Any]]:
-    """Return ``async with`` a bus to a mission that is up, and its clock."""
-    from backbone import visit
+    """Return a context manager for a bus to a mission that is up, and its clock."""
+    from backbone import mission_connection
 
     if endpoint is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
     secret = read_secret_option(secret_file) if endpoint is not None else ""
-    return visit.visiting(mission, endpoint, f"ui_console/cli-{os.getpid()}", secret)
+    return mission_connection.connected(mission, endpoint, f"ui_console/cli-{os.getpid()}", secret)
 
 
 def read_secret_option(secret_file: Path | None) -> str:
@@ -103,7 +103,7 @@ def read_secret_option(secret_file: Path | None) -> str:
     """
     from getpass import getpass
 
-    from backbone.door import read_secret, read_secret_file
+    from backbone.authentication import read_secret, read_secret_file
 
     if secret_file is None:
         return ""
@@ -250,7 +250,7 @@ def why(
     async def work() -> int:
         from backbone.reasons import reasons_for
 
-        async with visiting(mission, connect, secret_file) as (bus, clock):
+        async with connected(mission, connect, secret_file) as (bus, clock):
             reasons = await reasons_for(bus, name, clock)
             show([json.dumps(reasons.to_json())] if as_json else reasons.lines(clock.now_s()))
         return ExitCode.DONE
@@ -272,7 +272,7 @@ def story(
         from backbone.log_lines import story_json, story_lines
         from backbone.reasons import story_of
 
-        async with visiting(mission, connect, secret_file) as (bus, clock):
+        async with connected(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
         events = [*map(told.people.named_event, told.events)]
         show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(events))
@@ -318,7 +318,7 @@ def log(
         from backbone.mission_picture import LAUNCHER
         from backbone.moments import Now
 
-        async with visiting(mission, connect, secret_file) as (bus, clock):
+        async with connected(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)
             asked = LogQuestion(text, robot, person, level, since, until).asked(now, most)
             told = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
@@ -356,7 +356,7 @@ def start(
         from backbone.placer.wishes import START_WITHIN_S
         from backbone.start_by_hand import completed
 
-        async with visiting(mission, connect, secret_file) as (bus, clock):
+        async with connected(mission, connect, secret_file) as (bus, clock):
             order, remark = await completed(bus, Start(type_, name, parameters, host))
             started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
             if remark:
@@ -383,7 +383,7 @@ def stop(
         from backbone.operators import OperatorAction, tell_acted
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
-        async with visiting(mission, connect, secret_file) as (bus, clock):
+        async with connected(mission, connect, secret_file) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
             tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             show([f"{name} ended by {ended.by}"])
@@ -418,7 +418,7 @@ def set_(
         from backbone.attributes import attributes_of, change
         from backbone.operators import OperatorAction, login_name, tell_acted
 
-        async with visiting(mission, connect, secret_file) as (bus, clock):
+        async with connected(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
                 lines = await change(bus, name, parameter, _value(value), login_name())
                 tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}")

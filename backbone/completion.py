@@ -9,14 +9,14 @@ import asyncio
 import os
 from pathlib import Path
 
+from backbone.authentication import read_secret_file
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.door import read_secret_file
 from backbone.errors import BackboneError
+from backbone.mission_connection import connected
 from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
 from backbone.people import is_console
 from backbone.run_files import find_all
-from backbone.visit import visiting
 
 WITHIN_S = 1.5  # chosen: a person who pressed Tab waits no longer
 
@@ -53,7 +53,7 @@ def picture_now(mission: str | None, connect: str | None, secret_file: Path | No
         secret = read_secret_file(secret_file) if connect is not None and secret_file is not None else ""
         async with (
             asyncio.timeout(WITHIN_S),
-            visiting(mission, connect, f"ui_console/complete-{os.getpid()}", secret) as (bus, clock),
+            connected(mission, connect, f"ui_console/complete-{os.getpid()}", secret) as (bus, clock),
         ):
             return await look(bus, clock.now_s(), rate=clock.rate)
 

@@ -229,7 +229,7 @@ def _claims(description: MissionDescription) -> Iterator[_Claim]:
         try:
             sets = inventory.find(FindRcs(list(needs[wish.kind]), wish.wish, features))
         except Refusal as refusal:
-            yield _Claim(arc, behavior, path, None, _told(refusal))
+            yield _Claim(arc, behavior, path, None, _refusal_text(refusal))
             continue
         request = scheduling_request(
             arc,
@@ -274,7 +274,7 @@ def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _Claim, hosts: d
     try:
         rcs = manager.choose(claim.request)
     except Refusal as refusal:
-        return _Asked(claim, refused=_told(refusal))
+        return _Asked(claim, refused=_refusal_text(refusal))
     rehearsal.tell(Requested(claim.request, rcs))
     return _Asked(claim, rcs)
 
@@ -300,5 +300,5 @@ def _arc_name(behavior: Behavior, wish: ArcWish) -> str:
     return f"{behavior.name}-{wish.kind}"
 
 
-def _told(refusal: Refusal) -> str:
+def _refusal_text(refusal: Refusal) -> str:
     return f"{refusal.detail} [{code_of(refusal)}]: {refusal.remedy}"

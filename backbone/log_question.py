@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
-from backbone.mission_log import FOR_EVER_S, MOST_TOLD, AskLog
+from backbone.mission_log import FOR_EVER_S, MOST_EVENTS, AskLog
 from backbone.moments import Now, moment
 from backbone.ranges import LONGEST_MENTION
 
@@ -44,7 +44,7 @@ class LogQuestion:
     since: str = ""
     until: str = ""
 
-    def asked(self, now: Now, most: int = MOST_TOLD) -> AskLog:
+    def asked(self, now: Now, most: int = MOST_EVENTS) -> AskLog:
         """Return the question for the launcher.
 
         Args:

@@ -25,7 +25,7 @@ from backbone.ranges import MANY, Count, Instant, Line, Mention
 from backbone.wire import Envelope, Message
 
 EVENTS_KEPT = 20_000  # chosen: hours of a busy mission, some megabytes
-MOST_TOLD = 10_000  # chosen: what one message carries with room to spare
+MOST_EVENTS = 10_000  # chosen: what one message carries with room to spare
 FOR_EVER_S = 1e12  # as the latest instant there is
 _ORDER = list(LogLevel)
 
@@ -49,7 +49,7 @@ class AskLog(Message, frozen=True):
     person: Mention = ""
     level: LogLevel = LogLevel.INFO
     text: Line = ""
-    most: Annotated[int, msgspec.Meta(ge=1, le=MOST_TOLD)] = MOST_TOLD
+    most: Annotated[int, msgspec.Meta(ge=1, le=MOST_EVENTS)] = MOST_EVENTS
 
     def wants(self, event: StoryEvent) -> bool:
         """Say whether the event is one of those asked for.
@@ -119,7 +119,7 @@ class MissionLog:
             self._since_s = self._events[1].at_s
         self._events.append(event)
 
-    def told(self, asked: AskLog) -> Log:
+    def answer(self, asked: AskLog) -> Log:
         """Return what is wanted, by the names of people."""
         found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
         return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)

@@ -9,14 +9,14 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 
+from backbone.authentication import SECRET_NAME, tcp_endpoint
 from backbone.component.messages import Absence
 from backbone.creator.messages import creator_name, offer_name
-from backbone.door import SECRET_NAME, tcp_endpoint
 from backbone.mission.model import Host, MissionDescription
 from backbone.naming import Subsystem, address
 
 
-def door_for_others(description: MissionDescription) -> str:
+def endpoint_for_others(description: MissionDescription) -> str:
     """Return the endpoint at which the mission's other machines reach its hub; empty if it has none."""
     first = description.hosts[0]
     return tcp_endpoint(first.address, first.port) if description.other_hosts else ""
@@ -24,7 +24,7 @@ def door_for_others(description: MissionDescription) -> str:
 
 def command_on(host: Host, description: MissionDescription) -> str:
     """Return what is typed on that machine to offer it to the mission; ``secret`` is a copy of the mission's."""
-    words = ["scout-backbone", "creator", "--host", host.name, "--connect", door_for_others(description)]
+    words = ["scout-backbone", "creator", "--host", host.name, "--connect", endpoint_for_others(description)]
     words += ["--mission", description.name, *(word for tag in host.tags for word in ("--tag", tag))]
     return shlex.join([*words, "--secret-file", SECRET_NAME])
 

@@ -1,4 +1,4 @@
-"""What must hold before a mission is brought up: nothing is started, and nothing of it is left, if it does not."""
+"""Preconditions of a bring-up. If one fails, nothing is started and no file of the mission is left."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import socket
 from pathlib import Path
 
 from backbone import run_files
-from backbone.door import SECRET_NAME, keep_secret, new_secret, socket_endpoint
+from backbone.authentication import SECRET_NAME, keep_secret, new_secret, socket_endpoint
 from backbone.errors import Refusal
 from backbone.mission.model import Host, MissionDescription
 
@@ -19,7 +19,7 @@ class MissionAlreadyUp(Refusal):
 
 
 class PortTaken(Refusal):
-    """The hub cannot listen for other machines where the mission file says."""
+    """The hub cannot listen for other machines at the address and port of the mission file."""
 
     code = "run.port"
     remedy = "State another port or address at the mission's first host, or stop what listens there."
@@ -29,7 +29,7 @@ def refuse_if_up(mission: str) -> None:
     """Return if no mission of this name runs on this machine.
 
     Raises:
-        MissionAlreadyUp: One does.
+        MissionAlreadyUp: A mission of this name runs.
     """
     try:
         running = run_files.find(mission)
@@ -40,14 +40,14 @@ def refuse_if_up(mission: str) -> None:
     )
 
 
-def make_door(description: MissionDescription, directory: Path) -> str:
-    """Return where the hub will listen on this machine; with other machines their secret lies beside it afterwards.
+def prepare_endpoint(description: MissionDescription, directory: Path) -> str:
+    """Return the endpoint of the hub on this machine; if the mission has other machines, their secret lies beside it.
 
-    The secret is a new one, so that nothing of an earlier run can speak to this one.
+    Each run has a new secret, so that components of an earlier run cannot reach this one.
 
     Raises:
         SocketPathTooLong: The folder's path is too long for a socket.
-        PortTaken: The hub could not listen for the other machines.
+        PortTaken: The hub cannot listen for the other machines.
     """
     endpoint = socket_endpoint(directory)
     (directory / SECRET_NAME).unlink(missing_ok=True)
@@ -61,7 +61,7 @@ def _refuse_taken_port(host: Host) -> None:
     """Return if a hub can listen at the host's address and port.
 
     Raises:
-        PortTaken: It cannot.
+        PortTaken: The port is in use, or the address is not this machine's.
     """
     try:
         family, kind, protocol, _, where = socket.getaddrinfo(host.address, host.port, type=socket.SOCK_STREAM)[0]

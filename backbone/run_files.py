@@ -16,7 +16,7 @@ import msgspec
 import psutil
 
 from backbone.atomic_file import replace_file
-from backbone.door import secret_of
+from backbone.authentication import secret_of
 from backbone.errors import Refusal
 from backbone.naming import is_legal, legal
 

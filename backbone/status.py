@@ -18,9 +18,9 @@ from backbone.component.messages import Absence
 from backbone.endings import ExitCode
 from backbone.errors import HubUnreachable, LinkError
 from backbone.health import HealthWord
+from backbone.mission_connection import connected
 from backbone.mission_picture import MissionPicture, look
 from backbone.mission_screen import live_screen, screen
-from backbone.visit import visiting
 
 EVERY_S = 1.0  # chosen: programs that watch want one line a second
 REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds
@@ -55,7 +55,7 @@ async def show_status(
     """
     found = run_files.find(mission) if endpoint is None else None
     try:
-        async with visiting(mission, endpoint, source, secret) as (bus, clock):
+        async with connected(mission, endpoint, source, secret) as (bus, clock):
             return await _show(bus, clock, found, shown)
     except LinkError as error:
         if found is None:

@@ -98,7 +98,7 @@ class Arrivals:
         else:
             self.flood_s.append(now_s)
 
-    def told(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Any]:
         """Return what was measured, for the report."""
         lasted_s = self.flood_s[-1] - self.flood_s[0]
         return {
@@ -134,8 +134,8 @@ async def measure(endpoint: str, frames: int) -> None:
         frames=frames,
         bytes=WIDTH_PX * HEIGHT_PX,
         rate_hz=RATE_HZ,
-        bus=on_bus.told(),
-        bare=on_bare.told(),
+        bus=on_bus.figures(),
+        bare=on_bare.figures(),
         ratio=round(percentile(on_bus.latencies_s, 0.5) / percentile(on_bare.latencies_s, 0.5), 3),
         publish_cpu_us={"bus": round(cpu_s[0] * 1e6), "bare": round(cpu_s[1] * 1e6)},
     )

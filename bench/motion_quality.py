@@ -51,7 +51,7 @@ class Count:
     still_slices: int = 0
     alarmed_slices: int = 0
 
-    def told(self) -> dict[str, float]:
+    def figures(self) -> dict[str, float]:
         """Return the measures, rounded."""
         hours = self.still_frames / FRAMES_PER_S / 3600
         return {
@@ -146,7 +146,7 @@ def main() -> None:
     print("noise  detector            precision  recall  false alarms/h  slices with one")
     for noise in NOISES:
         told = {
-            name: count.told() for name, count in measure(noise, chosen.crossings, chosen.still, chosen.seed).items()
+            name: count.figures() for name, count in measure(noise, chosen.crossings, chosen.still, chosen.seed).items()
         }
         measured[str(noise)] = told
         for name, row in told.items():

@@ -20,10 +20,10 @@ import uvloop
 import zenoh
 from measuring import free_endpoint, helper, percentile, report, summary, wait_for_end_of_input
 
+from backbone.authentication import socket_endpoint
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.component.messages import SetParameter, Stop
-from backbone.door import socket_endpoint
 from backbone.wire import WIRE_VERSION, Envelope, Message, write
 
 MISSION = "bench"
@@ -140,7 +140,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("role", nargs="?", default="all", choices=["all", "hub", "server"])
     parser.add_argument("endpoint", nargs="?", default="")
-    parser.add_argument("--tcp", action="store_true", help="by the door for other machines, not by the unix socket")
+    parser.add_argument("--tcp", action="store_true", help="by the port for other machines, not by the unix socket")
     parser.add_argument("--calls", type=int, default=2000, help="asked each way")
     chosen = parser.parse_args()
     if chosen.role == "hub":

@@ -102,7 +102,7 @@ def _received(receiver: Receiver, world: World, camera: Camera) -> NDArray[np.ui
     return receiver.receive([Signal(camera.picture("scout"), "scout", motors=motors)], world.frame).picture
 
 
-def told(trial: Trial) -> str:
+def table_line(trial: Trial) -> str:
     """Return the trial's line of the table."""
     off_axis_deg, heading_deg = math.degrees(trial.off_axis_rad), math.degrees(trial.heading_rad)
     return (
@@ -126,7 +126,7 @@ def main() -> None:
         trial = run(chosen.seed + number, air)
         trials.append(trial)
         if chosen.table:
-            print(told(trial), flush=True)
+            print(table_line(trial), flush=True)
     took_s = [trial.took_s for trial in trials]
     simulated_s = sum(took_s)
     report(

@@ -21,10 +21,10 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
-from backbone.component.companion import Companion
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LifeState, LogLevel
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import ProcessFell, creator_name
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
@@ -122,7 +122,7 @@ class Behavior(Component[B], Generic[B]):
         self._abandoned: dict[str, Absence] = {}
         self._heard_creators: dict[str, Subscription] = {}
         self._suspended_because = ""
-        self._parent: Companion | None = None
+        self._parent: PeerMonitor | None = None
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
 
@@ -257,7 +257,7 @@ class Behavior(Component[B], Generic[B]):
         """Watch the parent, if it is a behavior: the first step of a path is the mission itself."""
         if len(self.path) > 2:
             parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
-            self._parent = Companion(self.bus, parent)
+            self._parent = PeerMonitor(self.bus, parent)
 
     async def serve(self) -> None:
         """Start, claim, bring up the children; then everything goes by events."""

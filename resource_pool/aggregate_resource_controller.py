@@ -22,10 +22,10 @@ import msgspec
 
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
-from backbone.component.companion import Companion
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
@@ -141,7 +141,7 @@ class _Notice:
 
     notice: Resumed | Suspending | Suspended
     within_s: float
-    told: asyncio.Event
+    done: asyncio.Event
 
 
 class AggregateResourceController(Component[ArcParameters]):
@@ -171,7 +171,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._offering: asyncio.Task[None] | None = None
         self._unfounded: dict[str, int] = {}
         self._unfounded_since_s = 0.0
-        self._manager: Companion | None = None
+        self._manager: PeerMonitor | None = None
         self._commands = self._refused = 0
 
     # ------------------------------------------------------------------ hooks
@@ -224,7 +224,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def serve(self) -> None:
         """Ask for run time, then watch owner and RC manager until told to stop."""
-        self.start_task(self._tell_owner(), "tell owner")
+        self.start_task(self._send_notices(), "tell owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
         self.start_task(self._watch_lease(), "watch lease")
@@ -453,9 +453,9 @@ class AggregateResourceController(Component[ArcParameters]):
             return
         self._slice_end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
         self.report(f"granted: {', '.join(self._rcs.values())}")
-        told = self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
+        noted = self._notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
         if self.parameters.may_say_not_now:
-            self._offering = self.start_task(self._offer_more(told), "offer more")
+            self._offering = self.start_task(self._offer_more(noted), "offer more")
 
     async def _close(self, order: CloseGate) -> GateClosed:
         if order.deadline_s > 0 and self._gate.is_open:
@@ -547,18 +547,18 @@ class AggregateResourceController(Component[ArcParameters]):
 
     def _notify(self, notice: Resumed | Suspending | Suspended, within_s: float = NOTICE_S) -> asyncio.Event:
         """Have the owner told after everything it was told before; the event is set when it took note, or did not."""
-        told = asyncio.Event()
-        self._notices.put_nowait(_Notice(notice, within_s, told))
-        return told
+        noted = asyncio.Event()
+        self._notices.put_nowait(_Notice(notice, within_s, noted))
+        return noted
 
-    async def _tell_owner(self) -> None:
+    async def _send_notices(self) -> None:
         """Tell one notice after the other, so that none overtakes another on its way to a slow owner."""
         while True:
             waiting = await self._notices.get()
-            await self._tell_until_noted(waiting)
-            waiting.told.set()
+            await self._send_until_noted(waiting)
+            waiting.done.set()
 
-    async def _tell_until_noted(self, waiting: _Notice) -> None:
+    async def _send_until_noted(self, waiting: _Notice) -> None:
         """Tell it until the owner took note or there is something newer to tell: a notice may get lost.
 
         The owner may also hang or be gone, which others find out.
@@ -625,7 +625,7 @@ class AggregateResourceController(Component[ArcParameters]):
         await self._send_request()
 
     async def _watch_owner(self) -> None:
-        owner = Companion(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
+        owner = PeerMonitor(self.bus, self._owner, gone_after_s=OWNER_GONE_S)
         try:
             await owner.wait_gone()
         finally:
@@ -647,7 +647,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def _watch_rc_manager(self) -> None:
         """Ask anew if a restarted RC manager has not asked for the request by itself."""
-        manager = self._manager = Companion(self.bus, RC_MANAGER)
+        manager = self._manager = PeerMonitor(self.bus, RC_MANAGER)
         try:
             await manager.wait_there()
             while True:

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.companion import Companion
 from backbone.component.messages import Stop, Stopping
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
 from backbone.nameserver.messages import NameTaken
@@ -163,7 +163,7 @@ class ArcClient:
         stops_at_once: bool = False,
         not_now: Callable[[], float] | None = None,
     ) -> ArcClient:
-        """Have an ARC of this kind started for the speaker of ``bus`` and its RCs asked for.
+        """Have an ARC of this kind started for the component of ``bus`` and its RCs asked for.
 
         The caller answers ``ArcNotice`` questions by handing them to ``handle``; notices may arrive
         before this returns, so route them by ``notice.arc == arc_name(bus, kind)``.
@@ -246,15 +246,15 @@ class ArcClient:
             is_there = False
             self.wish.placed()
             on_changed()
-            companion = Companion(self._bus, self.address)
+            monitor = PeerMonitor(self._bus, self.address)
             watching = [
-                asyncio.create_task(self._agree_after_absence(companion), name=f"{self.arc}:agree"),
-                asyncio.create_task(self._note_absence(companion, clock, on_changed), name=f"{self.arc}:absence"),
+                asyncio.create_task(self._agree_after_absence(monitor), name=f"{self.arc}:agree"),
+                asyncio.create_task(self._note_absence(monitor, clock, on_changed), name=f"{self.arc}:absence"),
             ]
             try:
-                await companion.wait_gone()
+                await monitor.wait_gone()
             finally:
-                companion.close()
+                monitor.close()
                 for task in watching:
                     task.cancel()
                 await asyncio.gather(*watching, return_exceptions=True)
@@ -314,7 +314,7 @@ class ArcClient:
 
     async def halt(self) -> Applied:
         """Stop the wheels; see ``drive``."""
-        return await self._do(Halt())
+        return await self._command(Halt())
 
     async def jump(self) -> Applied:
         """Jump; see ``drive``."""
@@ -363,7 +363,7 @@ class ArcClient:
 
     async def idle(self, idle: bool = True) -> None:
         """Say that no time is wanted now, or that it is wanted again."""
-        await self._say(WantIdle(idle))
+        await self._request(WantIdle(idle))
 
     async def rest(self) -> None:
         """Give the RCs back and keep the ARC, which wants no time until it is kept with ``rests``.
@@ -383,11 +383,11 @@ class ArcClient:
 
     async def want_runtime(self, minimum_runtime_s: float, maximum_runtime_s: float = 0.0) -> None:
         """Ask for other run times from the next slice on."""
-        await self._say(WantRuntime(minimum_runtime_s, maximum_runtime_s))
+        await self._request(WantRuntime(minimum_runtime_s, maximum_runtime_s))
 
     async def want_longer(self, until_s: float) -> None:
         """Let the running slice last until this mission time, at most the maximum run time."""
-        await self._say(WantLonger(until_s))
+        await self._request(WantLonger(until_s))
 
     async def release(self, reason: str = "done") -> None:
         """Give the RCs back and end the ARC. Afterwards it is gone, also if it was gone before."""
@@ -441,22 +441,22 @@ class ArcClient:
         except LinkError as error:
             log.info("%s: ended without an answer: %s", self.arc, error)
 
-    async def _note_absence(self, companion: Companion, clock: Clock, on_changed: Callable[[], None]) -> None:
-        """Miss the ARC from the moment at which it is out of sight, also while that may be this process's own link."""
-        await companion.wait_risen(1)
+    async def _note_absence(self, monitor: PeerMonitor, clock: Clock, on_changed: Callable[[], None]) -> None:
+        """Report the ARC as absent while its token does not stand, also while only the own link may be down."""
+        await monitor.wait_risen(1)
         while True:
-            await companion.wait_hidden()
+            await monitor.wait_hidden()
             self.wish.missing("it cannot be reached", clock.now_s())
             on_changed()
-            await companion.wait_there()
+            await monitor.wait_there()
             self.wish.placed()
             on_changed()
 
-    async def _agree_after_absence(self, companion: Companion) -> None:
-        """Ask what the ARC holds whenever it is back in sight: notices may have been missed meanwhile."""
-        await companion.wait_there()
+    async def _agree_after_absence(self, monitor: PeerMonitor) -> None:
+        """Ask the ARC for its state whenever its token rises again, because notices may have been lost meanwhile."""
+        await monitor.wait_there()
         while True:
-            await companion.wait_risen(companion.times_risen + 1)
+            await monitor.wait_risen(monitor.times_risen + 1)
             try:
                 state = await self.state()
             except LinkError as error:
@@ -485,15 +485,15 @@ class ArcClient:
 
     async def _move(self, command: Drive | Jump) -> Applied:
         try:
-            return await self._do(command)
+            return await self._command(command)
         except EmergencyStopped as stopped:
             self._stops.refused(stopped)
             raise
 
-    async def _do(self, command: Message) -> Applied:
+    async def _command(self, command: Message) -> Applied:
         return await self._bus.ask(self.address, command, Applied, within_s=REPLY_TIME_S)
 
-    async def _say(self, wish: Message) -> None:
+    async def _request(self, wish: Message) -> None:
         await self._bus.ask(self.address, wish, Accepted, within_s=REPLY_TIME_S)
 
 
@@ -545,7 +545,7 @@ async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopS
     Needs no grant, neither ARC nor RC manager; a second stop keeps the first one's author. For operators only.
 
     Raises:
-        NotFromYou: The speaker of ``bus`` is no operator.
+        NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer: whether it stopped is unknown.
     """
     return await _ask_robot(bus, robot, EmergencyStop(reason, user))
@@ -561,7 +561,7 @@ async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
 
     Raises:
         OtherStop: Somebody stopped it anew since.
-        NotFromYou: The speaker of ``bus`` is no operator.
+        NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer.
     """
     return await _ask_robot(bus, stop.rc, LiftStop(stop.number, user))

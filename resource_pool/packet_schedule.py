@@ -191,7 +191,7 @@ class PacketSchedule:
 
     def __init__(self) -> None:
         self._senders: dict[str, _Sender] = {}
-        self._told: set[tuple[str, int, str]] = set()
+        self._reported: set[tuple[str, int, str]] = set()
 
     def connect(self, arc: str, streams: list[Usage], rank: int) -> None:
         """Give the ARC its streams; their first releases come with their first packets.
@@ -319,8 +319,8 @@ class PacketSchedule:
             news.append(("slow", f"{what} take {declared}: nobody's deadline on this radio is certain"))
         if stream.overruns:
             news.append(("late", f"{what} are not always done within {stream.deadline_s:g} s of their release"))
-        found = [(fault, line) for fault, line in news if (arc, number, fault) not in self._told]
-        self._told |= {(arc, number, fault) for fault, _ in found}
+        found = [(fault, line) for fault, line in news if (arc, number, fault) not in self._reported]
+        self._reported |= {(arc, number, fault) for fault, _ in found}
         return [line for _, line in found]
 
     def counts(self) -> dict[str, Count]:

@@ -232,7 +232,7 @@ class ResourceController(Component[R], Generic[R]):
             case AskRc():
                 return self.rc_state()
             case _:
-                self._check_speaker(asked)
+                self._check_sender(asked)
                 return await self.command(asked)
 
     def parameters_changed(self) -> None:
@@ -274,7 +274,7 @@ class ResourceController(Component[R], Generic[R]):
             "safety_faults": self._faults,
         }
 
-    def _check_speaker(self, asked: Envelope[Any]) -> None:
+    def _check_sender(self, asked: Envelope[Any]) -> None:
         """Refuse a command that is of a present hold but not from who has it; one of no present hold is stale anyway.
 
         Raises:

@@ -19,8 +19,8 @@ from backbone.bus.interface import Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.cli import read_secret_option
 from backbone.component.launch import Launch
+from backbone.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
-from backbone.visit import clock_elsewhere
 from ui_console.observer import Observer
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's

@@ -15,8 +15,8 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
+from backbone.bus.bus_base import BusBase, settle
 from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
-from backbone.bus.speaker import Speaker, settle
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
 from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
@@ -61,12 +61,12 @@ class LocalNetwork:
         watching.tell(address, alive)
 
 
-class Neighbor(Speaker):
-    """A speaker whose neighbors in this process are handed what it says, and hand it what they say.
+class Neighbor(BusBase):
+    """A bus that exchanges messages with its neighbors in this process directly.
 
     Attributes:
-        network: Where its neighbors are.
-        declared: What it declared there.
+        network: The network of its neighbors.
+        declared: Its declarations in that network.
     """
 
     network: LocalNetwork
@@ -149,7 +149,7 @@ class Neighbor(Speaker):
 
 
 class Declared:
-    """Something one speaker declared; closing it takes it out of the network."""
+    """A declaration of one bus; ``close`` removes it from the network."""
 
     def __init__(self, owner: Neighbor, take_back: Callable[[], None]) -> None:
         self.owner, self._take_back, self.closed = owner, take_back, False

@@ -21,6 +21,8 @@ from typing import Any, cast
 
 import zenoh
 
+from backbone.authentication import USER
+from backbone.bus.bus_base import BusBase, settle
 from backbone.bus.interface import (
     Accepted,
     Answer,
@@ -31,8 +33,6 @@ from backbone.bus.interface import (
     Reply,
     Subscription,
 )
-from backbone.bus.speaker import Speaker, settle
-from backbone.door import USER
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (
@@ -161,7 +161,7 @@ async def close_session(session: zenoh.Session) -> None:
     await asyncio.get_running_loop().run_in_executor(None, session.close)
 
 
-class ZenohBus(Speaker):
+class ZenohBus(BusBase):
     """One component's voice and ears on a Zenoh session. Open it inside a running event loop.
 
     Args:

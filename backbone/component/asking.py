@@ -1,7 +1,7 @@
-"""Asking through a restart of the hub or of the one asked.
+"""Repeated questions: a question outlasts a restart of the hub or of its receiver.
 
-Rule: only questions that may be asked twice. What an unanswered question did is unknown, and asking
-it again must not do it again.
+Rule: only idempotent questions. The outcome of an unanswered question is unknown, so asking it again must not change
+anything more.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ async def ask_until_answered(
     """Ask, and after every ``LinkError`` ask again after a growing pause.
 
     Args:
-        question: May be asked twice.
-        each_s: Seconds of the machine one question waits for its answer.
-        within_s: Seconds of the machine after which no further question is asked.
+        question: An idempotent question.
+        each_s: Seconds of the machine that one question waits for its answer.
+        within_s: Seconds of the machine after which the question is not repeated.
 
     Raises:
-        Refusal: It understood and said no.
-        LinkError: The last one, when the time is up.
+        Refusal: The receiver refused.
+        LinkError: No answer arrived in time.
     """
     end_s, pause_s = clock.now_s() + within_s * clock.rate, PAUSE_FIRST_S
     while True:

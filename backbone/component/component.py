@@ -1,8 +1,8 @@
 """The life of every component: register, connect, ready, serve, drain, stop.
 
-A component is a class with a few hooks. The shell in this file owns the order in which they run,
-answers the questions everybody can be asked, and makes readiness visible: the liveliness token is
-declared last, so whoever sees it can ask at once.
+A component is a class with a few hooks. The shell in this file calls the hooks in their order, answers the common
+questions of every component, and declares the liveliness token last, so that the component answers as soon as its
+token stands.
 
 Rule: a bug ends the component. Its process exits with an error, its creator reports and restarts it.
 """
@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
+from backbone.authentication import secret_of
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.asking import ask_until_answered
@@ -44,7 +45,6 @@ from backbone.component.messages import (
     Story,
 )
 from backbone.component.story import StoryBook
-from backbone.door import secret_of
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
@@ -56,17 +56,17 @@ from backbone.wire import Envelope, Message, UnknownMessage
 log = logging.getLogger(__name__)
 
 MAX_FEEDBACK_LENGTH = 500  # chosen: a line for people, not a trace
-REGISTER_WITHIN_S = 10.0  # chosen: a hub that is being restarted on a busy machine is back long before
-CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for its spectators; people see no difference
+REGISTER_WITHIN_S = 10.0  # chosen: a restarted hub is back long before, even on a busy machine
+CALM_S = 0.02  # chosen: longer than a context switch, which must not wait for published news; people see no difference
 REGISTER_AGAIN_S = 0.1  # chosen: the nameserver forgets a name without a claim after a second
 REGISTER_EACH_S = 2.0  # chosen: the nameserver answers in milliseconds; after this the question was lost
 
 
 class OtherIncarnation(Refusal):
-    """The order was meant for another life of this address: another host or another process."""
+    """The order is for another incarnation of this address: another host or another process."""
 
     code = "component.incarnation"
-    remedy = "Nothing to do: the life that was meant is not this one."
+    remedy = "Nothing to do: the order is for another incarnation."
 
 
 class NoParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,9 +87,9 @@ class Component(Generic[P]):
     """Base of every component; derive, set the class variables, override the hooks you need.
 
     Args:
-        launch: Who this component is, and with which parameters it begins.
-        bus: Already open.
-        clock: The mission's time.
+        launch: Name, type, host and initial parameters of this component.
+        bus: An open bus.
+        clock: The mission's clock.
 
     Raises:
         WrongParameter: The launch's parameters do not fit ``parameters_type``.
@@ -97,36 +97,36 @@ class Component(Generic[P]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = NoParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset()
-    """Parameters that no <parameter> of a mission file gives: its other elements and attributes do."""
+    """Parameters that a mission file sets by other elements and attributes, not by <parameter>."""
     accepts: ClassVar[types.UnionType | type[Any] | None] = None
-    """Questions it answers besides the common ones: a message class or a union of them."""
+    """Its own questions, besides the common ones: a message class or a union of them."""
     registers: ClassVar[bool] = True
-    """False only for the nameserver, which keeps the register itself."""
+    """False only for the nameserver, which keeps the registry itself."""
 
     @classmethod
     def driver_options(cls) -> dict[str, type[msgspec.Struct]] | None:
-        """Return for each built-in driver the parameters it takes besides; None: the class uses no driver."""
+        """Return the additional parameters of each built-in driver; None: the class uses no driver."""
         return None
 
     @classmethod
     def before_bus(cls, launch: Launch) -> None:
         """Prepare the process.
 
-        When: first thing in a new process, before the event loop and before any bus is open.
-        What: the only moment at which this process may still fork (a zygote).
+        When: at the begin of a new process, before the event loop and before any bus is open.
+        What: fork a zygote, which is impossible later.
         Not: anything that needs other components.
         """
 
     @classmethod
     def open_bus(cls, launch: Launch, clock: Clock) -> Bus:
-        """Return the bus the component will speak on: a client of the hub, unless the class is the hub."""
+        """Open the component's bus: a client of the hub, unless the class is the hub."""
         config = client_config(launch.endpoint, secret_of(launch.run_directory))
         return ZenohBus.open(launch.mission, launch.address, clock, config)
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         self.launch, self.bus, self.clock = launch, bus, clock
         self.pid = os.getpid()
-        """Its process. A simulation, where many components share one, sets another."""
+        """Pid of its process. A simulation, where many components share one process, sets other numbers."""
         self.parameters: P = cast(P, _convert(launch.parameters, self.parameters_type))
         self.story = StoryBook(launch.address, clock)
         self.feedback = ""
@@ -134,44 +134,44 @@ class Component(Generic[P]):
         self._end = asyncio.Event()
         self._bug: BaseException | None = None
         self._group: asyncio.TaskGroup | None = None
-        self._tasks: dict[asyncio.Task[None], None] = {}  # in the order in which they began
+        self._tasks: dict[asyncio.Task[None], None] = {}  # in the order of their starts
         self._token: Subscription | None = None
         self._news = asyncio.Event()
 
     # ------------------------------------------------------------------ hooks
     async def connect(self) -> None:
-        """Get hold of what the component needs.
+        """Connect to everything that the component needs.
 
-        When: once, before anybody can ask it; cancelled if it is told to end meanwhile. What: subscribe,
-        ask others, open devices. Not: wait for something that waits for this component's readiness.
+        When: once, before the component answers questions; cancelled if the component must end meanwhile. What:
+        subscribe, ask other components, open devices. Not: wait for a component that waits for this one's readiness.
         """
 
     async def serve(self) -> None:
         """Do the component's own work.
 
-        When: from readiness on. What: loop until cancelled, or return when the work is done; the
-        component lives on and answers questions until it is told to stop or calls ``end``.
+        When: from readiness on. What: loop until cancelled, or return when the work is done; the component continues to
+        answer questions until it is stopped or calls ``end``.
         """
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Return the reply to one of the questions in ``accepts``; raise a ``Refusal`` to say no.
+        """Return the reply to one of the questions in ``accepts``, or raise a ``Refusal``.
 
-        When: any time between readiness and stop, while it drains too, several at once. Not: wait for the asker.
+        When: at any time between readiness and stop, also while draining, several at once. Not: wait for the requester.
         """
         raise UnknownMessage(f"{type(asked.body).__name__} is not answered here")
 
     async def drain(self) -> None:
         """Go to the safe state.
 
-        When: once if ``connect`` succeeded, after a bug too: when ``serve`` and all tasks have ended, while
-        the bus is open and the liveliness token still stands. What: finish or undo what was begun, leave
-        hardware safe. Not: begin anything new.
+        When: once if ``connect`` succeeded, also after a bug, when ``serve`` and all tasks have ended and the bus and
+        the liveliness token still exist. What: finish or undo work in progress, leave hardware safe. Not: begin new
+        work.
         """
 
     def parameters_changed(self) -> None:
-        """Take over ``self.parameters``, which were just replaced by checked new ones.
+        """Apply ``self.parameters``, which hold new, checked values.
 
-        When: after each change, not at the start. A ``Refusal`` raised here brings the old ones back.
+        When: after each change, not at the start. A ``Refusal`` raised here restores the old parameters.
         """
 
     def statistics(self) -> dict[str, float]:
@@ -179,24 +179,24 @@ class Component(Generic[P]):
         return {}
 
     def absences(self) -> list[Absence]:
-        """Return the components this one wants and that are absent.
+        """Return the absent components that this one wants.
 
-        When: while it is ready, for each published state. Call ``changed`` when the answer changes.
+        When: while it is ready, for each published state. Call ``changed`` when the result changes.
         """
         return []
 
     def standing_stop(self) -> StandingStop | None:
-        """Return the emergency stop in force on this component; call ``changed`` when the answer changes."""
+        """Return the emergency stop in force on this component; call ``changed`` when the result changes."""
         return None
 
     def person(self) -> str:
-        """Return the name of the person who sits at this component; empty: nobody does."""
+        """Return the name of the person at this component; empty: no person."""
         return ""
 
     def publish_news(self) -> None:
-        """Publish what spectators should know now.
+        """Publish the component's news.
 
-        When: ``CALM_S`` after ``report`` or ``changed`` said that there is news, once for all of it.
+        When: ``CALM_S`` after ``report`` or ``changed``, once for all news in between.
         """
         self._publish_state()
 
@@ -213,16 +213,16 @@ class Component(Generic[P]):
 
     @property
     def state(self) -> LifeState:
-        """Where the component is in its life."""
+        """Present state of the component's life cycle."""
         return self._state
 
     def start_task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
-        """Run the coroutine beside ``serve``; its bug is the component's bug, its life ends with it.
+        """Run the coroutine beside ``serve``, until the component ends; its bug is the component's bug.
 
-        When the component is about to end nothing new begins: the task returned is then being cancelled.
+        If the component is ending, the returned task is cancelled at once.
 
         Raises:
-            RuntimeError: The component does not live yet.
+            RuntimeError: The component is not connecting yet.
         """
         if self._group is None and not self._end.is_set():
             work.close()
@@ -236,21 +236,21 @@ class Component(Generic[P]):
         return task
 
     def report(self, feedback: str) -> None:
-        """Say in one line what the component is doing; published soon if it is news."""
+        """Set the feedback, one line for people; it is published soon if it has changed."""
         if feedback != self.feedback:
             self.feedback = feedback
             self.changed()
 
     def changed(self) -> None:
-        """Have ``publish_news`` called soon."""
+        """Call ``publish_news`` soon."""
         self._news.set()
 
     def tell(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
-        """Keep that this happened to the subject, and let people who watch the mission see it."""
+        """Add an event about the subject to the story, and publish it to the mission's log."""
         self.bus.publish(self.address, Conversation.LOG, self.story.note(subject, what, level))
 
     def end(self, reason: str) -> None:
-        """Leave in good order; ``run`` returns when that is done."""
+        """End in good order; then ``run`` returns."""
         if not self._end.is_set():
             self.story.note(self.name, f"ends: {reason}")
             self._end.set()
@@ -261,12 +261,12 @@ class Component(Generic[P]):
             self._bug = bug
             self.feedback = _complaint(bug)
             self.story.note(self.name, f"failed: {self.feedback}")
-            is_told = isinstance(bug, BackboneError)  # it says in a sentence what a traceback would only surround
-            log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_told else bug)
+            is_refusal = isinstance(bug, BackboneError)  # its detail says more than a traceback
+            log.error("%s failed: %s", self.address, self.feedback, exc_info=None if is_refusal else bug)
         self._end.set()
 
     def component_state(self) -> ComponentState:
-        """Return who and how this component is."""
+        """Return address, process and state of this component."""
         launch = self.launch
         return ComponentState(
             launch.address,
@@ -284,26 +284,26 @@ class Component(Generic[P]):
 
     # ------------------------------------------------------------------ the shell
     async def run(self) -> None:
-        """Live the whole life; return after a good end.
+        """Run the component's whole life cycle; return after an end in good order.
 
-        Cancelled, it dies as if its process were killed: it drains nothing and says nothing any more.
+        If cancelled, the component ends as if its process were killed: it neither drains nor publishes.
 
         Raises:
-            NameTaken: A living component has the name; nobody heard of this one.
+            NameTaken: A living component has the name; this component published nothing.
             LinkError: No nameserver answered within ``REGISTER_WITHIN_S``.
-            BaseException: The bug that ended it.
+            BaseException: The bug that ended the component.
         """
         self.bus.on_bug = self.fail
         try:
             if await self._unless_ended(self._claim_name(), "claim"):
-                await self._live_and_say_so()
+                await self._live_and_report_end()
         finally:
             await self.bus.close()
         if self._bug is not None:
             raise self._bug
 
     async def _claim_name(self) -> None:
-        """Make the name this process's own; its claim stands from here on, so a death before readiness is seen too."""
+        """Register the name and declare its claim, so that the nameserver also sees a death before readiness."""
         if not self.registers:
             return
         state, until_s = self.component_state(), self.clock.now_s() + REGISTER_WITHIN_S * self.clock.rate
@@ -326,17 +326,17 @@ class Component(Generic[P]):
         self.bus.declare_alive(claim_address(state.address, state.host, state.pid))
 
     def _is_of_the_dead(self, taken: NameTaken) -> bool:
-        """Say whether the name is that of a process of this host that was killed before its claim stood."""
+        """Return whether the name belongs to a process of this host that was killed before it declared its claim."""
         pid = taken.facts.get("pid", 0)
         return taken.facts.get("host") == self.launch.host and bool(pid) and not Path(f"/proc/{pid}").exists()
 
-    async def _live_and_say_so(self) -> None:
+    async def _live_and_report_end(self) -> None:
         try:
             await self._live()
         except Exception as bug:
             self.fail(bug)
         if self._bug is not None:
-            self.feedback = _complaint(self._bug)  # whatever draining reported
+            self.feedback = _complaint(self._bug)  # draining may have reported something else
         self._enter(LifeState.FAILED if self._bug is not None else LifeState.STOPPED)
         if self._token is not None:
             self._token.close()
@@ -351,7 +351,7 @@ class Component(Generic[P]):
                     if connected:
                         await self._serve_until_end()
                 finally:
-                    self._end.set()  # also when it is killed: what is still heard begins nothing any more
+                    self._end.set()  # also when it is killed: later messages begin no work
                     self._group = None
                 for task in self._tasks:
                     task.cancel()
@@ -378,11 +378,11 @@ class Component(Generic[P]):
     def _task_ended(self, task: asyncio.Task[None]) -> None:
         self._tasks.pop(task, None)
         if not task.cancelled() and (bug := task.exception()) is not None:
-            self._group = None  # which ends its other tasks now, and must get no new ones meanwhile
+            self._group = None  # the group is ending and must get no new tasks
             self.fail(bug)
 
     async def _unless_ended(self, work: Coroutine[Any, Any, None], name: str) -> bool:
-        """Do the work unless the component is told to end first; say whether it was done."""
+        """Run the work unless the component must end first; return whether the work was finished."""
         if self._end.is_set():
             work.close()
             return False

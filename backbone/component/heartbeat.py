@@ -1,8 +1,8 @@
-"""Heartbeat of a process: the time stamp of a small file, which its event loop counts up and its creator reads.
+"""Heartbeat of a process: the time stamp of a small file, which its event loop increments and its creator reads.
 
-No message crosses the bus, so a lost hub never makes a process look hung, and reading costs the process nothing.
-A time stamp needs no room on the disk: on a full one only the line that says what the process is doing is missing. A
-process that could not even make its file is not judged once it is ready.
+The heartbeat does not use the bus, so a lost hub never makes a process look hung. A time stamp needs no disk space: on
+a full disk only the line with the present step is missing. A ready process that could not create its file is never
+taken as hung.
 
 Prior art: systemd's watchdog notifications. Here the supervisor reads at its own pace.
 """
@@ -24,18 +24,18 @@ BEAT_EVERY_S = 0.25  # chosen: a hung process is seen within 1 s, at four wake-u
 DOING_BYTES = 160  # chosen: a line for people
 _NS = 1e-9
 _ONE_BEAT_NS = 1_000_000_000  # chosen: every file system keeps whole seconds
-_LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file in which nothing has beaten yet is later
+_LATEST_NS = 1_000_000_000 * _ONE_BEAT_NS  # 2001: the stamp of a file before its first beat is later
 
 
 @dataclass(frozen=True, slots=True)
 class Vitals:
-    """What one look at a process shows; every value only grows.
+    """One reading of a process; every value only grows.
 
     Attributes:
         beats: Heartbeats of its event loop; 0 before the first.
-        ran_s: Processor seconds its main thread used.
-        queued_s: Seconds its main thread was ready to run and waited for a processor.
-        doing: What the process says it is doing, for people.
+        ran_s: Processor seconds of its main thread.
+        queued_s: Seconds that its main thread waited for a processor.
+        doing: Its present step, for people.
     """
 
     beats: int
@@ -48,8 +48,8 @@ class Heartbeat:
     """The writing side, inside the process.
 
     Args:
-        run_directory: Folder of the mission's files on this host; empty: nothing is written.
-        doing: Returns what the process is doing, one line.
+        run_directory: Folder of the mission's files on this host; empty: no file is written.
+        doing: Returns the present step, one line.
     """
 
     def __init__(self, run_directory: str, doing: Callable[[], str] = str) -> None:
@@ -61,7 +61,7 @@ class Heartbeat:
             path.parent.mkdir(mode=0o700, exist_ok=True)
             self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
         except OSError as error:
-            log.warning("no heartbeat can be written: %s", error)
+            log.warning("cannot write the heartbeat: %s", error)
 
     async def keep(self, clock: Clock) -> None:
         """Write a beat every ``BEAT_EVERY_S`` until cancelled."""
@@ -70,7 +70,7 @@ class Heartbeat:
             await clock.sleep_s(BEAT_EVERY_S * clock.rate)
 
     def close(self) -> None:
-        """Write nothing any more."""
+        """Stop writing and close the file."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -87,12 +87,12 @@ class Heartbeat:
 
 
 def heartbeat_path(run_directory: str, pid: int) -> Path:
-    """Return where the process of this pid writes its heartbeat."""
+    """Return the path of the heartbeat of this pid."""
     return Path(run_directory) / "heartbeat" / str(pid)
 
 
 def read_vitals(run_directory: str, pid: int) -> Vitals | None:
-    """Return what the system shows of a process; None if the process has ended."""
+    """Read the vitals of a process; None if the process has ended."""
     try:
         ran_ns, queued_ns, *_ = Path(f"/proc/{pid}/schedstat").read_bytes().split()
     except FileNotFoundError:
@@ -110,6 +110,6 @@ def read_vitals(run_directory: str, pid: int) -> Vitals | None:
 
 
 def forget_heartbeat(run_directory: str, pid: int) -> None:
-    """Remove the heartbeat of a process that has ended; right also if it never wrote one."""
+    """Remove the heartbeat of a process that has ended, if it wrote one."""
     with suppress(OSError):
         heartbeat_path(run_directory, pid).unlink()

@@ -1,4 +1,4 @@
-"""Everything a new process must know to become a component. Written by a creator, read by the process."""
+"""Launch: the creator's order from which a new process becomes a component."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ class Launch(Message, frozen=True):
 
     Attributes:
         mission: Name of the mission.
-        subsystem: One of the four.
+        subsystem: Subsystem of the component.
         name: Name of the component, unique in the mission.
         type: Component type as named in the mission file.
         class_path: ``package.module:Class``, a ``Component``.
         host: Name of the host it runs on.
-        endpoint: Where the hub listens. The secret it may ask for is in the run directory, never in here.
+        endpoint: Endpoint of the hub. The secret, if any, is in the run directory and never in a launch.
         clock_origin_monotonic_s: This machine's monotonic clock at mission time 0.
         clock_rate: Mission seconds per second of the machine.
         parameters: Values for the class's ``Parameters``.
-        requester: Address of whoever asked for it.
+        requester: Address of the component's owner.
         run_directory: Folder of the mission's files on this host; gone when the mission has ended.
-        process: Name of the process it shares with other components; empty: a process of its own. Without a
-            class path this is the launch of the shared process itself, and ``requester`` its creator.
-        incarnation: Name of this one life of the component, ``<host>.<pid of the creator>.<number>``: two lives of one
-            name never have the same, on any hosts.
+        process: Name of the shared process; empty: a process of its own. Without a class path this is the launch of
+            the shared process itself, and ``requester`` is its creator.
+        incarnation: Id of this life of the component, ``<host>.<pid of the creator>.<number>``, unique in the
+            mission.
     """
 
     mission: Name
@@ -46,7 +46,7 @@ class Launch(Message, frozen=True):
 
     @property
     def is_shared_process(self) -> bool:
-        """Whether this starts a process for components to come, and no component."""
+        """True if this starts an empty shared process, and no component."""
         return bool(self.process) and not self.class_path
 
     @property

@@ -1,11 +1,11 @@
-"""Logs of components: one file each in the mission's folder, which stays small whatever is said.
+"""Logs of components: one file each in the mission's folder, whose size is limited.
 
-A process's standard output and errors are its log file, so that what the interpreter and C libraries say when they die
-is in it too. Therefore the file is kept small from outside the writers: when it has grown beyond ``LOG_BYTES`` it
-becomes ``NAME.log.1``, in place of an older one, and the process's own descriptors are turned to a new file.
+The log file is a process's standard output and error, so it also holds the last output of the interpreter and of C
+libraries. When the file has grown beyond ``LOG_BYTES``, it is renamed to ``NAME.log.1``, which replaces an older one,
+and the process redirects its descriptors to a new file.
 
-Every process that writes into a log holds it locked, so that whoever starts next can tell the logs of the living from
-those of the dead: of the dead the newest ``ENDED_KEPT`` stay. What cannot be written is lost and ends nothing.
+Each process holds a lock on its log, so a starting process distinguishes logs of living and of ended components. Of
+ended components the newest ``ENDED_KEPT`` logs stay. A line that cannot be written is lost; no process ends for it.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from backbone.component.repeats import Repeats
 from backbone.printable import printable_lines
 
 LOG_BYTES = 1 << 20  # chosen: a day of an honest component; with the one before it, two
-LINE_BYTES = 8192  # chosen: a long traceback; more is a message that somebody else wrote
+LINE_BYTES = 8192  # chosen: a long traceback; a longer line quotes a hostile message
 LOOK_EVERY_BYTES = LOG_BYTES // 16
-LOOK_EVERY_S = 5.0  # chosen: also what a C library says is seen; it writes some megabytes meanwhile at worst
-ENDED_KEPT = 32  # chosen: of consoles that came and went; more than a person looks into
-FOLDER_BYTES = 64 << 20  # chosen: a mission of 30 components that all say as much as they may
-TIDY_EVERY_S = 10.0  # chosen: a mission of 400 components starts in less, and is looked through once
+LOOK_EVERY_S = 5.0  # chosen: limits the output of C libraries too; they write some megabytes meanwhile at worst
+ENDED_KEPT = 32  # chosen: of ended consoles; more than a person reads
+FOLDER_BYTES = 64 << 20  # chosen: a mission of 30 components with two full files each
+TIDY_EVERY_S = 10.0  # chosen: a mission of 400 components starts in less, and tidies once
 _TIDIED = ".tidied"
 _OLD = ".1"
 
 
 def log_path(run_directory: str, name: str) -> Path:
-    """Return where a component's output goes."""
+    """Return the path of a component's log."""
     return Path(run_directory) / "log" / f"{name}.log"
 
 
 def open_log(run_directory: str, name: str) -> int:
-    """Return a descriptor that output can go to: of the component's log if there can be one, else of nothing."""
+    """Return a descriptor of the component's log, or of the null device if the log cannot be opened."""
     path = log_path(run_directory, name)
     with contextlib.suppress(OSError):
         tidy(path.parent)
     try:
         return _open(path)
-    except OSError:  # the disk is full; or the mission ends just now and its folder is gone: do not bring it back
+    except OSError:  # the disk is full, or the mission has ended and its folder must not be created again
         return os.open(os.devnull, os.O_WRONLY)
 
 
 def redirect(run_directory: str, name: str) -> None:
-    """Turn standard input to nothing, output and errors to the component's log while the mission has a folder."""
+    """Redirect input from the null device, and output to the component's log if the mission has a folder."""
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
@@ -61,11 +61,11 @@ def redirect(run_directory: str, name: str) -> None:
 
 
 class ComponentLog(logging.Handler):
-    """Writes what is logged in this process to standard error, and keeps the file behind that small.
+    """Writes this process's log records to standard error, and limits the size of the file behind it.
 
     Args:
-        name: Of the component, in each line.
-        run_directory: As for ``redirect``; if that was not called, standard error is left as it is.
+        name: Name of the component, in each line.
+        run_directory: As for ``redirect``; without ``redirect``, standard error is not limited.
     """
 
     def __init__(self, name: str, run_directory: str = "") -> None:
@@ -77,16 +77,16 @@ class ComponentLog(logging.Handler):
         self._unlooked_bytes = 0
 
     def install(self) -> None:
-        """Have all loggers of this process write here only, from the level in ``SCOUT_LOG`` on."""
+        """Make this the only handler of this process, from the level in ``SCOUT_LOG`` on."""
         logging.basicConfig(level=os.environ.get("SCOUT_LOG", "INFO"), handlers=[self], force=True)
 
     def watch(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Look after the file every few seconds for as long as the loop runs."""
+        """Call ``look_after`` every few seconds while the loop runs."""
         self.look_after()
         loop.call_later(LOOK_EVERY_S, self.watch, loop)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write the record, or count it."""
+        """Write the record, or count it if it repeats."""
         try:
             now_s = time.monotonic()
             self._tell(self._repeats.due(now_s))
@@ -96,13 +96,13 @@ class ComponentLog(logging.Handler):
             self.handleError(record)
 
     def look_after(self) -> None:
-        """Tell what was counted, and begin a new file if this one has grown too big."""
+        """Write the counts of repeated records, and begin a new file if this one is too big."""
         with self.lock or contextlib.nullcontext():
             self._tell(self._repeats.due(time.monotonic()))
             self._keep_small()
 
     def close(self) -> None:
-        """Tell what was counted; called at the end of the process."""
+        """Write the counts of repeated records; called at the end of the process."""
         self._tell(self._repeats.rest())
         super().close()
 
@@ -125,12 +125,12 @@ class ComponentLog(logging.Handler):
         self._unlooked_bytes = 0
         if self._path is None:
             return
-        with contextlib.suppress(OSError):  # the folder is gone, or the disk is full: what grows is tried again
+        with contextlib.suppress(OSError):  # the folder is gone, or the disk is full: tried again later
             if os.fstat(2).st_size <= LOG_BYTES:
                 return
             if is_at(2, self._path):
                 os.replace(self._path, f"{self._path}{_OLD}")
-            elif not self._path.exists():  # somebody removed it
+            elif not self._path.exists():  # the file was removed
                 os.ftruncate(2, 0)
                 return
             try:
@@ -144,11 +144,11 @@ def tidy(folder: Path, now_s: float | None = None) -> None:
     """Remove the oldest logs of components that have ended, if there are too many or they are too big together.
 
     Args:
-        folder: Of the logs; looked through at most every ``TIDY_EVERY_S``.
+        folder: Folder of the logs; read at most every ``TIDY_EVERY_S``.
         now_s: Time of day; None: now.
 
     Raises:
-        OSError: The folder is gone, or refuses.
+        OSError: The folder is gone, or cannot be read.
     """
     now_s = time.time() if now_s is None else now_s
     mark = folder / _TIDIED
@@ -168,7 +168,7 @@ def tidy(folder: Path, now_s: float | None = None) -> None:
 
 
 def _logs(folder: Path) -> Iterator[tuple[float, Path, int]]:
-    """Yield each log after the time of its last line, and its size."""
+    """Yield the time of the last line, path and size of each log."""
     for path in folder.iterdir():
         if path.name != _TIDIED:
             with contextlib.suppress(FileNotFoundError):  # another process tidies too
@@ -177,7 +177,7 @@ def _logs(folder: Path) -> Iterator[tuple[float, Path, int]]:
 
 
 def _is_held(path: Path) -> bool:
-    """Say whether a living process writes into it."""
+    """Return whether a living process holds the log."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -189,7 +189,7 @@ def _is_held(path: Path) -> bool:
 
 
 def _remove_ended(path: Path) -> bool:
-    """Remove the log unless a living process writes into it; return whether it is gone."""
+    """Remove the log unless a living process holds it; return whether it is gone."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -203,7 +203,7 @@ def _remove_ended(path: Path) -> bool:
 
 
 def _open(path: Path) -> int:
-    """Return a descriptor of the file at this path that adds to its end, held by this process among others."""
+    """Open the file for appending with a shared lock and return its descriptor."""
     while True:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o600)
         try:
@@ -213,11 +213,11 @@ def _open(path: Path) -> int:
         except BaseException:
             os.close(descriptor)
             raise
-        os.close(descriptor)  # it was removed or replaced before we held it
+        os.close(descriptor)  # it was removed or replaced before this process held it
 
 
 def _turn_output_to(descriptor: int) -> None:
-    """Have standard output and errors go there; the descriptor is used up."""
+    """Redirect standard output and error to the descriptor, and close it."""
     with contextlib.suppress(OSError, ValueError):  # a full disk, or a stream that was closed
         sys.stdout.flush()
         sys.stderr.flush()

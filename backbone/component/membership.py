@@ -1,7 +1,7 @@
-"""What a process that several components share can be asked. Only the creator that started it asks.
+"""Messages to a shared process. Only the creator that started the process sends them.
 
-A component that lives in such a process is its *member*. Each admission has a number of its own, its
-*life*: a name that is admitted again after its end begins another life.
+A component in such a process is its *member*. Each admission has a number, its *life*: a name that is admitted again
+after its end begins another life.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from backbone.ranges import Count, ExitCode
 from backbone.wire import Message
 
 PROCESSES = f"{Subsystem.BACKBONE}/*/*/*"
-"""Addresses of all shared processes, for watching their tokens: one rises when its process can be asked."""
+"""Addresses of all shared processes, for watching their tokens; a token rises when its process serves."""
 
 
 class Admit(Message, frozen=True):
-    """Begin to be this component too. May be asked twice for the same life.
+    """Admit this component. Idempotent for the same life.
 
     Attributes:
-        launch: As for a process of its own.
-        life: Number of this admission, never given before by this creator.
+        launch: The component's launch.
+        life: Number of this admission, unique for this creator.
     """
 
     launch: Launch
@@ -29,20 +29,20 @@ class Admit(Message, frozen=True):
 
 
 class Admitted(Message, frozen=True):
-    """Answer to ``Admit``: it has begun. Whether it becomes ready, its own token tells."""
+    """Answer to ``Admit``: the member's life has begun. Its own token rises when it is ready."""
 
 
 class AwaitEnd(Message, frozen=True):
-    """How does this life end? Answered when it has ended, be it long ago."""
+    """Ask for the end of this life. Answered when it has ended, also if it ended long ago."""
 
     life: Count
 
 
 class MemberEnded(Message, frozen=True):
-    """Answer to ``AwaitEnd``: nothing of it is left in the process.
+    """Answer to ``AwaitEnd``: the member has ended.
 
     Attributes:
-        exit_code: What a process of its own would have exited with.
+        exit_code: Exit code that a process of its own would have had.
     """
 
     life: Count
@@ -50,17 +50,17 @@ class MemberEnded(Message, frozen=True):
 
 
 class EndMember(Message, frozen=True):
-    """End this member in good order, as SIGTERM would end a process of its own. May be asked twice."""
+    """End this member in good order, as SIGTERM would end a process of its own. Idempotent."""
 
     life: Count
 
 
 class MemberEnding(Message, frozen=True):
-    """Answer to ``EndMember``: it was told, or has ended."""
+    """Answer to ``EndMember``: the member is ending or has ended."""
 
 
 class NeedsOwnProcess(Refusal):
-    """A component of this class prepares its process before there is a bus, or brings a bus of its own."""
+    """A component of this class prepares its process before the bus is open, or opens a bus of its own."""
 
     code = "component.own_process"
     remedy = "Remove the attribute 'process' from it in the mission file."
@@ -70,25 +70,25 @@ class AlreadyMember(Refusal):
     """A component of this name lives in the process, by another admission."""
 
     code = "component.already_member"
-    remedy = "End it first."
+    remedy = "End the member first."
 
 
 class NotAMember(Refusal):
-    """No life of this number was ever begun in this process."""
+    """This process never admitted a life of this number."""
 
     code = "component.not_a_member"
     remedy = "Admit the component."
 
 
 class NotItsCreator(Refusal):
-    """Members come and go by the word of the creator that started the process, so that its picture stays true."""
+    """Only the creator that started the process admits and ends members, so that its records stay correct."""
 
     code = "component.not_its_creator"
     remedy = "Ask the placer to start or stop the component."
 
 
 class AskedAgain(Refusal):
-    """The end of this life was asked for once more; only the newest question is answered when it comes."""
+    """A newer question waits for the end of this life; only the newest one is answered."""
 
     code = "component.asked_again"
     remedy = "Nothing to do: the newer question waits."
@@ -98,9 +98,9 @@ ProcessQuestion = Admit | AwaitEnd | EndMember
 
 
 def process_address(host: str, process: str, pid: int) -> str:
-    """Return the address at which one shared process is asked.
+    """Return the address of a shared process.
 
-    It names the process itself, not only its role: what is asked of one that died never reaches its successor.
+    It contains the pid, so that a question to a dead process never reaches its successor.
 
     Example:
         >>> process_address("lab-pc", "pool", 4242)
@@ -117,7 +117,7 @@ def read_process_address(address: str) -> tuple[str, str, int]:
         ('lab-pc', 'pool', 4242)
 
     Raises:
-        IllegalName: It is the address of something else.
+        IllegalName: The text is no address of a shared process.
     """
     match address.split("/"):
         case [Subsystem.BACKBONE, host, process, pid] if pid.isdecimal():

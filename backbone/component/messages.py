@@ -1,4 +1,4 @@
-"""What every component can be asked, and what it says of itself unasked."""
+"""Common messages: the questions that every component answers, and its status."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from backbone.wire import Message
 
 
 class LifeState(StrEnum):
-    """Where a component is in its life; it only moves downwards in this list."""
+    """State of a component's life cycle; it only moves downwards in this list."""
 
-    CONNECTING = "connecting"  # exists, cannot be asked yet
+    CONNECTING = "connecting"  # exists, does not answer yet
     READY = "ready"  # its liveliness token stands
-    DRAINING = "draining"  # ends what it began, takes nothing new
+    DRAINING = "draining"  # finishes its work, begins none
     STOPPED = "stopped"  # left the bus in good order
-    FAILED = "failed"  # ended by a bug; the process is about to die
+    FAILED = "failed"  # ended by a bug; its process is ending
 
 
 class AskState(Message, frozen=True):
-    """Who are you and how are you?"""
+    """Ask for the component's state."""
 
 
 class Absence(Message, frozen=True):
@@ -28,11 +28,11 @@ class Absence(Message, frozen=True):
 
     Attributes:
         name: Name of the absent component.
-        since_s: Mission time at which its owner first missed it.
-        cause: Why it is absent: how it ended, or what refused its start. One line.
-        doing: What its owner does about it, one line; empty: nothing more.
-        remedy: What an operator can do; empty: nothing is needed.
-        vital: True if the mission cannot do its work without it (core services).
+        since_s: Mission time at which its owner found it missing.
+        cause: Why it is absent: how it ended, or the refusal of its start. One line.
+        doing: What its owner does to start it, one line; empty: nothing.
+        remedy: What an operator can do; empty: no action is needed.
+        vital: True if the mission cannot work without it (core services).
     """
 
     name: Mention
@@ -44,14 +44,14 @@ class Absence(Message, frozen=True):
 
 
 class StandingStop(Message, frozen=True):
-    """An emergency stop that is in force: the component moves nothing until an operator lifts it.
+    """An emergency stop in force: the component moves nothing until an operator lifts the stop.
 
     Attributes:
-        number: Grows with each stop; the one that is lifted is named by it.
+        number: Grows with each stop; an order to lift names it.
         by: The operator who stopped the component.
-        reason: As given; may be empty.
+        reason: The operator's reason; may be empty.
         since_s: Mission time of the stop.
-        is_confirmed: False if the hardware did not confirm that it stands still.
+        is_confirmed: False if the hardware did not confirm standstill.
     """
 
     number: Count
@@ -69,13 +69,13 @@ class ComponentState(Message, frozen=True):
         type: Component type as named in the mission file.
         host: Host it runs on.
         pid: Its process.
-        state: Where it is in its life.
+        state: State of its life cycle.
         since_s: Mission time at which it entered that state.
-        feedback: One line for people: what it is doing.
-        requester: Address of whoever had it started.
-        absent: Components that this one wants and that are absent.
-        stop: The emergency stop in force on it; None: there is none.
-        user: The person who sits at it, as they call themselves; empty: nobody does.
+        feedback: Its present work, one line for people.
+        requester: Address of its owner.
+        absent: Absent components that this one wants.
+        stop: The emergency stop in force on it; None: no stop.
+        user: Name of the person at it, as the person gave it; empty: no person.
     """
 
     address: Address
@@ -92,14 +92,14 @@ class ComponentState(Message, frozen=True):
 
 
 class AskTime(Message, frozen=True):
-    """What time is it in your mission?"""
+    """Ask for the mission's time."""
 
 
 class MissionTime(Message, frozen=True):
     """Answer to ``AskTime``.
 
     Attributes:
-        at_s: Mission time at which this was answered.
+        at_s: Mission time of the answer.
         rate: Mission seconds per second of the machine.
     """
 
@@ -108,32 +108,32 @@ class MissionTime(Message, frozen=True):
 
 
 class AskStatistics(Message, frozen=True):
-    """What did you count?"""
+    """Ask for the component's counters and measures."""
 
 
 class Statistics(Message, frozen=True):
-    """Answer to ``AskStatistics``: named counters and measures with their unit in the name."""
+    """Answer to ``AskStatistics``: counters and measures, with units in their names."""
 
     values: Annotated[dict[Mention, Measure], MANY]
 
 
 class AskParameters(Message, frozen=True):
-    """With which parameters do you run?"""
+    """Ask for the component's parameters."""
 
 
 class Parameters(Message, frozen=True):
-    """Answer to ``AskParameters`` and ``SetParameter``: all parameters as they are now."""
+    """Answer to ``AskParameters`` and ``SetParameter``: all present parameters."""
 
     values: Values
 
 
 class SetParameter(Message, frozen=True):
-    """Run with this value from now on. Refused, and nothing changed, if the value does not fit.
+    """Set a parameter. If the value does not fit, the component refuses and changes nothing.
 
     Attributes:
         name: Name of the parameter.
         value: The new value.
-        user: Who wants it, for the record.
+        user: The person who sets it, for the story.
     """
 
     name: Mention
@@ -142,35 +142,35 @@ class SetParameter(Message, frozen=True):
 
 
 class AskStory(Message, frozen=True):
-    """What happened to you lately?
+    """Ask for the component's recent events.
 
     Attributes:
-        subject: Only events about this name; empty for all.
+        subject: Only events about this name; empty: all.
     """
 
     subject: Mention = ""
 
 
 class LogLevel(StrEnum):
-    """How much something that happened matters, most first."""
+    """Importance of an event, most important first."""
 
-    ALARM = "alarm"  # a robot may do what it should not, or nothing any more
-    WARNING = "warning"  # the mission goes on, less well
-    NOTICE = "notice"  # what people and behaviors did or found
+    ALARM = "alarm"  # a robot may act wrongly, or not at all
+    WARNING = "warning"  # the mission continues, degraded
+    NOTICE = "notice"  # an action or finding of a person or behavior
     INFO = "info"
 
 
 class StoryEvent(Message, frozen=True):
-    """One thing that happened.
+    """One event of a component.
 
     Attributes:
         at_s: Mission time.
-        where: Address of the component that tells it.
-        what: Past tense, one line.
-        subject: The name it is about.
-        cause: Id of the message that led to it, empty for a first cause.
-        level: How much it matters.
-        user: The person who did it; empty: nobody in person.
+        where: Address of the component that recorded it.
+        what: The event, past tense, one line.
+        subject: Name of its subject.
+        cause: Id of the message that led to it; empty: a first cause.
+        level: Its importance.
+        user: The person who did it; empty: no person.
     """
 
     at_s: Instant
@@ -189,12 +189,12 @@ class Story(Message, frozen=True):
 
 
 class Stop(Message, frozen=True):
-    """End in good order: finish what you began, go to the safe state, leave.
+    """End in good order: finish the work in progress, go to the safe state, leave.
 
     Attributes:
-        reason: For the record.
-        incarnation: The one life that is meant, see ``Launch.incarnation``; empty: the component of this address.
-            Another life of the same address refuses with ``OtherIncarnation``.
+        reason: Reason, for the story.
+        incarnation: The incarnation to stop, see ``Launch.incarnation``; empty: any. Another incarnation of the
+            address refuses with ``OtherIncarnation``.
     """
 
     reason: Text = ""
@@ -202,7 +202,7 @@ class Stop(Message, frozen=True):
 
 
 class Stopping(Message, frozen=True):
-    """Answer to ``Stop``: it is on its way out."""
+    """Answer to ``Stop``: the component is ending."""
 
 
 CommonQuestion = AskState | AskTime | AskStatistics | AskParameters | SetParameter | AskStory | Stop

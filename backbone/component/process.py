@@ -1,4 +1,4 @@
-"""From a launch order to a running component: the last thing a forked or fresh process calls."""
+"""Process entry: a forked or fresh process runs the component of its launch."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _REFUSED_LINE = re.compile(r" (\S+) ended, refused \[([^]]+)\]: (.*) \(remedy: (
 
 
 class WrongClassPath(Refusal):
-    """A class path does not lead to a component class."""
+    """The class path names no component class."""
 
     code = "component.class"
     remedy = "Write the class as package.module:Class, importable on the component's host."
@@ -37,7 +37,7 @@ def load_class(class_path: str) -> type[Component[Any]]:
     """Return the component class at ``package.module:Class``.
 
     Raises:
-        WrongClassPath: There is none.
+        WrongClassPath: No component class has this path.
     """
     module_name, _, class_name = class_path.partition(":")
     try:
@@ -50,7 +50,7 @@ def load_class(class_path: str) -> type[Component[Any]]:
 
 
 def run_process(launch: Launch) -> int:
-    """Become the component and return the process's exit code."""
+    """Run the component of this launch and return the process's exit code."""
 
     def begin() -> Coroutine[Any, Any, None]:
         component_class = load_class(launch.class_path)
@@ -61,10 +61,10 @@ def run_process(launch: Launch) -> int:
 
 
 def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -> int:
-    """Run what ``begin`` returns in an event loop of this process and return the process's exit code.
+    """Run the coroutine of ``begin`` in an event loop of this process and return the process's exit code.
 
     Args:
-        begin: Called before there is a loop.
+        begin: Called before the loop exists.
     """
     faulthandler.enable()
     component_log = ComponentLog(launch.name, launch.run_directory)
@@ -82,10 +82,10 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -
 
 
 def exit_code_of(error: BaseException, address: str) -> int:
-    """Log why a component ended and return the exit code that says so.
+    """Log why a component ended and return the matching exit code.
 
     Args:
-        error: What its life ended with.
+        error: The exception that ended it.
     """
     log = logging.getLogger(__name__)
     match error:
@@ -101,11 +101,11 @@ def exit_code_of(error: BaseException, address: str) -> int:
 
 
 def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
-    """Return the refusal that ended a component, as ``exit_code_of`` logged it; None: it did not end by one.
+    """Return the refusal that ended a component, as ``exit_code_of`` logged it; None: no refusal ended it.
 
     Args:
-        lines: Of the log, oldest first.
-        address: Of the component.
+        lines: Lines of the log, oldest first.
+        address: Address of the component.
 
     Example:
         >>> line = "12:00 ERROR x: resource_pool/x ended, refused [a.b]: no scout is named 'y' (remedy: See status.)"
@@ -138,7 +138,7 @@ async def _live(component_class: type[Component[Any]], launch: Launch) -> None:
 async def run_with_heartbeat(
     launch: Launch, clock: Clock, life: Coroutine[Any, Any, None], doing: Callable[[], str] = str
 ) -> None:
-    """Live this life while the process's heartbeat shows that its event loop runs."""
+    """Run this coroutine and the process's heartbeat beside it."""
     heartbeat = Heartbeat(launch.run_directory, doing)
     beating = asyncio.create_task(heartbeat.keep(clock), name="heartbeat")
     try:

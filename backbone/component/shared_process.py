@@ -1,8 +1,8 @@
-"""A process that several components share: it begins empty, its creator admits its members.
+"""Shared process: begins without members; its creator admits them.
 
-Each member is a component like any other, with a bus, a token and a story of its own; what they share is
-the event loop, the session to the hub and the pid. A member that ends, also by a bug, leaves the others
-alone. Who blocks the event loop blocks them all, and is ended with all of them.
+Each member is a component with a bus, a token and a story of its own. The members share the event loop, the session to
+the hub and the pid. If a member ends, also by a bug, the others continue. If a member blocks the event loop, it blocks
+all members, and the whole process is ended.
 
 SIGTERM ends all members in good order, the last admitted first, and then the process.
 """
@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.shared_bus import SharedSession
@@ -38,7 +39,6 @@ from backbone.component.membership import (
     process_address,
 )
 from backbone.component.process import exit_code_of, load_class, run_to_end, run_with_heartbeat
-from backbone.door import secret_of
 from backbone.wire import Envelope, Message
 
 
@@ -48,8 +48,8 @@ class _Member:
 
     Attributes:
         component: None until its class is loaded.
-        ended: Its exit code, as soon as there is one.
-        end_reason: Why it is to end; empty: it is not.
+        ended: Its exit code, after its end.
+        end_reason: Why it must end; empty: it continues.
     """
 
     launch: Launch
@@ -59,18 +59,18 @@ class _Member:
     asked: asyncio.Future[int] | None = None
 
     async def wait_ended(self) -> int:
-        """Return its exit code as soon as there is one; who asked before has given up, and waits no longer.
+        """Return its exit code after its end; an older question that still waits is refused.
 
         Raises:
-            AskedAgain: A newer question waits.
+            AskedAgain: A newer question replaced this one.
         """
         if self.asked is not None and not self.asked.done():
-            self.asked.set_exception(AskedAgain(f"the end of {self.launch.name} was asked for once more"))
+            self.asked.set_exception(AskedAgain(f"a newer question waits for the end of {self.launch.name}"))
         self.asked = asyncio.shield(self.ended)
         return await self.asked
 
     def end(self, reason: str) -> None:
-        """Have it leave in good order, at once or as soon as it can be told."""
+        """End the member in good order, as soon as its component exists."""
         self.end_reason = self.end_reason or reason
         if self.component is not None:
             self.component.end(reason)
@@ -80,10 +80,10 @@ class SharedProcess:
     """The members of this process and the answers to its creator.
 
     Args:
-        launch: Of the process itself; see ``Launch.process``.
-        join: Returns a bus for a source; all of them are neighbors.
-        clock: The mission's time, for all members.
-        pid: The process, as its creator knows it.
+        launch: Launch of the process itself; see ``Launch.process``.
+        join: Returns a bus for a source; all these buses are neighbors.
+        clock: The mission's clock, for all members.
+        pid: Pid of the process.
     """
 
     def __init__(self, launch: Launch, join: Callable[[str, Clock], Bus], clock: Clock, pid: int) -> None:
@@ -95,12 +95,12 @@ class SharedProcess:
         self._bug: BaseException | None = None
 
     async def run(self) -> None:
-        """Answer the creator until told to end; when this returns, every member has left.
+        """Answer the creator until the process must end; return when every member has ended.
 
-        Cancelled, it dies as if it were killed, and its members with it.
+        If cancelled, it ends with its members as if it were killed.
 
         Raises:
-            BaseException: The bug in this file that ended it.
+            BaseException: A bug in this file.
         """
         bus = self._join(self.address, self._clock)
         bus.on_bug = self._fail
@@ -121,11 +121,11 @@ class SharedProcess:
             raise self._bug
 
     def end(self, _reason: str = "") -> None:
-        """Have all members leave in good order; ``run`` returns when that is done."""
+        """End all members in good order; then ``run`` returns."""
         self._end.set()
 
     def members(self) -> dict[str, Component[Any]]:
-        """Return the components that live here now, by name."""
+        """Return the present members, by name."""
         living = [self._members[life] for life in self._lives]
         return {member.launch.name: member.component for member in living if member.component is not None}
 
@@ -141,7 +141,7 @@ class SharedProcess:
             case AwaitEnd(life=life):
                 return MemberEnded(life, await self._member(life).wait_ended())
             case EndMember(life=life):
-                self._member(life).end(f"told by {asked.source}")
+                self._member(life).end(f"ordered by {asked.source}")
                 return MemberEnding()
 
     def _member(self, life: int) -> _Member:
@@ -193,7 +193,7 @@ class SharedProcess:
 
 
 def run_shared_process(launch: Launch) -> int:
-    """Become the shared process of this launch and return the process's exit code."""
+    """Run the shared process of this launch and return the process's exit code."""
     return run_to_end(launch, lambda: _live(launch))
 
 
@@ -210,11 +210,11 @@ async def _live(launch: Launch) -> None:
 
 
 async def _load(class_path: str) -> type[Component[Any]]:
-    """Return the class without holding up the other members while its module is imported.
+    """Import and return the class without blocking the other members.
 
     Raises:
-        WrongClassPath: There is none.
-        NeedsOwnProcess: It must not share a process.
+        WrongClassPath: No component class has this path.
+        NeedsOwnProcess: The class must not share a process.
     """
     if class_path.partition(":")[0] in sys.modules:
         found = load_class(class_path)

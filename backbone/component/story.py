@@ -20,8 +20,8 @@ class StoryBook:
     """Keeps the newest events.
 
     Args:
-        where: Address that tells the events.
-        clock: Stamps them.
+        where: Address of the component that records the events.
+        clock: Stamps the events.
     """
 
     def __init__(self, where: str, clock: Clock) -> None:
@@ -29,9 +29,9 @@ class StoryBook:
         self._events: deque[StoryEvent] = deque(maxlen=LENGTH)
 
     def note(self, subject: str, what: str, level: LogLevel = LogLevel.INFO, user: str = "") -> StoryEvent:
-        """Keep that this happened to the subject now, because of the message being handled; as printable text.
+        """Record an event about the subject, caused by the current message, as printable text.
 
-        What is longer than ``LONGEST_WHAT`` is cut: others compose it too, and the book has its size.
+        A text longer than ``LONGEST_WHAT`` is cut, because other components write parts of it and the book stays small.
         """
         what, subject, cause = what[:LONGEST_WHAT], subject[:LONGEST_MENTION], current_cause.get()[:LONGEST_MENTION]
         event = printable_all(StoryEvent(self._clock.now_s(), self._where, what, subject, cause, level, user))
@@ -39,21 +39,21 @@ class StoryBook:
         return event
 
     def of(self, subject: str = "") -> list[StoryEvent]:
-        """Return the events about a subject or because of a message, or all, oldest first."""
+        """Return the events about a subject or caused by a message, or all, oldest first."""
         return [event for event in self._events if not subject or is_about(event, subject)]
 
 
 def is_about(event: StoryEvent, subject: str) -> bool:
-    """Say whether the event's subject, its cause or a whole name in its text is this one: not scout10 for scout1.
+    """Return whether the subject, the cause or a whole name in the text of the event is this name.
 
-    A cause may be named without its subsystem, ``rc_manager#112``.
+    ``scout1`` does not match ``scout10``. A cause may be named without its subsystem, ``rc_manager#112``.
     """
     named = subject in (event.subject, event.cause, component_of(event.cause))
     return named or speaks_of(event.what, subject)
 
 
 def speaks_of(text: str, name: str) -> bool:
-    """Say whether the whole name stands in the text.
+    """Return whether the text contains the whole name.
 
     Example:
         >>> speaks_of("held by scout10", "scout1"), speaks_of("held by scout1", "scout1")

@@ -1,4 +1,4 @@
-"""What supervision decides: instructions, carried out in order by the keeper."""
+"""Instructions: decisions of supervision, which the process keeper carries out in order."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from backbone.creator.messages import EndedBy
 
 @dataclass(frozen=True, slots=True)
 class Fork:
-    """Have it running; report ``forked`` or ``fork_failed``."""
+    """Fork the component; report ``forked`` or ``fork_failed``."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class AskToStop:
-    """Ask it to stop; report ``ask_failed`` if it does not say that it will."""
+    """Ask the component to stop; report ``ask_failed`` if it does not agree."""
 
     name: str
     within_s: float
@@ -25,7 +25,7 @@ class AskToStop:
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """Send the signal to everything that belongs to this process."""
+    """Send the signal to the process tree."""
 
     name: str
     pid: int
@@ -34,7 +34,7 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class ReportReady:
-    """It is ready, for the first time or again."""
+    """The component is ready, for the first time or again."""
 
     name: str
     pid: int
@@ -42,7 +42,7 @@ class ReportReady:
 
 @dataclass(frozen=True, slots=True)
 class ReportStartFailed:
-    """It never became ready, and will not by this order."""
+    """The start has failed and is not repeated."""
 
     name: str
     how: str
@@ -50,7 +50,7 @@ class ReportStartFailed:
 
 @dataclass(frozen=True, slots=True)
 class ReportEnded:
-    """Its end was ordered, and nothing of it is left."""
+    """The process tree ended by order."""
 
     name: str
     by: EndedBy
@@ -59,18 +59,18 @@ class ReportEnded:
 
 @dataclass(frozen=True, slots=True)
 class ReportLeft:
-    """It ended in good order by itself and is not supervised any more."""
+    """The component ended by itself with exit code 0; its supervision has ended."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class ReportFell:
-    """It ended unexpectedly.
+    """The component ended unexpectedly.
 
     Attributes:
-        restart_in_s: Pause until its restart; negative: its owner has to ask for another one.
-        failing: Whether it ended more often than its policy's limit.
+        restart_in_s: Pause until the restart; negative: no restart, the owner must ask for a new start.
+        failing: Whether it ended more often than the limit of its policy.
     """
 
     name: str
@@ -81,10 +81,10 @@ class ReportFell:
 
 @dataclass(frozen=True, slots=True)
 class ReportSilent:
-    """It shows no sign of life, or does so again.
+    """The component shows no sign of life, or responds again.
 
     Attributes:
-        silent_s: For how long, seconds of the machine; 0: it responds again.
+        silent_s: Duration of the silence, seconds of the machine; 0: it responds again.
     """
 
     name: str
@@ -93,7 +93,7 @@ class ReportSilent:
 
 @dataclass(frozen=True, slots=True)
 class WakeAt:
-    """Report ``woken`` at this time at the latest; replaces what earlier answers said."""
+    """Report ``woken`` at this time at the latest; replaces earlier ``WakeAt``."""
 
     at_s: float
 

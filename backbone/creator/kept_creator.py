@@ -1,4 +1,4 @@
-"""The creator on a machine that is offered to a mission elsewhere: its process, its folder, its types."""
+"""The creator of a machine that is offered to a mission elsewhere: its process, its folder, its types."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Protocol
 import msgspec
 
 from backbone import run_files
+from backbone.authentication import keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
@@ -19,7 +20,6 @@ from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPo
 from backbone.creator.preload import arc_modules
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
-from backbone.door import keep_secret
 
 READY_WITHIN_S = 20.0  # chosen: as for the creators a launcher starts
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
@@ -28,14 +28,14 @@ POLICY = RestartPolicy(back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=
 
 @dataclass(frozen=True)
 class Offered:
-    """This machine, and the mission it is offered to.
+    """The offered machine, and the mission that may use it.
 
     Attributes:
         mission: Name of the mission.
-        endpoint: Where its hub listens.
+        endpoint: Endpoint of the mission's hub.
         host: Name of this machine in the mission.
-        tags: What this machine has.
-        secret: What the hub asks its clients for; empty: nothing.
+        tags: Tags of this machine.
+        secret: Secret of the mission; empty: the hub asks for none.
     """
 
     mission: str
@@ -46,32 +46,32 @@ class Offered:
 
 
 class KeepsCreator(Protocol):
-    """What an offer needs of the one that keeps its creator; see ``KeptCreator``."""
+    """What an offer needs of ``KeptCreator``."""
 
     on_fell: Callable[[ProcessFell], None]
     on_changed: Callable[[], None]
 
     async def start(self, bus: Bus, clock: Clock) -> None:
-        """Have the creator running, or raise a ``BackboneError``."""
+        """Start the creator and return when it is ready, or raise a ``BackboneError``."""
 
     def processes(self) -> list[ProcessState]:
         """Return the creator's process."""
 
     def absences(self) -> list[Absence]:
-        """Return the creator while it does not run or respond."""
+        """Return the creator as absent while it does not run or respond."""
 
     async def close(self) -> None:
-        """Return when nothing runs here any more; right however often called."""
+        """End the creator and all its components. Idempotent."""
 
 
 class KeptCreator:
     """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
 
     Args:
-        launch: Of the offer.
+        launch: Launch of the offer.
 
     Attributes:
-        on_fell: Called when the creator ended unexpectedly.
+        on_fell: Called when the creator has ended unexpectedly.
         on_changed: Called when ``absences()`` may have changed.
     """
 
@@ -82,12 +82,12 @@ class KeptCreator:
         self._keeper: ProcessKeeper | None = None
 
     async def start(self, bus: Bus, clock: Clock) -> None:
-        """Have the creator running.
+        """Start the creator and return when it is ready.
 
         Raises:
             LinkError: The mission's component database did not answer.
             StartFailed: The creator did not become ready; the end of its log is in the detail.
-            NameTaken: The mission has a creator of this host.
+            NameTaken: The mission already has a creator of this host.
         """
         answered = await bus.ask(COMPONENT_DATABASE, ListTypes(), Types, within_s=REPLY_TIME_S)
         types = [counted.component_type for counted in answered.types]
@@ -106,11 +106,11 @@ class KeptCreator:
         return self._keeper.processes() if self._keeper is not None else []
 
     def absences(self) -> list[Absence]:
-        """Return the creator while it does not run or respond."""
+        """Return the creator as absent while it does not run or respond."""
         return self._keeper.absences() if self._keeper is not None else []
 
     async def close(self) -> None:
-        """Return when nothing runs here any more; right however often called."""
+        """End the creator and all its components. Idempotent."""
         keeper, self._keeper = self._keeper, None
         if keeper is not None:
             await keeper.close()

@@ -1,4 +1,4 @@
-"""What can be said to a creator, and what it reports."""
+"""Messages to a creator, and its reports."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ READY_WITHIN_S = 10.0  # chosen: silence, not time: a starting process that impo
 CUT_OFF_ENDS_WITHIN_S = (
     7.0  # chosen: a link counts as cut after 2 s, a cut-off host ends all after 3 s, which takes 2 s
 )
-START_MOST_S = 180.0  # chosen: a start that shows signs of life for so long and is not ready never will be
+START_MOST_S = 180.0  # chosen: a start that is not ready by then has failed, even if it shows signs of life
 
 
 class RestartPolicy(Message, frozen=True):
-    """When a process that ended without an order, or hangs, is replaced.
+    """When the creator replaces a process that hangs or ended without an order.
 
     Attributes:
-        restart: False: never; its owner asks for a new one.
+        restart: False: never; the owner must ask for a new start.
         back_off_s: Pause before the first restart, seconds of the machine; doubles with each one in the window.
         back_off_most_s: Longest pause while there are fewer restarts than ``limit`` in the window.
         limit: Restarts within the window from which on the component is failing: it is still restarted, but after
@@ -60,17 +60,17 @@ class Spawn(Message, frozen=True):
     """Start one component here and answer when it is ready. Only the placer asks this.
 
     Attributes:
-        subsystem: Where it belongs.
+        subsystem: Subsystem of the component.
         name: Unique in the mission.
         type: Component type.
         class_path: ``package.module:Class``.
         parameters: Values for its ``Parameters``.
-        requester: Address of whoever wanted it.
-        policy: What to do when it ends unexpectedly.
+        requester: Address of the component's owner.
+        policy: Restart policy.
         ready_within_s: Silence, seconds of the machine, after which a start that is not ready has failed.
-        pinned: True if it may run on this host only. Kept here, with the tags, for a placer that lost its memory.
-        tags: Tags its host must have.
-        process: Name of the process it shares with others on its host; empty: a process of its own.
+        pinned: True if it may run on this host only. A restarted placer learns this and the tags from the creator.
+        tags: Tags that its host must have.
+        process: Name of the shared process; empty: a process of its own.
     """
 
     subsystem: Subsystem
@@ -87,7 +87,7 @@ class Spawn(Message, frozen=True):
 
 
 class Spawned(Message, frozen=True):
-    """Answer to ``Spawn``: it is ready."""
+    """Answer to ``Spawn``: the component is ready."""
 
     address: Mention
     pid: Pid
@@ -96,14 +96,14 @@ class Spawned(Message, frozen=True):
 class EndProcess(Message, frozen=True):
     """End a component's whole process tree: ask, then SIGTERM, then SIGKILL.
 
-    One that shares its process is asked, then told to end, and the others stay; if that does not help,
-    the process is killed, and the others are restarted by their policies.
+    A component in a shared process is asked, then ordered to end, and the other members continue. If it does not end,
+    the process is killed, and the other members are restarted by their policies.
 
     Attributes:
         name: The component.
-        reason: For the record.
-        ask_s: Seconds of the machine it has after being asked.
-        term_s: Seconds it has after SIGTERM.
+        reason: Reason, for the story.
+        ask_s: Seconds of the machine from the request to SIGTERM.
+        term_s: Seconds of the machine from SIGTERM to SIGKILL.
     """
 
     name: Mention
@@ -113,7 +113,7 @@ class EndProcess(Message, frozen=True):
 
 
 class EndedBy(StrEnum):
-    """What it took to end a process."""
+    """The step that ended a process."""
 
     ITSELF = "itself"
     ASKING = "asking"
@@ -122,7 +122,7 @@ class EndedBy(StrEnum):
 
 
 class ProcessEnded(Message, frozen=True):
-    """Answer to ``EndProcess``: nothing of it is left."""
+    """Answer to ``EndProcess``: the whole process tree has ended."""
 
     name: Mention
     by: EndedBy
@@ -130,19 +130,19 @@ class ProcessEnded(Message, frozen=True):
 
 
 class ListProcesses(Message, frozen=True):
-    """What runs here?"""
+    """Ask which processes this creator runs."""
 
 
 class ProcessState(Message, frozen=True):
-    """One component of this creator.
+    """One component of this creator, running or waiting for a restart.
 
     Attributes:
-        spawn: The order it was started by.
-        pid: Its process now, 0 while it waits for a restart.
-        restarts: How often it was restarted.
-        last_end: How it ended last, for people; empty if it never did.
-        silent_s: Seconds of the machine since its process last showed that its event loop runs; 0 while it is in time.
-        doing: What a component that is not ready yet is doing, for people.
+        spawn: The order that started it.
+        pid: Its process, 0 while it waits for a restart.
+        restarts: Number of its restarts.
+        last_end: How it last ended, for people; empty if it never ended.
+        silent_s: Seconds of the machine since the last heartbeat of its process; 0 while the heartbeat is in time.
+        doing: Present step of a component that is not ready yet, for people.
     """
 
     spawn: Spawn
@@ -154,7 +154,7 @@ class ProcessState(Message, frozen=True):
 
 
 class Processes(Message, frozen=True):
-    """Answer to ``ListProcesses``: the truth about this host, from which others rebuild their picture."""
+    """Answer to ``ListProcesses``, from which the placer rebuilds its book after a restart."""
 
     host: Mention
     tags: Annotated[list[Mention], FEW]
@@ -162,11 +162,11 @@ class Processes(Message, frozen=True):
 
 
 class HostLoad(Message, frozen=True):
-    """Published by each creator as telemetry, once a second and on every change of its processes.
+    """Load of a host. Each creator publishes it once a second and after every change of its processes.
 
     Attributes:
         host: Name of the host.
-        tags: Its tags.
+        tags: Tags of the host.
         cpu: Busy share of all cores, 0 to 1.
         memory: Used share of memory, 0 to 1.
         cores: Number of cores.
@@ -187,9 +187,9 @@ class ProcessFell(Message, frozen=True):
     Attributes:
         name: The component.
         how: Exit code or signal, for people.
-        restart_in_s: Pause before it is started again; negative if it is left down.
-        last_lines: The end of its log.
-        failing: True if it ended more often than its policy's limit.
+        restart_in_s: Pause before the restart; negative: no restart.
+        last_lines: Last lines of its log.
+        failing: True if it ended more often than the limit of its policy.
     """
 
     name: Mention
@@ -200,9 +200,9 @@ class ProcessFell(Message, frozen=True):
 
 
 class StartFailed(Refusal):
-    """The component did not become ready; the detail is what it refused with, or else the end of its log.
+    """The component did not become ready; the detail is its refusal, or else the end of its log.
 
-    Facts: ``name``, ``how`` it ended, and ``refused``, the code of its own refusal if it was one.
+    Facts: ``name``, ``how`` it ended, and ``refused``, the code of its refusal, if it refused.
     """
 
     code = "creator.start_failed"
@@ -217,28 +217,28 @@ class NotHere(Refusal):
 
 
 class AlreadyHere(Refusal):
-    """A component of this name runs, starts or ends under this creator, by another order."""
+    """Another order of this name is running, starting or ending under this creator."""
 
     code = "creator.already_here"
     remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
 
 
 class UnlistedType(Refusal):
-    """The creator may not run this class: it was not launched with it in the list of the mission's types."""
+    """The mission's types, which the creator got at its launch, do not contain this class."""
 
     code = "creator.unlisted_type"
     remedy = "Declare the type in the mission file; core services are started by 'scout-backbone up' alone."
 
 
 class FixedTypes(Refusal):
-    """Which types a creator may run, and what it preloads, is settled by its launch."""
+    """The types and preloaded modules of a creator are set at its launch and cannot be changed."""
 
     code = "creator.fixed_types"
     remedy = "Change the types in the mission file, and bring the mission up again."
 
 
 class NotThePlacer(Refusal):
-    """Processes are started and ended by the placer alone, so that its picture stays true."""
+    """Only the placer starts and ends processes, so that its book stays correct."""
 
     code = "creator.not_the_placer"
     remedy = "Ask the placer to start or stop the component."
@@ -253,5 +253,5 @@ def creator_name(host: str) -> str:
 
 
 def offer_name(host: str) -> str:
-    """Return the name of the command that offers a host to a mission elsewhere, and keeps its creator."""
+    """Return the component name of the command that offers a host to a mission and keeps its creator."""
     return f"offer-{host}"

@@ -1,8 +1,8 @@
-"""Offer this machine to a mission elsewhere: keep the mission's creator here until it is ordered to stop.
+"""Offer: this machine runs a creator for a mission elsewhere until the mission or a signal ends the offer.
 
-The offer outlives the link. If the link to the hub is down for ``CUT_OFF_S``, the creator and all it started end;
-then the offer tries to reach the hub again, and begins a new creator with the mission's clock asked anew. It ends
-when the mission's launcher asks it to (``down``), or on a signal.
+The offer outlives the link. If the link to the hub is down for ``CUT_OFF_S``, the offer ends its creator and all
+components of that creator. It then reconnects to the hub, reads the mission's clock again, and starts a new creator.
+The offer ends when the mission's launcher asks it to (``down``), or on a signal.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar
 
+from backbone.authentication import read_secret_file
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -30,22 +31,21 @@ from backbone.creator.messages import (
     ProcessFell,
     offer_name,
 )
-from backbone.door import read_secret_file
 from backbone.errors import HubUnreachable, LinkError, Refusal
+from backbone.mission_connection import clock_elsewhere, mission_clock
 from backbone.naming import Subsystem, legal
-from backbone.visit import clock_elsewhere, mission_clock
 from backbone.wire import Envelope, Message
 
 OFFER_TYPE = "offer"
 CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), a killed hub at once and is back within 3 s
-SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, on a slow link by a tenth of a second
-ASK_AGAIN_S = 0.1  # chosen: a hub's nameserver answers that soon after the hub listens
+SAME_TIME_S = 0.5  # chosen: two readings of one clock differ by milliseconds, over a slow link by 0.1 s
+ASK_AGAIN_S = 0.1  # chosen: the nameserver answers that soon after the hub listens
 PAUSE_FIRST_S, PAUSE_MOST_S, PAUSE_FACTOR = 0.2, 2.0, 1.5  # chosen: a hub that is back is found within 2 s
 DIAL_TIME_S = 3.0  # chosen: longer than a lost first packet takes to be repeated
 
 
 class Ending(StrEnum):
-    """Why an offer's life ended."""
+    """Why an offer ended."""
 
     ORDERED = "ordered to end"
     CUT_OFF = "the link to the mission was lost"
@@ -53,10 +53,10 @@ class Ending(StrEnum):
 
 
 class Offer(Component[NoParameters]):
-    """Keeps the creator of this machine, as long as the mission can be reached.
+    """Runs a creator on this machine while the mission can be reached.
 
     Attributes:
-        ending: Why it ended; meaningful after ``run``.
+        ending: Why it ended; valid after ``run``.
     """
 
     accepts: ClassVar[Any] = ListProcesses
@@ -71,26 +71,26 @@ class Offer(Component[NoParameters]):
         self.ending = Ending.ORDERED
 
     async def connect(self) -> None:
-        """Have the creator running, or end meanwhile because the link is lost."""
+        """Start the creator; if the link is lost meanwhile, end."""
         self.start_task(self._watch_link(), "link")
         await self._creator.start(self.bus, self.clock)
 
     async def serve(self) -> None:
-        """Let it be known that the machine is in the mission."""
+        """Report that the machine is in the mission."""
         self._on_ready()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Tell of the creator's process."""
+        """Answer ``ListProcesses`` with the creator's process."""
         if isinstance(asked.body, ListProcesses):
             return Processes(self.launch.host, [], self._creator.processes())
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return the creator while it does not run or respond."""
+        """Return the creator as absent while it does not run or respond."""
         return self._creator.absences()
 
     async def drain(self) -> None:
-        """End the creator and all it started."""
+        """End the creator and all its components."""
         await self._creator.close()
 
     def _creator_fell(self, fell: ProcessFell) -> None:
@@ -98,7 +98,7 @@ class Offer(Component[NoParameters]):
         self.changed()
 
     async def _watch_link(self) -> None:
-        """End this life if the link stays down, or if the mission's time is another one when it is back."""
+        """End this offer if the link stays down, or if the mission's time has changed when the link is back."""
         self.bus.watch_link(self._link_changed)
         while True:
             await self._link_fell.wait()
@@ -118,10 +118,10 @@ class Offer(Component[NoParameters]):
             self._link_up.set()
         else:
             self._link_up.clear()
-            self._link_fell.set()  # and stays so until it is judged, however soon the link is back
+            self._link_fell.set()  # stays set until the offer has examined it, even if the link is back at once
 
     async def _is_other_time(self) -> bool:
-        """Compare the clocks as soon as the nameserver answers, which a hub's link precedes."""
+        """Compare the clocks. The nameserver may answer a moment after the link to its hub is up."""
         while self._link_up.is_set():
             try:
                 again = await mission_clock(self.bus)
@@ -137,11 +137,11 @@ class Offer(Component[NoParameters]):
 
 
 class Offering:
-    """Offers a machine, life after life. Use it inside one event loop.
+    """Offers a machine again after every lost link. Use it inside one event loop.
 
     Args:
-        say: Called with lines for the person who typed the command.
-        secret_file: Read anew before each life: a new run of the mission has a new secret. None: it stays.
+        say: Called with lines for the person at the terminal.
+        secret_file: Read before each attempt, because each run of the mission has a new secret. None: the secret stays.
     """
 
     def __init__(self, offered: Offered, say: Callable[[str], None], secret_file: Path | None = None) -> None:
@@ -155,8 +155,8 @@ class Offering:
         """Offer the machine until the mission or a signal ends it.
 
         Raises:
-            NameTaken: The mission has a creator of this host.
-            Refusal: The first creator could not be started.
+            NameTaken: The mission already has a creator of this host.
+            Refusal: The first creator did not start.
         """
         self._lives = asyncio.create_task(self._live_again_and_again(), name="offer")
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -168,7 +168,7 @@ class Offering:
                 raise
 
     def end(self) -> None:
-        """Have ``run`` return when nothing runs here any more."""
+        """End the creator and all its components; then ``run`` returns."""
         self._is_ordered_to_end = True
         if self._current is not None:
             self._current.end("by a signal")
@@ -197,7 +197,7 @@ class Offering:
             pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)
 
     async def _live(self) -> Offer:
-        """Be one offer from the hub's first answer to its end."""
+        """Run one offer, from the hub's first answer to the end of the offer."""
         if self._secret_file is not None:
             self._offered = replace(self._offered, secret=read_secret_file(self._secret_file))
         offered = self._offered
@@ -234,10 +234,10 @@ class Offering:
 
 
 async def _dial(offered: Offered) -> None:
-    """Return when something listens at the endpoint; unlike opening a bus this can be interrupted.
+    """Return when a process listens at the endpoint; unlike opening a bus this can be interrupted.
 
     Raises:
-        HubUnreachable: Nothing does.
+        HubUnreachable: No process listens at the endpoint.
     """
     protocol, _, where = offered.endpoint.partition("/")
     host, _, port = where.partition("?")[0].partition("#")[0].rpartition(":")
@@ -246,7 +246,7 @@ async def _dial(offered: Offered) -> None:
     try:
         async with asyncio.timeout(DIAL_TIME_S):
             _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
-    except OSError as error:  # a timeout is one, too
+    except OSError as error:  # includes TimeoutError
         raise HubUnreachable(f"no hub listens at {offered.endpoint}: {_reason(error)}") from error
     writer.close()
 

@@ -1,4 +1,4 @@
-"""What a creator's zygote imports beforehand, so that the start of a component does not wait for it."""
+"""Modules that a creator's zygote imports beforehand, so that a component's start does not wait for them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backbone.component_database.messages import ComponentType
 def arc_modules(types: Iterable[ComponentType]) -> list[str]:
     """Return the modules of the ARCs among these types, each once, in order of name.
 
-    A person who takes a robot over waits until an ARC has started; whatever else starts does so with the mission.
+    ARCs start while a person waits for a robot; all other components start with the mission.
 
     Example:
         >>> from backbone.naming import Subsystem

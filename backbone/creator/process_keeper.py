@@ -1,7 +1,7 @@
-"""Keeps processes: joins supervision, which decides, with a zygote, which forks, and a bus, which tells readiness.
+"""Process keeper: carries out the decisions of ``supervision`` with a zygote, and reports events from zygote and bus.
 
-Components that share a process are admitted to it over the bus instead of being forked; ``shared_processes``
-decides about that. Used by creators for what the placer orders and by the launcher for the core services.
+A component that shares a process is not forked but admitted to that process over the bus, as ``shared_processes``
+decides. Creators use a keeper for the placer's orders, the launcher uses one for the core services.
 """
 
 from __future__ import annotations
@@ -82,9 +82,9 @@ log = logging.getLogger(__name__)
 
 LAST_LINES = 20
 _LAST_BYTES = 16_384  # chosen: more than 20 lines of a traceback
-OVERLAP_S = 0.3  # chosen: ten times what a component that obeys takes; who takes longer holds nobody up
+OVERLAP_S = 0.3  # chosen: ten times what an obeying component takes; a slower one delays no other
 ADMIT_EACH_S = 1.0  # chosen: a thousand times what an answer takes
-AWAIT_EACH_S = 60.0  # chosen: the question stands until the member ends; renewed in case an answer was lost
+AWAIT_EACH_S = 60.0  # chosen: the question stays open until the member ends; it is repeated in case its answer was lost
 _DEFAULTS = EndProcess("")
 
 
@@ -95,16 +95,16 @@ class Forks(Protocol):
     on_lost: Callable[[], None]
 
     async def fork(self, launch: Launch) -> int:
-        """Have the component running and return its pid, or raise ``NoProcess``."""
+        """Start the component and return its pid, or raise ``NoProcess``."""
 
     def kill(self, pid: int, number: signal.Signals) -> None:
-        """Send the signal to everything that belongs to the component."""
+        """Send the signal to the component's process tree."""
 
     def keep_running(self) -> str:
-        """Continue the zygote if it was stopped; return what is wrong with it, empty: nothing."""
+        """Continue the zygote if it was stopped; return what was wrong, empty: nothing."""
 
     async def close(self) -> None:
-        """End everything it forked, and itself."""
+        """End the zygote and everything it forked."""
 
 
 ReadVitals = Callable[[str, int], Vitals | None]
@@ -114,16 +114,16 @@ class ProcessKeeper:
     """Starts, watches, restarts and ends processes. Use it inside one event loop.
 
     Args:
-        zygote: Forks the processes; the keeper takes over its ``on_exit``, and leaves its closing to the caller.
-        clock: For back-off and deadlines, which are in seconds of the machine; None: the machine's own.
-        read_vitals: Looks at a process, given the mission's folder and the pid; see ``heartbeat.read_vitals``.
-        pid: The keeper's own process, which is part of each incarnation it starts; 0: this one.
+        zygote: Forks the processes; the keeper sets its ``on_exit``, the caller closes it.
+        clock: Clock of back-off and deadlines, which are in seconds of the machine; None: the machine's own.
+        read_vitals: Reads the vitals of a process, given run directory and pid; see ``heartbeat.read_vitals``.
+        pid: Pid of the keeper, which is part of each incarnation that it starts; 0: this process.
 
     Attributes:
         on_fell: Called when a process ended unexpectedly.
         on_silent: Called with name and seconds when a process shows no sign of life, and with 0 when it does again.
         on_changed: Called after every change of ``processes()``.
-        on_bug: Called with what must not happen.
+        on_bug: Called with each exception that is a bug.
     """
 
     def __init__(
@@ -154,7 +154,7 @@ class ProcessKeeper:
         zygote.on_exit = self._exited
 
     def use(self, bus: Bus) -> None:
-        """Hear of readiness, and ask processes to stop, over this bus from now on."""
+        """From now on learn readiness and ask processes to stop over this bus."""
         self._bus = bus
         bus.watch_alive("*/*", self._token_changed)
         bus.watch_alive(PROCESSES, self._process_token_changed)
@@ -163,37 +163,37 @@ class ProcessKeeper:
     async def start(
         self, launch: Launch, policy: RestartPolicy, ready_within_s: float, order: Spawn | None = None
     ) -> int:
-        """Have the component running and return its pid when it is ready.
+        """Start the component and return its pid when it is ready.
 
         Args:
-            policy: What to do when it ends unexpectedly later.
+            policy: Restart policy.
             ready_within_s: Silence, seconds of the machine, after which a start has failed.
-            order: What ``processes()`` shows as the order; None: one made of the other arguments.
+            order: Order that ``processes()`` returns; None: made from the other arguments.
 
         Raises:
-            StartFailed: It never became ready; nothing of it is left.
-            AlreadyHere: One of this name runs, starts or ends here.
+            StartFailed: It did not become ready, and its whole process tree has ended.
+            AlreadyHere: A component of this name runs, starts or ends here.
         """
         self._begin(launch, order or _as_spawn(launch, policy, ready_within_s), is_hub=False)
         return await self._readiness(launch.name)
 
     async def start_hub(self, launch: Launch, policy: RestartPolicy) -> int:
-        """Order the process that carries the bus and return its pid; its readiness shows once ``use`` was called.
+        """Start the process of the hub and return its pid; its readiness can be seen only after ``use``.
 
         Raises:
-            StartFailed: There is no process.
-            AlreadyHere: One of this name runs, starts or ends here.
+            StartFailed: The system gave no process.
+            AlreadyHere: A component of this name runs, starts or ends here.
         """
         forked: asyncio.Future[int] = asyncio.get_running_loop().create_future()
         self._begin(launch, _as_spawn(launch, policy, READY_WITHIN_S), is_hub=True, forked=forked)
         return await forked
 
     async def wait_ready(self, name: str, within_s: float) -> int:
-        """Return the pid of a started component as soon as it is ready, at once if it is.
+        """Return the pid of a started component when it is ready.
 
         Raises:
             StartFailed: It ended, or was not ready within that many seconds of the machine.
-            NotHere: Nothing of this name was started.
+            NotHere: No component of this name was started.
         """
         one = self._supervision.find(name)
         if one is None:
@@ -212,27 +212,27 @@ class ProcessKeeper:
     async def end(
         self, name: str, reason: str = "", ask_s: float = _DEFAULTS.ask_s, term_s: float = _DEFAULTS.term_s
     ) -> ProcessEnded:
-        """End the component's whole process tree: ask, then SIGTERM, then SIGKILL; return when nothing of it is left.
+        """End the component's whole process tree: ask, then SIGTERM, then SIGKILL; return when the tree has ended.
 
         Args:
-            reason: For the component's record.
-            ask_s: Seconds of the machine it has after being asked.
-            term_s: Seconds it has after SIGTERM.
+            reason: Reason, for the component's story.
+            ask_s: Seconds of the machine from the request to SIGTERM.
+            term_s: Seconds of the machine from SIGTERM to SIGKILL.
 
         Raises:
-            NotHere: Nothing of this name is here.
+            NotHere: No component of this name is here.
         """
         instructions = self._supervision.end_ordered(name, ask_s, term_s, self._now_s())
         self._kept[name].end_reason = reason
         ended: asyncio.Future[ProcessEnded] = asyncio.get_running_loop().create_future()
         self._ending.setdefault(name, []).append(ended)
-        self._do(instructions)
+        self._carry_out(instructions)
         return await ended
 
     async def close(self) -> list[ProcessEnded]:
-        """End everything, the last started first, and return how each ended. Nothing can be started afterwards.
+        """End all components, the last started first, and return how each ended. Later starts are refused.
 
-        Who was started before another is asked only after the other has ended, or has had a moment to.
+        A component is asked after all components that started later have ended, or after ``OVERLAP_S``.
         """
         self._is_closing = True
         ends = []
@@ -254,12 +254,12 @@ class ProcessKeeper:
 
     # Picture
     def order(self, name: str) -> Spawn | None:
-        """Return the order of what is kept under this name, None if nothing is."""
+        """Return the order of the component of this name, None if there is none."""
         kept = self._kept.get(name)
         return kept.order if kept else None
 
     def processes(self) -> list[ProcessState]:
-        """Return what is kept here, in the order of start."""
+        """Return the kept components, in the order of their starts."""
         return [
             ProcessState(
                 self._kept[one.name].order,
@@ -273,7 +273,7 @@ class ProcessKeeper:
         ]
 
     def absences(self) -> list[Absence]:
-        """Return what is kept here and does not run or respond; times in mission seconds."""
+        """Return the kept components that do not run or respond; times in mission seconds."""
         rate, now_s = self._clock.rate, self._now_s()
         absent = [
             msgspec.structs.replace(absence, since_s=absence.since_s * rate)
@@ -303,7 +303,7 @@ class ProcessKeeper:
         if self._looking is None and launch.run_directory:
             self._looking = self._task(self._look_for_life(launch.run_directory), "look for signs of life")
         self._failures.pop(name, None)
-        self._do(instructions, forked)
+        self._carry_out(instructions, forked)
 
     async def _readiness(self, name: str) -> int:
         ready: asyncio.Future[int] = asyncio.get_running_loop().create_future()
@@ -314,16 +314,16 @@ class ProcessKeeper:
         name = component_of(address)
         kept = self._kept.get(name)
         if stands and kept is not None and kept.launch.address == address:
-            self._do(self._supervision.ready(name))
+            self._carry_out(self._supervision.ready(name))
 
     def _process_token_changed(self, address: str, stands: bool) -> None:
         try:
             host, process, pid = read_process_address(address)
-        except IllegalName as illegal:  # a stranger's token must not end the creator
+        except IllegalName as illegal:  # a token of an unknown client must not end the creator
             log.info("ignored: %s", illegal.detail)
             return
         if stands and any((k.launch.host, k.launch.process) == (host, process) for k in self._kept.values()):
-            self._do_shared(self._shared.serving(process, pid, self._now_s()))
+            self._carry_out_shared(self._shared.serving(process, pid, self._now_s()))
 
     async def _look_for_life(self, run_directory: str) -> None:
         while True:
@@ -340,10 +340,10 @@ class ProcessKeeper:
                 self.on_changed()
 
     def _observed(self, pid: int, silent_s: float, now_s: float, *, beats: bool) -> None:
-        self._do_shared(self._shared.observed(pid, silent_s, now_s))
+        self._carry_out_shared(self._shared.observed(pid, silent_s, now_s))
         for one in [one for one in self._supervision if one.pid == pid]:
-            if beats or one.phase is not Phase.READY:  # a ready process that never beat could not make its file
-                self._do(self._supervision.observed(one.name, silent_s, now_s))
+            if beats or one.phase is not Phase.READY:  # a ready process without a beat could not create its file
+                self._carry_out(self._supervision.observed(one.name, silent_s, now_s))
 
     def _exited(self, pid: int, returncode: int) -> None:
         self._silences.pop(pid, None)
@@ -351,24 +351,24 @@ class ProcessKeeper:
         if self._kept:
             forget_heartbeat(next(iter(self._kept.values())).launch.run_directory, pid)
         if not self._shared.has(pid):
-            self._do(self._supervision.exited(pid, returncode, self._now_s()))
+            self._carry_out(self._supervision.exited(pid, returncode, self._now_s()))
             return
         for talk in self._talks.pop(pid, set()):
             talk.cancel()
-        self._do_shared(self._shared.exited(pid, returncode))
+        self._carry_out_shared(self._shared.exited(pid, returncode))
 
     async def _fork(self, launch: Launch, forked: asyncio.Future[int] | None) -> None:
         name = launch.name
         try:
             pid = await self._zygote.fork(launch)
         except NoProcess as error:
-            self._do(self._supervision.fork_failed(name, str(error), self._now_s()))
+            self._carry_out(self._supervision.fork_failed(name, str(error), self._now_s()))
             if forked is not None and not forked.done():
                 forked.set_exception(self._failures[name])
             return
         if forked is not None and not forked.done():
             forked.set_result(pid)
-        self._do(self._supervision.forked(name, pid, self._now_s()))
+        self._carry_out(self._supervision.forked(name, pid, self._now_s()))
 
     async def _fork_process(self, process: str, member: Launch) -> None:
         launch = msgspec.structs.replace(
@@ -383,30 +383,30 @@ class ProcessKeeper:
         try:
             pid = await self._zygote.fork(launch)
         except NoProcess as error:
-            self._do_shared(self._shared.fork_failed(process, str(error)))
+            self._carry_out_shared(self._shared.fork_failed(process, str(error)))
             return
-        self._do_shared(self._shared.forked(process, pid, self._now_s()))
+        self._carry_out_shared(self._shared.forked(process, pid, self._now_s()))
 
     async def _share_life(self, bus: Bus, at: str, launch: Launch, life: int) -> None:
-        """Have the component admitted and wait for its end; cancelled when the process ends."""
+        """Have the shared process admit the component, then wait for its end; cancelled when the process ends."""
         try:
             await ask_until_answered(
                 bus, self._clock, at, Admit(launch, life), Admitted, each_s=ADMIT_EACH_S, within_s=math.inf
             )
         except Refusal as refusal:
-            self._do_shared(self._shared.refused(life, str(refusal), self._now_s()))
+            self._carry_out_shared(self._shared.refused(life, str(refusal), self._now_s()))
             return
-        self._do_shared(self._shared.admitted(life))
+        self._carry_out_shared(self._shared.admitted(life))
         ended = await ask_until_answered(
             bus, self._clock, at, AwaitEnd(life), MemberEnded, each_s=AWAIT_EACH_S, within_s=math.inf
         )
-        self._do_shared(self._shared.member_ended(life, ended.exit_code, self._now_s()))
+        self._carry_out_shared(self._shared.member_ended(life, ended.exit_code, self._now_s()))
 
     async def _end_member(self, bus: Bus, at: str, life: int) -> None:
         try:
             await bus.ask(at, EndMember(life), MemberEnding, within_s=ADMIT_EACH_S)
         except BackboneError as error:  # supervision's next step is to kill the process
-            log.info("%s did not take the order to end a member: %s", at, error)
+            log.info("%s did not accept the order to end a member: %s", at, error)
 
     async def _ask_to_stop(self, kept: _Kept, within_s: float) -> None:
         try:
@@ -416,18 +416,18 @@ class ProcessKeeper:
             await self._bus.ask(kept.launch.address, stop, Stopping, within_s=within_s)
         except BackboneError as error:
             log.info("%s could not be asked to stop: %s", kept.launch.name, error)
-            self._do(self._supervision.ask_failed(kept.launch.name, self._now_s()))
+            self._carry_out(self._supervision.ask_failed(kept.launch.name, self._now_s()))
 
     async def _ring(self, at_s: float) -> None:
         await self._clock.sleep_until_s(at_s * self._clock.rate)
-        self._do(self._supervision.woken(self._now_s()))
+        self._carry_out(self._supervision.woken(self._now_s()))
 
     async def _ring_shared(self, at_s: float) -> None:
         await self._clock.sleep_until_s(at_s * self._clock.rate)
-        self._do_shared(self._shared.woken(self._now_s()))
+        self._carry_out_shared(self._shared.woken(self._now_s()))
 
     # Instructions
-    def _do(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
+    def _carry_out(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
         for instruction in instructions:
             match instruction:
                 case Fork(name=name):
@@ -435,7 +435,7 @@ class ProcessKeeper:
                 case AskToStop(name=name, within_s=within_s):
                     self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
                 case Signal(name=name, number=number) if self._kept[name].launch.process:
-                    self._do_shared(self._shared.signalled(name, number))
+                    self._carry_out_shared(self._shared.signalled(name, number))
                 case Signal(name=name, pid=pid, number=number):
                     log.info("%s to %s, pid %d", number.name, name, pid)
                     self._zygote.kill(pid, number)
@@ -443,7 +443,7 @@ class ProcessKeeper:
                     _settle(self._starting.pop(name, []), pid)
                 case ReportStartFailed(name=name, how=how):
                     failure, waiting = self._start_failed(name, how), self._starting.pop(name, [])
-                    if not waiting:  # a hub's: told to whoever waits for it next
+                    if not waiting:  # a hub's failure: raised at the next ``wait_ready``
                         self._failures[name] = failure
                     _settle(waiting, failure)
                 case ReportEnded(name=name, by=by, exit_code=exit_code):
@@ -472,11 +472,11 @@ class ProcessKeeper:
         incarnation = f"{launch.host}.{self._pid}.{self._lives}"
         launch = kept.launch = msgspec.structs.replace(launch, incarnation=incarnation)
         if launch.process:
-            self._do_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))
+            self._carry_out_shared(self._shared.wanted(launch.name, launch.process, self._now_s()))
         else:
             self._task(self._fork(launch, forked), f"fork {launch.name}")
 
-    def _do_shared(self, instructions: list[ProcessInstruction]) -> None:
+    def _carry_out_shared(self, instructions: list[ProcessInstruction]) -> None:
         for instruction in instructions:
             match instruction:
                 case ForkProcess(process=process, name=name):
@@ -492,11 +492,11 @@ class ProcessKeeper:
                     log.info("%s to shared process %s, pid %d", number.name, process, pid)
                     self._zygote.kill(pid, number)
                 case MemberRuns(name=name, pid=pid):
-                    self._do(self._supervision.forked(name, pid, self._now_s()))
+                    self._carry_out(self._supervision.forked(name, pid, self._now_s()))
                 case MemberNotStarted(name=name, why=why, returncode=returncode):
-                    self._do(self._supervision.fork_failed(name, why, self._now_s(), returncode))
+                    self._carry_out(self._supervision.fork_failed(name, why, self._now_s(), returncode))
                 case MemberGone(name=name, returncode=returncode, how=how):
-                    self._do(self._supervision.left(name, returncode, how, self._now_s()))
+                    self._carry_out(self._supervision.left(name, returncode, how, self._now_s()))
                 case ProcessesWakeAt(at_s=at_s):
                     if self._shared_alarm is not None and self._shared_alarm is not asyncio.current_task():
                         self._shared_alarm.cancel()
@@ -510,7 +510,7 @@ class ProcessKeeper:
         return self._bus
 
     def _talk(self, pid: int, work: Coroutine[Any, Any, None], name: str) -> None:
-        """Do what ends with the shared process it is about."""
+        """Run work that is cancelled when its shared process ends."""
         talks, talk = self._talks.setdefault(pid, set()), self._task(work, name)
         talks.add(talk)
         talk.add_done_callback(talks.discard)
@@ -539,7 +539,7 @@ class ProcessKeeper:
 
     def _start_failed(self, name: str, how: str) -> StartFailed:
         lines, kept = self._last_lines(name), self._kept.get(name)
-        if kept is not None and how == describe(EXIT_REFUSED):  # it said in a sentence why it cannot be
+        if kept is not None and how == describe(EXIT_REFUSED):  # the log ends with its refusal
             refusal = refusal_in_log(lines, kept.launch.address)
             if refusal is not None:
                 return StartFailed(refusal.detail, remedy=refusal.remedy, name=name, how=how, refused=code_of(refusal))
@@ -554,7 +554,7 @@ class ProcessKeeper:
 
 @dataclass
 class _Kept:
-    """What the keeper remembers of a name while it is supervised."""
+    """The keeper's record of a supervised component."""
 
     launch: Launch
     order: Spawn
@@ -587,7 +587,7 @@ def _as_spawn(launch: Launch, policy: RestartPolicy, ready_within_s: float) -> S
 
 def _settle(waiting: list[asyncio.Future[Any]], outcome: object) -> None:
     for future in waiting:
-        if future.done():  # whoever waited was cancelled
+        if future.done():  # the waiting task was cancelled
             continue
         if isinstance(outcome, BaseException):
             future.set_exception(outcome)
@@ -596,11 +596,11 @@ def _settle(waiting: list[asyncio.Future[Any]], outcome: object) -> None:
 
 
 def _ignore(_fell: ProcessFell) -> None:
-    """Tell nobody."""
+    """Default listener: ignore the event."""
 
 
 def _ignore_silence(_name: str, _silent_s: float) -> None:
-    """Tell nobody."""
+    """Default listener: ignore the event."""
 
 
 def _report_to_loop(bug: BaseException) -> None:

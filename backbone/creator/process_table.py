@@ -1,9 +1,9 @@
-"""What Linux knows of processes: who descends from whom, who belongs to which component, who is gone.
+"""The process table of Linux: descent of processes, their components, and processes that have ended.
 
-Every component leads a session of its own, so whatever it starts stays recognizable by that session
-after the component's death. What left the session by executing another program is recognized by a
-variable in its environment. A zygote is in a session of its own and named after its parent: it ends
-its children by itself when the parent dies, and must be given the time to do so.
+Every component leads a session of its own, so its children stay recognizable by that session after the component's
+death. A child that left the session by executing another program is recognized by a variable in its environment. A
+zygote has a session of its own and the name of its parent. It ends its children by itself when the parent dies, and
+needs time for that.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 MARK = "SCOUT_COMPONENT"
-"""Environment variable with the pid of the component a process was started by."""
+"""Environment variable with the pid of the component that started a process."""
 
 _PR_SET_PDEATHSIG, _PR_SET_NAME, _PR_SET_CHILD_SUBREAPER = 1, 15, 36  # linux/prctl.h
 _LONGEST_TITLE = 15  # linux/sched.h: TASK_COMM_LEN less its end mark
@@ -31,9 +31,9 @@ class Process:
 
     Attributes:
         parent: Its parent's pid.
-        session: Pid of its session's leader, who may be gone.
+        session: Pid of the leader of its session; the leader may have ended.
         title: First 15 characters of its name.
-        is_gone: It has ended and only waits to be reaped.
+        is_gone: True if it has ended and waits to be reaped.
     """
 
     parent: int
@@ -46,7 +46,7 @@ Table = Mapping[int, Process]
 
 
 def threads() -> int:
-    """Return how many threads this process has, other languages' included."""
+    """Return the number of threads of this process, threads of C libraries included."""
     return len(os.listdir("/proc/self/task"))
 
 
@@ -61,7 +61,7 @@ def read_table() -> dict[int, Process]:
 
 
 def read_line(stat: str) -> Process:
-    """Return what a line of ``/proc/<pid>/stat`` says.
+    """Return the process of a line of ``/proc/<pid>/stat``.
 
     Example:
         >>> read_line("7 (a (b) c) S 1 7 7 0 -1")
@@ -73,7 +73,7 @@ def read_line(stat: str) -> Process:
 
 
 def is_stopped(pid: int) -> bool:
-    """Say whether the process was stopped by a signal or a debugger."""
+    """Return whether a signal or a debugger has stopped the process."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text()
     except OSError:
@@ -87,12 +87,12 @@ def zygote_title(parent: int) -> str:
 
 
 def is_zygote(process: Process) -> bool:
-    """Say whether it is a zygote of ours."""
+    """Return whether the process is a zygote of this project."""
     return process.title.startswith(zygote_title(0)[:-1])
 
 
 def descendants(table: Table, ancestor: int) -> set[int]:
-    """Return who descends from the process and has not ended, but no zygote and nothing below one."""
+    """Return the descendants that have not ended, without zygotes and their descendants."""
     children: dict[int, list[int]] = {}
     for pid, process in table.items():
         children.setdefault(process.parent, []).append(pid)
@@ -106,17 +106,17 @@ def descendants(table: Table, ancestor: int) -> set[int]:
 
 
 def tree(table: Table, component: int) -> set[int]:
-    """Return what is there of a component that still lives: itself, its session, its descendants, no zygotes."""
+    """Return the processes of a living component: itself, its session, its descendants, no zygotes."""
     own = {component} & table.keys()
     session = {pid for pid, process in table.items() if process.session == component and not is_zygote(process)}
     return {pid for pid in own | session | descendants(table, component) if not table[pid].is_gone}
 
 
 def remains(table: Table, component: int, adopter: int | None = None) -> set[int]:
-    """Return what a component that has ended left behind, except zygotes.
+    """Return the processes that an ended component left behind, except zygotes.
 
     Args:
-        adopter: Who inherited its children, if that is known: fewer environments have to be read then.
+        adopter: Process that inherited its children, if known; then fewer environments are read.
     """
     mark = f"{MARK}={component}".encode()
     left = {
@@ -134,14 +134,14 @@ def zygotes_of(table: Table, parent: int) -> set[int]:
 
 
 def environment(pid: int) -> list[bytes]:
-    """Return the environment the process's program was started with; empty if it is gone or another user's."""
+    """Return the environment of the process at its start; empty if it has ended or belongs to another user."""
     with suppress(OSError):
         return Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
     return []
 
 
 def send(pids: Iterable[int], number: signal.Signals) -> None:
-    """Send the signal to each; those that are gone meanwhile are passed over."""
+    """Send the signal to each process; skip processes that have ended."""
     for pid in pids:
         with suppress(ProcessLookupError):
             os.kill(pid, number)
@@ -164,7 +164,7 @@ async def wait_gone(pids: Collection[int]) -> None:
             os.close(handle)
 
 
-# What a process says of itself to the kernel.
+# Settings of the calling process in the kernel.
 
 
 def die_with_parent() -> None:
@@ -178,7 +178,7 @@ def adopt_orphans() -> None:
 
 
 def set_title(title: str) -> None:
-    """Show this process under that name, cut to 15 characters, in ``ps`` and ``top``."""
+    """Set the name of this process in ``ps`` and ``top``, cut to 15 characters."""
     _prctl(_PR_SET_NAME, ctypes.create_string_buffer(title[:_LONGEST_TITLE].encode()))
 
 

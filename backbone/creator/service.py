@@ -1,7 +1,7 @@
 """The creator: starts, watches, restarts and ends processes on its host, for the placer.
 
-Its own death, by whatever signal, ends everything it started (see ``zygote_process``), so a creator
-that comes up always begins with nothing running and never fights over names with its predecessor.
+When a creator dies, by any signal, all its components die with it (see ``zygote_process``). So a new creator starts
+without components and never competes with its predecessor for names.
 
 Source: S000, "creator"; RAM 2002, "Backbone".
 """
@@ -48,9 +48,9 @@ class CreatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     """Parameters of a creator.
 
     Attributes:
-        tags: What this host has, for the placer's choice.
-        preload: Modules its zygote imports at its start, so that components need not.
-        types: The mission's component types. It runs these, core services excepted, and no others.
+        tags: Tags of this host, for the placer's choice.
+        preload: Modules that its zygote imports at its start, so that components need not.
+        types: The mission's component types. The creator runs these, except core services, and no others.
     """
 
     tags: list[str] = []
@@ -65,13 +65,13 @@ class Creator(Component[CreatorParameters]):
     accepts = CreatorQuestion
 
     _forked: ClassVar[dict[str, Zygote]] = {}
-    """The zygote ``before_bus`` forked, until the creator of that address takes it over."""
+    """Zygotes that ``before_bus`` forked, by address, until their creators take them over."""
 
     @classmethod
     def before_bus(cls, launch: Launch) -> None:
-        """Fork the zygote while this process still may."""
+        """Fork the zygote, because this process cannot fork once a bus is open."""
         preload = launch.parameters.get("preload", [])
-        if isinstance(preload, list):  # anything else is refused when the parameters are checked
+        if isinstance(preload, list):  # the check of the parameters refuses other values
             cls._forked[launch.address] = Zygote.fork_now(preload=[str(module) for module in preload])
 
     _zygote: Forks
@@ -94,7 +94,7 @@ class Creator(Component[CreatorParameters]):
         self._spawned = self._ended = self._fell = 0
 
     async def connect(self) -> None:
-        """Watch for readiness; get a zygote if this process could not fork one."""
+        """Watch liveliness tokens; spawn a zygote if this process could not fork one."""
         self._zygote = self._given or await Zygote.spawn_fresh(preload=self.parameters.preload)
         self._zygote.on_lost = lambda: self.tell(
             self.name, "lost its zygote and with it everything it ran", LogLevel.ALARM
@@ -115,7 +115,7 @@ class Creator(Component[CreatorParameters]):
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Answer ``Spawn`` and ``EndProcess`` for the placer, ``ListProcesses`` for everybody."""
+        """Answer ``Spawn`` and ``EndProcess`` of the placer, and ``ListProcesses`` of any component."""
         question: Message = asked.body
         match question:
             case Spawn():
@@ -133,26 +133,26 @@ class Creator(Component[CreatorParameters]):
                 raise UnknownMessage(f"{type(other).__name__} is not answered here")
 
     async def drain(self) -> None:
-        """End all it runs, the last started first, then the zygote."""
+        """End all components, the last started first, then the zygote."""
         await self._keeper.close()
         await self._zygote.close()
 
     def absences(self) -> list[Absence]:
-        """Return what the placer ordered here and does not run or respond."""
+        """Return the placer's orders whose components do not run or respond."""
         return self._keeper.absences()
 
     def parameters_changed(self) -> None:
-        """Tell the placer of new tags at once.
+        """Publish new tags to the placer at once.
 
         Raises:
-            FixedTypes: Other types or modules than those of the launch; nothing is changed.
+            FixedTypes: Types or modules differ from those of the launch; nothing is changed.
         """
         if (self.parameters.types, self.parameters.preload) != self._fixed:
             raise FixedTypes(f"{self.name} keeps the types and modules it was launched with")
         self._publish_load()
 
     def statistics(self) -> dict[str, float]:
-        """Return what it did since its start."""
+        """Return counts since its start."""
         return {
             "components": float(self._count()),
             "spawned": float(self._spawned),
@@ -161,11 +161,11 @@ class Creator(Component[CreatorParameters]):
         }
 
     def _refuse_unlisted(self, order: Spawn) -> None:
-        """Return if the order is for a type of the mission, under names that lead to no other folder.
+        """Return if the order is for a type of the mission, under legal names, which lead to no other folder.
 
         Raises:
-            UnlistedType: It is not.
-            IllegalName: The component's name or its process's is illegal.
+            UnlistedType: The mission's types do not contain the class.
+            IllegalName: The name of the component or of its process is illegal.
         """
         if (order.type, order.class_path, order.subsystem) not in self._allowed:
             raise UnlistedType(

@@ -1,19 +1,18 @@
-"""Shared processes: which one is forked when, who is admitted to it, and when it ends.
+"""Shared processes: when each is forked, which members it admits, and when it ends.
 
-Events go in, instructions come out, as for ``supervision``, which decides about each component and knows
-nothing of this: to it an admission is a fork, and the end of a membership the end of a process. Times are
-seconds of the machine on one clock.
+Events go in, instructions come out. ``supervision`` decides about each component and knows no shared process: for it,
+an admission is a fork, and the end of a membership is the end of a process. Times are seconds of the machine on one
+clock.
 
 Rules:
 
-* Of one shared process there is never more than one pid: it is forked again only after the last one was
-  reported as ended.
-* Whoever is wanted is answered by exactly one ``MemberRuns`` or ``MemberNotStarted``, and whoever runs by
-  exactly one ``MemberGone``, when nothing of it is left.
-* A process nobody lives in is ended. Its last member is gone only when the process is.
-* What cannot be ended alone is ended with its process: a member that must be killed, and a process that
-  does not serve or does not admit in time. All who lived in it are gone then, each to be restarted by its
-  own policy; who was only to be admitted when it was ended is admitted to its successor.
+* A shared process never has more than one pid: it is forked again only after its last pid was reported as ended.
+* Each wanted member gets exactly one ``MemberRuns`` or ``MemberNotStarted``. Each member that runs gets exactly one
+  ``MemberGone``, after its end.
+* A process without members is ended. Its last member counts as gone only when the process has ended.
+* A process is killed if one of its members must be killed, or if it does not serve or admit in time. Then all its
+  members are gone, and each is restarted by its own policy. A member whose admission was pending is admitted to the
+  next process.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ NEVER_S = math.inf
 
 @dataclass(frozen=True, slots=True)
 class ForkProcess:
-    """Have the process running, on the terms of this member; report ``forked`` or ``fork_failed``."""
+    """Fork the process with the launch of this member; report ``forked`` or ``fork_failed``."""
 
     process: str
     name: str
@@ -41,7 +40,7 @@ class ForkProcess:
 
 @dataclass(frozen=True, slots=True)
 class AdmitMember:
-    """Have the process admit the member; report ``admitted`` and later ``member_ended``, or ``refused``."""
+    """Ask the process to admit the member; report ``admitted`` and later ``member_ended``, or ``refused``."""
 
     process: str
     pid: int
@@ -51,7 +50,7 @@ class AdmitMember:
 
 @dataclass(frozen=True, slots=True)
 class EndMemberAlone:
-    """Have the process end this member in good order."""
+    """Ask the process to end this member in good order."""
 
     process: str
     pid: int
@@ -61,7 +60,7 @@ class EndMemberAlone:
 
 @dataclass(frozen=True, slots=True)
 class SignalProcess:
-    """Send the signal to everything that belongs to the process."""
+    """Send the signal to the process tree."""
 
     process: str
     pid: int
@@ -70,7 +69,7 @@ class SignalProcess:
 
 @dataclass(frozen=True, slots=True)
 class MemberRuns:
-    """It was admitted and lives in this process."""
+    """The member was admitted and lives in this process."""
 
     name: str
     pid: int
@@ -78,10 +77,10 @@ class MemberRuns:
 
 @dataclass(frozen=True, slots=True)
 class MemberNotStarted:
-    """It does not live, and will not by this order.
+    """The member does not live, and this order is not repeated.
 
     Attributes:
-        returncode: That of its process if that ended first; 1: it was refused, or there was no process.
+        returncode: Return code of its process, if the process ended first; 1: refused, or no process.
     """
 
     name: str
@@ -91,10 +90,10 @@ class MemberNotStarted:
 
 @dataclass(frozen=True, slots=True)
 class MemberGone:
-    """It lived, and nothing of it is left.
+    """The member has ended.
 
     Attributes:
-        returncode: Its own exit code, or that of its process.
+        returncode: Exit code of the member, or return code of its process.
         how: For people.
     """
 
@@ -105,7 +104,7 @@ class MemberGone:
 
 @dataclass(frozen=True, slots=True)
 class ProcessesWakeAt:
-    """Report ``woken`` at this time at the latest; replaces what earlier answers said."""
+    """Report ``woken`` at this time at the latest; replaces earlier ``ProcessesWakeAt``."""
 
     at_s: float
 
@@ -164,7 +163,7 @@ class SharedProcesses:
         self._last_life = 0
 
     def has(self, pid: int) -> bool:
-        """Say whether this is a shared process."""
+        """Return whether this is the pid of a shared process."""
         return any(process.pid == pid for process in self._all.values())
 
     def pids(self) -> set[int]:
@@ -173,7 +172,7 @@ class SharedProcesses:
 
     # Orders
     def wanted(self, name: str, process: str, now_s: float) -> list[ProcessInstruction]:
-        """Begin to have the component live in this process; it must not be living in any."""
+        """Begin the membership of a component that is a member of no process."""
         one = self._all.get(process)
         if one is None:
             one = self._all[process] = _Process(process)
@@ -183,7 +182,7 @@ class SharedProcesses:
         return self._and_wake(self._admit_waiting(one, now_s) if one.phase is _Phase.SERVING else [])
 
     def signalled(self, name: str, number: signal.Signals) -> list[ProcessInstruction]:
-        """Begin to end a member that runs: by SIGKILL with its process, by any other signal alone."""
+        """Begin to end a running member: SIGKILL ends it with its process, any other signal ends it alone."""
         for one in self._all.values():
             member = one.members.get(name)
             if member is None or member.place is not _Place.LIVING:
@@ -195,18 +194,18 @@ class SharedProcesses:
 
     # What happened
     def forked(self, process: str, pid: int, now_s: float) -> list[ProcessInstruction]:
-        """Take note that it runs."""
+        """Record that the process runs."""
         one = self._all[process]
         one.phase, one.pid, one.deadline_s = _Phase.STARTING, pid, now_s + SERVES_WITHIN_S
         return self.serving(process, pid, now_s) if one.serving_pid == pid else self._and_wake([])
 
     def fork_failed(self, process: str, why: str) -> list[ProcessInstruction]:
-        """Take note that there is no process."""
+        """Record that the system gave no process."""
         one = self._all.pop(process)
         return self._and_wake([MemberNotStarted(member.name, why) for member in one.members.values()])
 
     def serving(self, process: str, pid: int, now_s: float) -> list[ProcessInstruction]:
-        """Take note that it can be asked; of no meaning for others than the one that is starting."""
+        """Record that the process serves; ignored unless this pid is starting."""
         one = self._all.get(process)
         if one is None:
             return []
@@ -217,7 +216,7 @@ class SharedProcesses:
         return self._and_wake(self._admit_waiting(one, now_s))
 
     def admitted(self, life: int) -> list[ProcessInstruction]:
-        """Take note that this life has begun."""
+        """Record that the member of this life was admitted."""
         for one, member in self._everybody():
             if member.life == life and member.place is _Place.ADMITTING:
                 member.place, member.deadline_s = _Place.LIVING, NEVER_S
@@ -225,21 +224,21 @@ class SharedProcesses:
         return []
 
     def refused(self, life: int, why: str, now_s: float) -> list[ProcessInstruction]:
-        """Take note that this life was not begun."""
+        """Record that the process refused the member of this life."""
         for one, member in self._everybody():
             if member.life == life and member.place is _Place.ADMITTING:
                 return self._leaves(one, member, MemberNotStarted(member.name, why), now_s)
         return []
 
     def member_ended(self, life: int, exit_code: int, now_s: float) -> list[ProcessInstruction]:
-        """Take note that this life has ended."""
+        """Record that the member of this life has ended."""
         for one, member in self._everybody():
             if member.life == life and member.place is _Place.LIVING:
                 return self._leaves(one, member, MemberGone(member.name, exit_code, describe(exit_code)), now_s)
         return []
 
     def exited(self, pid: int, returncode: int) -> list[ProcessInstruction]:
-        """Take note that nothing is left of this process."""
+        """Record that the whole process tree has ended."""
         one = next((process for process in self._all.values() if process.pid == pid), None)
         if one is None:
             return []
@@ -255,7 +254,7 @@ class SharedProcesses:
                 told.append(MemberGone(member.name, returncode, how))
             elif was_ended:
                 left[member.name] = _Member(member.name)
-            else:  # by a signal from outside its start is begun again, by the process's own failure it is not
+            else:  # a start is repeated after an outside signal, not after a failure of the process itself
                 told.append(MemberNotStarted(member.name, how, 1 if one.failure else returncode))
         if left:
             self._all[one.name] = _Process(one.name, members=left)
@@ -263,7 +262,7 @@ class SharedProcesses:
         return self._and_wake(told)
 
     def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
-        """Take note that this process has been silent for that long: what it has to do in time counts from there."""
+        """Record the silence of this process: its deadlines count from the begin of the silence."""
         for one in self._all.values():
             if one.pid != pid:
                 continue
@@ -275,7 +274,7 @@ class SharedProcesses:
         return self._and_wake([])
 
     def woken(self, now_s: float) -> list[ProcessInstruction]:
-        """Do what is due by now."""
+        """Carry out what is due by ``now_s``."""
         told: list[ProcessInstruction] = []
         for one in list(self._all.values()):
             if one.deadline_s <= now_s:
@@ -304,7 +303,7 @@ class SharedProcesses:
     def _leaves(
         self, one: _Process, member: _Member, report: MemberGone | MemberNotStarted, now_s: float
     ) -> list[ProcessInstruction]:
-        """Report a member that left, at once while others stay, else with the process, which ends."""
+        """Report a member's end: at once while others remain, else together with the end of the process."""
         if any(other is not member and other.report is None for other in one.members.values()):
             del one.members[member.name]
             return self._and_wake([report])

@@ -1,12 +1,12 @@
-"""Silence: for how long a process has shown no sign of life, time it could not run not counted.
+"""Silence: how long a process has shown no sign of life, without the time in which it could not run.
 
-Rules of this file: pure; looks at a process go in, seconds come out. The caller owns the clock.
+Rules of this file: pure; readings of a process go in, seconds come out. The caller owns the clock.
 
 * A beat ends the silence.
 * Time in which the process waited for a processor is not silence: a starved process is late, not hung.
-* Of a gap between two looks at most ``LOOK_MOST_S`` counts: if the supervisor itself was paused, its processes
-  may have been paused with it.
-* Before a process's first beat, processor time that it uses is a sign of life too: it imports, it opens a renderer.
+* At most ``LOOK_MOST_S`` of a gap between two readings counts, because a pause of the supervisor may have paused its
+  processes too.
+* Before a process's first beat, its use of processor time is a sign of life too: it imports or opens a renderer.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from dataclasses import dataclass, field
 from backbone.component.heartbeat import Vitals
 
 LOOK_EVERY_S = 0.2  # chosen: a little more often than a process beats
-LOOK_MOST_S = 0.4  # chosen: twice the period: one look may be missed
-SHOWN_AFTER_S = 0.55  # chosen: three looks; told 0.8 s after a process stopped, with the look that saw its last beat
+LOOK_MOST_S = 0.4  # chosen: twice the period, so that one reading may be missed
+SHOWN_AFTER_S = 0.55  # chosen: three readings; reported 0.8 s after the last beat
 
 
 @dataclass
 class Silence:
-    """The silence of one process; make one when the process begins.
+    """The silence of one process, from its start on.
 
     Attributes:
         silent_s: Seconds of the machine without a sign of life.
@@ -33,10 +33,10 @@ class Silence:
     _looked_s: float = -1.0
 
     def look(self, vitals: Vitals, now_s: float) -> float:
-        """Take one look at the process and return for how long it has been silent.
+        """Add one reading of the process and return the duration of its silence.
 
         Args:
-            vitals: What the look shows.
+            vitals: The reading.
             now_s: Seconds of the machine.
         """
         last, elapsed_s = self._last, now_s - self._looked_s

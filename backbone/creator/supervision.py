@@ -1,22 +1,22 @@
-"""Supervision: what to do about each process when something happens to it.
+"""Supervision: decides starts, restarts and ends of processes.
 
-Events go in, instructions come out. The caller owns the zygote, the bus and the clock: it reports what
-happened and when, and does what it is told, in order. Times are seconds of the machine on one clock.
+Events go in, instructions come out. The caller owns the zygote, the bus and the clock: it reports each event with its
+time and carries out the instructions in order. Times are seconds of the machine on one clock.
 
 Rules:
 
-* Of one name there is never more than one process: a name is forked again only after its last process
-  was reported as ended. Which of them share one is decided in ``shared_processes``; here each is alone.
-* What is wanted is restarted however it ended, after pauses that grow; only an order to end it ends that. A policy
-  without restart leaves that to the owner. In no window of a policy are there more quick restarts than its limit.
-* A process is dead when the zygote says so, never because its liveliness token fell: when the hub
-  dies, all tokens fall and everybody lives. A token that rises means ready, nothing else.
-* Every ordered start is answered by exactly one ``ReportReady`` or ``ReportStartFailed``, every ordered
-  end by exactly one ``ReportEnded``, and only when nothing of the process is left.
-* The first start that fails by itself (an exit code above 0, silence) is not repeated: its owner decides. One that
-  was ended from outside (a signal, a stop) is begun again, whatever the policy: its owner still waits for it.
-* A ready process that is silent for longer than its policy allows hangs: it is killed, then restarted. So there is
-  never a second copy of a process that was only paused.
+* A name never has more than one process: it is forked again only after its last process was reported as ended.
+  ``shared_processes`` decides about shared processes; here each component has a process of its own.
+* A wanted component is restarted however it ended, after growing pauses, until an order ends it. If its policy is
+  without restart, its owner asks for a new start. No window of a policy has more quick restarts than its limit.
+* Only the zygote's report means that a process is dead. A fallen liveliness token does not, because all tokens fall
+  when the hub dies while all components live. A risen token means ready, nothing else.
+* Each ordered start gets exactly one ``ReportReady`` or ``ReportStartFailed``; each ordered end gets exactly one
+  ``ReportEnded``, after the whole process tree has ended.
+* A first start that fails by itself (an exit code above 0, silence) is not repeated, because its owner decides. A
+  first start that ends from outside (a signal, a stop) is repeated under any policy, because its owner still waits.
+* A ready process that is silent for longer than its policy allows hangs. It is killed before it is restarted, so a
+  process that was only paused never gets a second copy.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ from backbone.creator.decisions import (
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHere, RestartPolicy
 from backbone.creator.silence import SHOWN_AFTER_S
 
-TERM_S = 0.5  # chosen: like EndProcess.term_s, for processes nobody ordered the end of
+TERM_S = 0.5  # chosen: like EndProcess.term_s, for ends without an order
 LEAVE_S = 0.15  # chosen: from leaving the bus to the end of a process takes 10 ms, on a busy machine ten times that
 NEVER_S = math.inf
 
 
 class Phase(StrEnum):
-    """Where a supervised process is."""
+    """Phase of a supervised process."""
 
     FORKING = "forking"  # ordered from the zygote, no pid yet
     STARTING = "starting"  # runs, its token has not risen since
@@ -66,8 +66,8 @@ class _End:
 
     Attributes:
         ordered: False if it is ended because it did not become ready.
-        stage: What was done to it last.
-        not_heard: Nobody answered when it was asked: it may be on its way out by itself.
+        stage: The last step.
+        not_heard: True if the request to stop got no answer: the process may be ending by itself.
     """
 
     ask_s: float
@@ -79,19 +79,19 @@ class _End:
 
 @dataclass
 class Supervised:
-    """One name under supervision; only ``Supervision`` changes it.
+    """One supervised component; only ``Supervision`` changes it.
 
     Attributes:
         name: The component.
-        policy: What to do when it ends unexpectedly.
+        policy: Restart policy.
         ready_within_s: Silence after which a start has failed.
-        asked_by_signal: True for a hub: asking over the bus it carries would cut the answer off.
-        phase: Where it is.
+        asked_by_signal: True for a hub, because its own end would cut off its answer on the bus.
+        phase: Its phase.
         pid: Its process, 0 while there is none.
-        restarts: How often it was restarted.
-        last_end: How it ended last, for people; empty if it never did.
-        silent_s: For how long a ready process has shown no sign of life.
-        absent_since_s: When it ended or fell silent; negative while it is ready and responds.
+        restarts: Number of its restarts.
+        last_end: How it last ended, for people; empty if it never ended.
+        silent_s: Duration of a ready process's silence.
+        absent_since_s: Time of its end or of the begin of its silence; negative while it is ready and responds.
     """
 
     name: str
@@ -125,7 +125,7 @@ class Supervision:
         return iter(self._all.values())
 
     def find(self, name: str) -> Supervised | None:
-        """Return what is known of this name, None if it is not supervised."""
+        """Return the component of this name, None if it is not supervised."""
         return self._all.get(name)
 
     # Orders
@@ -141,7 +141,7 @@ class Supervision:
         """Begin to supervise a new process.
 
         Raises:
-            AlreadyHere: One of this name is supervised.
+            AlreadyHere: A component of this name is supervised.
         """
         old = self._all.get(name)
         if old is not None:
@@ -150,10 +150,10 @@ class Supervision:
         return self._and_wake(self._fork(one, now_s))
 
     def end_ordered(self, name: str, ask_s: float, term_s: float, now_s: float) -> list[Instruction]:
-        """Begin to end a process, or hurry with it: a second order can only shorten the times of the first.
+        """Begin to end a process. A second order can only shorten the times of the first.
 
         Raises:
-            NotHere: Nothing of this name is supervised.
+            NotHere: No component of this name is supervised.
         """
         one = self._all.get(name)
         if one is None:
@@ -179,7 +179,7 @@ class Supervision:
 
     # What happened
     def forked(self, name: str, pid: int, now_s: float) -> list[Instruction]:
-        """Take note that it runs."""
+        """Record that the process runs."""
         one = self._all[name]
         one.pid = pid
         if one.end is not None:
@@ -188,12 +188,12 @@ class Supervision:
         return self._and_wake(self._become_ready(one) if one.token_rose else [])
 
     def fork_failed(self, name: str, why: str, now_s: float, returncode: int = 1) -> list[Instruction]:
-        """Take note that there is no process: there could be none, or the one it was to share ended with this code."""
+        """Record a failed fork: the system gave no process, or the shared process ended with this code."""
         one = self._all[name]
         return self._and_wake(self._gone(one, one.failure or why, returncode, now_s))
 
     def ready(self, name: str) -> list[Instruction]:
-        """Take note that its liveliness token rose; of no meaning for names that are not starting."""
+        """Record that the liveliness token has risen; ignored unless the component is starting."""
         one = self._all.get(name)
         if one is None or one.end is not None:
             return []
@@ -203,10 +203,10 @@ class Supervision:
         return []
 
     def exited(self, pid: int, returncode: int, now_s: float) -> list[Instruction]:
-        """Take note that nothing is left of this process.
+        """Record that the whole process tree has ended.
 
         Args:
-            pid: Of a process nobody shares.
+            pid: Pid of a process that is not shared.
             returncode: Exit code, or the number of the signal that killed it, negative.
         """
         one = next((each for each in self if each.pid == pid), None)
@@ -215,17 +215,17 @@ class Supervision:
         return self._and_wake(self._gone(one, one.failure or describe(returncode), returncode, now_s))
 
     def left(self, name: str, returncode: int, how: str, now_s: float) -> list[Instruction]:
-        """Take note that nothing is left of this component, which shared its process.
+        """Record the end of a member of a shared process.
 
         Args:
-            returncode: What a process of its own would have ended with.
-            how: For people.
+            returncode: Return code that a process of its own would have had.
+            how: How it ended, for people.
         """
         one = self._all[name]
         return self._and_wake(self._gone(one, one.failure or how, returncode, now_s))
 
     def ask_failed(self, name: str, now_s: float) -> list[Instruction]:
-        """Take note that it could not be asked to stop; it gets SIGTERM unless it is just about to leave."""
+        """Record that the request to stop got no answer; SIGTERM follows unless the process is just ending."""
         one = self._all.get(name)
         if one is None or one.end is None or one.end.stage is not EndedBy.ASKING:
             return []
@@ -233,7 +233,7 @@ class Supervision:
         return self._and_wake([])
 
     def observed(self, name: str, silent_s: float, now_s: float) -> list[Instruction]:
-        """Take note that its process has been silent for that long; of no meaning for names without a process."""
+        """Record the silence of its process; ignored for a component without a process."""
         one = self._all.get(name)
         if one is None or one.end is not None:
             return []
@@ -255,11 +255,11 @@ class Supervision:
         return self._and_wake(told)
 
     def absences(self, now_s: float) -> list[Absence]:
-        """Return what is wanted and does not run or respond; times are seconds of the machine."""
+        """Return the components that do not run or respond; times are seconds of the machine."""
         return [_absence(one, now_s) for one in self if one.absent_since_s >= 0 and not _is_ended_on_order(one)]
 
     def woken(self, now_s: float) -> list[Instruction]:
-        """Do what is due by now."""
+        """Carry out what is due by ``now_s``."""
         instructions: list[Instruction] = []
         for one in list(self):
             if one.deadline_s <= now_s:
@@ -275,7 +275,7 @@ class Supervision:
                 return self._fork(one, now_s)
             case _ if one.end is not None:
                 return _next_stage(one, one.end, now_s)
-            case Phase.FORKING:  # the zygote hangs: it may still obey, then the process is ended at once
+            case Phase.FORKING:  # the zygote hangs; if it forks later, the process is ended at once
                 one.end = self._fail(one)
                 if one.start_answered:
                     return []
@@ -301,7 +301,7 @@ class Supervision:
         return [ReportReady(one.name, one.pid)]
 
     def _gone(self, one: Supervised, how: str, returncode: int, now_s: float) -> list[Instruction]:
-        """Decide what follows from the end of its process."""
+        """Decide what follows the end of the process."""
         one.pid, one.last_end, one.last_code, one.deadline_s, one.silent_s = 0, how, returncode, NEVER_S, 0.0
         was_answered, is_ordered = one.start_answered, one.end is not None and one.end.ordered
         came_from_outside = returncode <= 0 and one.end is None and not one.is_abandoned
@@ -361,7 +361,7 @@ def _absence(one: Supervised, now_s: float) -> Absence:
 
 
 def _next_stage(one: Supervised, end: _End, now_s: float) -> list[Instruction]:
-    """Ask, then SIGTERM, then SIGKILL. What is not ready cannot be asked."""
+    """Ask, then SIGTERM, then SIGKILL. A process that is not ready cannot be asked."""
     was_ready, one.phase = one.phase is Phase.READY, Phase.ENDING
     match end.stage:
         case EndedBy.ITSELF if was_ready:
@@ -378,7 +378,7 @@ def _next_stage(one: Supervised, end: _End, now_s: float) -> list[Instruction]:
 
 
 def _by(end: _End, returncode: int) -> EndedBy:
-    """Return what it took. Who was not asked in truth, or dies otherwise than in good order, ended by itself."""
+    """Return the step that ended the process; ``ITSELF`` if it got no request or did not end by the request."""
     if end.stage is EndedBy.ASKING and (end.not_heard or returncode != 0):
         return EndedBy.ITSELF
     return end.stage

@@ -1,9 +1,8 @@
-"""A process's handle on its zygote: order components, hear of their ends, send them signals.
+"""Zygote handle: a process orders components from its zygote, learns their ends, and sends them signals.
 
-There are two ways to get one. ``fork_now`` copies the present process, which must not have opened a
-bus yet; it takes about a millisecond and is a creator's way (``Component.before_bus``). ``spawn_fresh``
-starts an interpreter and is the launcher's. A zygote that was killed is replaced, at the next order, by
-a fresh one; everything it had forked died with it and is told as killed.
+Creators use ``fork_now``, in ``Component.before_bus``. It copies the present process, which must not have opened a bus
+yet, in about a millisecond. The launcher uses ``spawn_fresh``, which starts an interpreter. After a zygote was killed,
+the next order spawns a fresh one; all components of the killed zygote died with it and are reported as killed.
 """
 
 from __future__ import annotations
@@ -41,21 +40,21 @@ from backbone.errors import BackboneError
 
 log = logging.getLogger(__name__)
 
-FORK_TRIES = 2  # chosen: a zygote killed while it forks is replaced once; twice in a row is no accident
+FORK_TRIES = 2  # chosen: a zygote killed while it forks is replaced once; a second time is no accident
 _answer_decoder = msgspec.msgpack.Decoder(Answer)
 
 
 class NoProcess(BackboneError):
-    """No process could be had: the system refused one, or the zygote was killed again and again."""
+    """The component got no process: the system refused one, or the zygote was killed repeatedly."""
 
 
 class Zygote:
     """A zygote that serves this process. Use it inside one event loop.
 
     Attributes:
-        on_exit: Called with pid and returncode (a signal's number is negative) when nothing is left of a
-            component; never before ``fork`` returned its pid.
-        on_lost: Called when the zygote itself died unexpectedly, before the ends of its components are told.
+        on_exit: Called with pid and returncode (a signal's number is negative) when a component's whole process tree
+            has ended; never before ``fork`` returned its pid.
+        on_lost: Called when the zygote died unexpectedly, before the ends of its components are reported.
     """
 
     def __init__(self, body: _Body, settings: ZygoteSettings) -> None:
@@ -70,7 +69,7 @@ class Zygote:
 
     @classmethod
     def fork_now(cls, *, preload: Iterable[str] = ()) -> Zygote:
-        """Return a zygote forked from this process as it is.
+        """Return a zygote forked from this process.
 
         Not: after any bus was open in this process, or while other threads run in it.
 
@@ -91,7 +90,7 @@ class Zygote:
         """Return a zygote in an interpreter of its own, which may still be importing.
 
         Args:
-            run_directory: Folder the zygote removes at its end, also when this process is killed; empty: none.
+            run_directory: Folder that the zygote removes at its end, also when this process is killed; empty: none.
             preload: Modules the zygote imports before the first order.
         """
         if run_directory:
@@ -101,14 +100,14 @@ class Zygote:
 
     @property
     def pid(self) -> int:
-        """The zygote's process."""
+        """Pid of the zygote."""
         return self._body.pid
 
     async def fork(self, launch: Launch) -> int:
-        """Have the component running and return its pid.
+        """Start the component and return its pid.
 
         Raises:
-            NoProcess: There is none, and there will be none by this order.
+            NoProcess: The system gave no process, or the zygote was killed repeatedly.
         """
         for _ in range(FORK_TRIES):
             body = await self._living_body()
@@ -122,13 +121,13 @@ class Zygote:
         raise NoProcess(f"the zygote was killed {FORK_TRIES} times while it forked {launch.name}")
 
     def kill(self, pid: int, number: signal.Signals) -> None:
-        """Send the signal to everything that belongs to the component; nothing if it has ended."""
+        """Send the signal to the component's process tree, unless the component has ended."""
         self._body.send(Kill(pid, number))
 
     def keep_running(self) -> str:
-        """Continue the zygote if it was stopped, which serves no purpose; return what is wrong, empty: nothing.
+        """Continue the zygote if it was stopped; return what was wrong, empty: nothing.
 
-        A stopped zygote starts nothing and reports no end, but everything it forked goes on.
+        A stopped zygote forks no component and reports no end, but its components continue.
         """
         if not process_table.is_stopped(self._body.pid):
             return ""
@@ -137,7 +136,7 @@ class Zygote:
         return "the zygote was stopped"
 
     async def close(self) -> None:
-        """End the zygote and everything it forked; when this returns, nothing of it is left. Idempotent."""
+        """End the zygote and all its components; return when they have ended. Idempotent."""
         self._is_closing = True
         async with self._renewing:
             self._body.hang_up()
@@ -158,7 +157,7 @@ class Zygote:
             return self._body
 
     async def _read(self, body: _Body) -> None:
-        """Pass on what the zygote tells until it ends."""
+        """Handle the zygote's messages until it ends."""
         reader = await body.connect()
         while (answer := await _receive(reader)) is not None:
             match answer:
@@ -179,9 +178,9 @@ class Zygote:
             _settle(body.pending.popleft(), _Lost())
 
     async def _end_rest(self) -> None:
-        """See to it that what a zygote left is gone, and tell of it.
+        """Kill the remains of a dead zygote and report the ends of its components.
 
-        The components die with their zygote; what they started themselves is swept here.
+        The components die with their zygote; this method kills their children.
         """
         lost, self._live = sorted(self._live), set()
         process_table.send(lost, signal.SIGKILL)
@@ -200,7 +199,7 @@ class Zygote:
             self._tell_exit(pid, -signal.SIGKILL)
 
     def _tell_exit(self, pid: int, returncode: int) -> None:
-        # Later, because whoever awaits ``fork`` learns the pid only in the next round of the loop.
+        # Later, because a task that awaits ``fork`` gets the pid only in the next iteration of the loop.
         asyncio.get_running_loop().call_soon(lambda: self.on_exit(pid, returncode))
 
 
@@ -220,7 +219,7 @@ class _Body:
         self._is_reaped = False
 
     async def connect(self) -> asyncio.StreamReader:
-        """Send what was said so far and return where the answers come."""
+        """Send the buffered orders and return the reader of the answers."""
         reader, self._writer = await asyncio.open_unix_connection(sock=self._channel)
         self._writer.write(bytes(self._unsent))
         self._unsent.clear()
@@ -233,14 +232,14 @@ class _Body:
             self._writer.write(frame(order))
 
     def hang_up(self) -> None:
-        """Tell the zygote to end; its last answers can still be read."""
+        """Order the zygote to end; its last answers can still be read."""
         if self._writer is None:
             self._channel.close()
         elif self._writer.can_write_eof() and not self._writer.is_closing():
             self._writer.write_eof()
 
     async def wait_gone(self) -> None:
-        """Return when the zygote has ended and was reaped."""
+        """Return when the zygote has ended and is reaped."""
         if not self._is_reaped:
             await process_table.wait_gone([self.pid])
             self._is_reaped = True
@@ -280,12 +279,12 @@ def _spawn(settings: ZygoteSettings) -> _Body:
 
 
 def _fresh(settings: ZygoteSettings) -> ZygoteSettings:
-    """Return the settings for a fresh interpreter in place of whatever kind of zygote there was."""
+    """Return the settings for a fresh interpreter that replaces a zygote of either kind."""
     return msgspec.structs.replace(settings, import_path=tuple(sys.path))
 
 
 def _settle(answered: asyncio.Future[int], outcome: int | Exception) -> None:
-    if answered.done():  # whoever ordered it was cancelled
+    if answered.done():  # the ordering task was cancelled
         return
     if isinstance(outcome, Exception):
         answered.set_exception(outcome)

@@ -1,15 +1,15 @@
-"""The zygote: a process that has imported what components need and forks one component per order.
+"""The zygote: a process that has imported the modules of components and forks one component per order.
 
-It never opens a bus, because a process that once did cannot fork components (the bus's threads are
-gone in the child), and it has one thread and no event loop, because a child inherits what they held.
+It never opens a bus, because the threads of a bus do not exist in a forked child. It has one thread and no event loop,
+because a child inherits their locks and descriptors.
 
-What holds, whatever is killed:
+Rules, for any killed process:
 
 * A component dies with its zygote (the kernel's parent-death signal).
-* The end of a component is told only when nothing of it is left: its session is swept, and a zygote
-  it had of its own (a creator's) has ended its children first.
-* When the zygote's parent is gone, by whatever cause, everything the zygote forked is told to end,
-  then killed, descendants included, and the mission's folder goes too. Then the zygote ends.
+* The end of a component is reported after the end of its whole process tree: its session is killed, and a zygote of
+  its own (a creator's) has ended its children before.
+* When the zygote's parent has ended, for any reason, the zygote sends SIGTERM, then SIGKILL, to all its components
+  and their descendants, removes the mission's folder, and ends.
 """
 
 from __future__ import annotations
@@ -45,40 +45,40 @@ from backbone.wire import Message
 
 log = logging.getLogger(__name__)
 
-GRACE_S = 0.8  # chosen: two zygotes, one below the other, end everything within 2 s, the promise is 3 s
+GRACE_S = 0.8  # chosen: two zygotes, one below the other, end everything within 2 s; the guarantee is 3 s
 ZYGOTE_GRACE_S = 1.2  # chosen: a zygote below this one needs GRACE_S and a moment to reap
 LENGTH = struct.Struct("!I")
 _LEFT_TO_THE_PARENT = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
-"""Whoever sends these to all processes of a terminal or service sends them to the parent too, and that ends us."""
+"""A terminal or service manager sends these signals to the parent too, and the parent's end ends the zygote."""
 
 
 class Fork(Message, frozen=True):
-    """Become this component. Answered by ``Forked`` or ``ForkFailed``, in the order of asking."""
+    """Fork this component. Answered by ``Forked`` or ``ForkFailed``, in the order of the requests."""
 
     launch: Launch
 
 
 class Kill(Message, frozen=True):
-    """Send the signal to everything that belongs to the component."""
+    """Send the signal to the component's process tree."""
 
     pid: Pid
     number: Signal
 
 
 class Forked(Message, frozen=True):
-    """It runs under this pid."""
+    """The component runs under this pid."""
 
     pid: Pid
 
 
 class ForkFailed(Message, frozen=True):
-    """The system did not give another process."""
+    """The system refused another process."""
 
     why: Text
 
 
 class Exited(Message, frozen=True):
-    """Nothing is left of the component.
+    """The component's whole process tree has ended.
 
     Attributes:
         pid: Its process.
@@ -90,11 +90,11 @@ class Exited(Message, frozen=True):
 
 
 class ZygoteSettings(msgspec.Struct, frozen=True):
-    """What a zygote is told at its start.
+    """Settings of a zygote, given at its start.
 
     Attributes:
         parent: Pid of the process it serves.
-        run_directory: Folder it removes at its end; empty: none.
+        run_directory: Folder that it removes at its end; empty: none.
         preload: Modules imported before the first order.
         import_path: ``sys.path`` of the components.
     """
@@ -113,13 +113,13 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def frame(message: Message) -> bytes:
-    """Return the message with its length in front."""
+    """Return the encoded message after its length."""
     body = _encode(message)
     return LENGTH.pack(len(body)) + body
 
 
 def serve(channel: socket.socket, settings: ZygoteSettings) -> NoReturn:
-    """Be the zygote of ``settings.parent``, which holds the other end of the channel, then end the process."""
+    """Run the zygote of ``settings.parent``, which holds the other end of the channel, then end the process."""
     code = EXIT_BUG
     try:
         _ZygoteProcess(channel, settings).run()
@@ -129,11 +129,11 @@ def serve(channel: socket.socket, settings: ZygoteSettings) -> NoReturn:
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(code)  # no cleaning up of what was inherited from the parent
+        os._exit(code)  # no cleanup of objects inherited from the parent
 
 
 def main() -> NoReturn:
-    """Be the zygote in a fresh interpreter: arguments are the channel's descriptor and the settings."""
+    """Run the zygote in a fresh interpreter: arguments are the channel's descriptor and the settings."""
     share_heaps()
     settings = msgspec.json.decode(sys.argv[2], type=ZygoteSettings)
     serve(socket.socket(fileno=int(sys.argv[1])), settings)
@@ -147,10 +147,10 @@ def fresh_interpreter(descriptor: int, settings: ZygoteSettings) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class _Sweep:
-    """A component that has ended and of which something may be left.
+    """A component that has ended, and whose children may still run.
 
     Attributes:
-        zygotes_until_s: Until when zygotes it had may end by themselves; None: they were killed.
+        zygotes_until_s: Time until which its zygotes may end by themselves; None: they were killed.
     """
 
     returncode: int
@@ -183,7 +183,7 @@ class _ZygoteProcess:
 
     def _prepare(self) -> None:
         if os.getsid(0) != self._own_pid:
-            os.setsid()  # Ctrl-C at a terminal is for the launcher; it tells us
+            os.setsid()  # Ctrl-C at a terminal is for the launcher, which then ends the zygote
         process_table.adopt_orphans()
         process_table.set_title(process_table.zygote_title(self._settings.parent))
         self._signals.setblocking(False)
@@ -194,11 +194,11 @@ class _ZygoteProcess:
             signal.signal(number, signal.SIG_IGN)
         if self._settings.import_path:
             sys.path[:] = self._settings.import_path
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a second thread must not be there at a fork
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a process that forks must have one thread
         for module in self._settings.preload:
             self._preload(module)
         gc.collect()
-        gc.freeze()  # the collector would write into pages the components share
+        gc.freeze()  # the collector would write into pages that the components share
         self._channel.setblocking(False)
         self._selector.register(self._channel, selectors.EVENT_READ)
         self._selector.register(self._signals, selectors.EVENT_READ)
@@ -206,14 +206,14 @@ class _ZygoteProcess:
     def _preload(self, module: str) -> None:
         try:
             importlib.import_module(module)
-        except Exception as error:  # the component that needs it will say so itself
+        except Exception as error:  # a component that needs the module reports it
             log.warning("%s is not preloaded: %r", module, error)
         if process_table.threads() > 1:
             log.warning("%s starts threads when it is imported, and a process with threads cannot fork", module)
             self._begin_anew_without(module)
 
     def _begin_anew_without(self, module: str) -> NoReturn:
-        """Go on as a fresh interpreter that has not imported the module; orders that wait are still to be read."""
+        """Continue as a fresh interpreter without the module; pending orders stay in the channel."""
         settings = msgspec.structs.replace(
             self._settings,
             preload=tuple(other for other in self._settings.preload if other != module),
@@ -249,7 +249,7 @@ class _ZygoteProcess:
             case Fork(launch=launch):
                 self._tell(self._fork(launch))
             case Kill(pid=pid, number=number):
-                if pid in self._live:  # else it was reaped, and the pid may be another's by now
+                if pid in self._live:  # else it was reaped, and another process may have the pid
                     process_table.send(process_table.tree(process_table.read_table(), pid), signal.Signals(number))
             case _:
                 assert_never(order)
@@ -278,7 +278,7 @@ class _ZygoteProcess:
         try:
             os.setsid()
             process_table.die_with_parent()
-            if os.getppid() != self._own_pid:  # it died before it could be tied to our life
+            if os.getppid() != self._own_pid:  # the zygote died before the child was tied to it
                 os._exit(EXIT_BUG)
             signal.set_wakeup_fd(-1)
             for number in (signal.SIGCHLD, *_LEFT_TO_THE_PARENT):
@@ -300,7 +300,7 @@ class _ZygoteProcess:
 
     # Ends
     def _reap(self) -> bool:
-        """Take note of every child that ended; say whether there are children left."""
+        """Record every child that has ended; return whether children are left."""
         while True:
             try:
                 pid, status = os.waitpid(-1, os.WNOHANG)
@@ -314,9 +314,9 @@ class _ZygoteProcess:
                 self._sweeps[pid] = _Sweep(returncode, time.monotonic() + ZYGOTE_GRACE_S)
 
     def _sweep(self) -> None:
-        """Kill what dead components left, and tell of the end of those of which nothing is left.
+        """Kill the children of dead components, and report a component when its process tree has ended.
 
-        Whatever is left is our child, or becomes it when its own parent ends, so each end wakes us.
+        Each remaining process is a child of the zygote or becomes one when its parent ends, so each end wakes it.
         """
         if not self._sweeps:
             return
@@ -333,9 +333,9 @@ class _ZygoteProcess:
                 self._tell(Exited(pid, sweep.returncode))
 
     def _end_all(self) -> None:
-        """End everything that descends from this process: SIGTERM, a moment, SIGKILL."""
+        """End all descendants of this process: SIGTERM, a moment, SIGKILL."""
         removed = self._hide_run_directory()
-        self._selector.unregister(self._channel)  # its end would be reported for ever
+        self._selector.unregister(self._channel)  # else the selector reports its end for ever
         now_s = time.monotonic()
         kill_at_s, kill_zygotes_at_s = now_s + GRACE_S, now_s + GRACE_S + ZYGOTE_GRACE_S
         table = process_table.read_table()
@@ -357,7 +357,7 @@ class _ZygoteProcess:
             shutil.rmtree(removed, ignore_errors=True)
 
     def _hide_run_directory(self) -> Path | None:
-        """Move the folder away, so that the same mission can come up anew while this one's rest is ended."""
+        """Rename the folder, so that the mission can come up again while its old processes are being ended."""
         if not self._settings.run_directory:
             return None
         directory = Path(self._settings.run_directory)
@@ -370,4 +370,4 @@ class _ZygoteProcess:
 
 
 def _only_wake(_number: int, _frame: object) -> None:
-    """Let the wakeup descriptor do the work; a handler must exist for it to be written."""
+    """Do nothing: without a handler the wakeup descriptor is not written."""

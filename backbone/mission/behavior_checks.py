@@ -6,7 +6,7 @@ from backbone.component_database.messages import Multiplicity
 from backbone.mission.behavior_orders import TREE_PARAMETERS
 from backbone.mission.document import Element
 from backbone.mission.parameter_checks import check_class_parameters
-from backbone.mission.report import Report, told_names
+from backbone.mission.report import Report, listed
 from backbone.mission.tables import Tables, check_parameters, check_unique, is_known
 from backbone.naming import Subsystem
 
@@ -23,7 +23,7 @@ def check_behaviors(tables: Tables, report: Report) -> None:
             report.fault(
                 behavior.place_of("type"),
                 f"type {kind} is no behavior",
-                f"Behaviors are types of subsystem mission_control: {told_names(behavior_types) or 'there is none'}",
+                f"Behaviors are types of subsystem mission_control: {listed(behavior_types) or 'there is none'}",
             )
         elif is_known(behavior, "type", "type of behavior", behavior_types, report):
             _check_multiplicity(behavior, "type", tables, of_one, report)
@@ -86,7 +86,7 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
                 report.fault(
                     wish.place_of("type"),
                     f"an ARC of kind {kind} has no {wanted}{report.hint(wanted, needs)}",
-                    f"It needs: {told_names(needs)}",
+                    f"It needs: {listed(needs)}",
                 )
             continue
         there = tables.resources_of(wanted)
@@ -104,8 +104,8 @@ def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
             hints = "".join(report.hint(feature, known) for feature in features if feature not in known)
             report.fault(
                 wish.place_of("features"),
-                f"{name or f'no {wanted}'} {'lacks' if name else 'has'} {told_names(features)}{hints}",
-                f"There is: {told_names(known) or 'no feature at all'}",
+                f"{name or f'no {wanted}'} {'lacks' if name else 'has'} {listed(features)}{hints}",
+                f"There is: {listed(known) or 'no feature at all'}",
             )
     for needed in needs:
         if not tables.resources_of(needed) and tables.is_resource_type(needed):
@@ -139,13 +139,13 @@ def _check_set(behavior: Element, arc: Element, tables: Tables, sets: _Sets, rep
         report.fault(
             arc.place_of("period-s"),
             f"{behavior.text('name')} alone asks for {demand:.0%} of a {needed}; "
-            f"{told_names([resource.text('name') for resource in roles[needed]])} can give {best:.0%}",
+            f"{listed([resource.text('name') for resource in roles[needed]])} can give {best:.0%}",
             "Write a longer period-s or a shorter packet-time-s, or raise the capacity",
         )
     if not tight and not sets.any_fits(list(enough.values())):
         report.fault(
             arc.place_of("kind"),
-            f"no {told_names(needs)} that {behavior.text('name')} may have can be used together",
+            f"no {listed(needs)} that {behavior.text('name')} may have can be used together",
             "Look at the <uses> of these resources, or wish for others",
         )
 

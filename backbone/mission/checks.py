@@ -25,7 +25,7 @@ from backbone.mission.parameter_checks import (
     check_type_class,
 )
 from backbone.mission.process_checks import check_processes
-from backbone.mission.report import Place, Report, told, told_names
+from backbone.mission.report import Place, Report, listed, quoted
 from backbone.mission.tables import (
     CORE_SERVICES,
     NETWORK_ID,
@@ -75,16 +75,16 @@ def _check_hosts(tables: Tables, report: Report) -> None:
     for host in hosts:
         address = host.text("address")
         if (re.fullmatch(r"[0-9.]+", address) or ":" in address) and not _is_ip(address):
-            report.fault(host.place_of("address"), f"{told(address)} is no IP address", "Write it like 192.0.2.7")
+            report.fault(host.place_of("address"), f"{quoted(address)} is no IP address", "Write it like 192.0.2.7")
         name = creator_name(host.text("name"))
         if is_legal(host.text("name")) and not is_legal(name):
             report.fault(
                 host.place_of("name"), "the name is too long for a creator's", f"{name} must fit {MAX_NAME_LENGTH}"
             )
-    _check_door(hosts, report)
+    _check_hub_endpoint(hosts, report)
 
 
-def _check_door(hosts: list[Element], report: Report) -> None:
+def _check_hub_endpoint(hosts: list[Element], report: Report) -> None:
     """Report a first host that other machines cannot reach, and ports of hosts that run no hub."""
     for host in hosts[1:]:
         if host.has("port"):
@@ -97,7 +97,7 @@ def _check_door(hosts: list[Element], report: Report) -> None:
     if others and is_loopback(hosts[0].text("address")):
         report.fault(
             hosts[0].place_of("address"),
-            f"no other machine reaches {told(hosts[0].text('address'))}, and {told_names(others)} must",
+            f"no other machine reaches {quoted(hosts[0].text('address'))}, and {listed(others)} must",
             f"Write the address at which they reach {hosts[0].text('name')}",
         )
 
@@ -188,8 +188,8 @@ def _check_needs(component_type: Element, tables: Tables, report: Report) -> Non
         if used not in known and is_legal(used):
             report.fault(
                 component_type.place_of("uses"),
-                f"no type of resource is named {told(used)}{report.hint(used, known)}",
-                f"There is: {told_names(known)}",
+                f"no type of resource is named {quoted(used)}{report.hint(used, known)}",
+                f"There is: {listed(known)}",
             )
     if component_type.words("uses") and not tables.is_resource_type(component_type.text("name")):
         report.fault(
@@ -237,7 +237,7 @@ def _check_resources(tables: Tables, report: Report) -> None:
                 resource.place_of("type"),
                 f"type {kind} runs no hardware",
                 f"Types of resource are those of subsystem resource_pool without <needs>: "
-                f"{told_names(tables.resource_types()) or 'there is none'}",
+                f"{listed(tables.resource_types()) or 'there is none'}",
             )
         elif kind not in tables.types:
             is_known(resource, "type", "type of resource", tables.resource_types(), report)
@@ -277,7 +277,7 @@ def _check_uses(resource: Element, tables: Tables, report: Report) -> None:
             report.fault(
                 used.place_of("name"),
                 f"{name} is a {tables.resources[name].text('type')}, no {kind}",
-                f"Write its type, or name one of these: {told_names(of_kind) or 'there is none'}",
+                f"Write its type, or name one of these: {listed(of_kind) or 'there is none'}",
             )
         elif is_known(used, "name", kind if type_fits else "resource", of_kind, report) and name == resource.text(
             "name"
@@ -287,7 +287,7 @@ def _check_uses(resource: Element, tables: Tables, report: Report) -> None:
     component_type = tables.types.get(resource.text("type"))
     for kind in [] if component_type is None else dict.fromkeys(component_type.words("uses")):
         if kind not in used_kinds and tables.is_resource_type(kind):
-            there = told_names([other.text("name") for other in tables.resources_of(kind)])
+            there = listed([other.text("name") for other in tables.resources_of(kind)])
             report.fault(
                 resource.place,
                 f"{resource.text('type')} {resource.text('name')} is on no {kind}",
@@ -310,7 +310,7 @@ def _check_driver(resource: Element, tables: Tables, report: Report) -> None:
         if given.text("name") == WORLD and given.text("value") != name and is_legal(name):
             report.fault(
                 given.place_of("value"),
-                f"no world is named {told(given.text('value'))}{report.hint(given.text('value'), [name])}",
+                f"no world is named {quoted(given.text('value'))}{report.hint(given.text('value'), [name])}",
                 f"Write {name}, or leave the parameter out",
             )
 
@@ -323,7 +323,7 @@ def _check_network_id(resource: Element, ids: dict[int, Element], report: Report
         if isinstance(value, bool) or not isinstance(value, int) or not FIRST_NETWORK_ID <= value <= LAST_NETWORK_ID:
             report.fault(
                 given.place_of("value"),
-                f"network id {told(given.text('value'))} of {resource.text('name')} is illegal",
+                f"network id {quoted(given.text('value'))} of {resource.text('name')} is illegal",
                 f"Write a whole number from {FIRST_NETWORK_ID} to {LAST_NETWORK_ID}",
             )
             return
@@ -348,14 +348,14 @@ def _check_component_names(tables: Tables, report: Report) -> None:
                 report.fault(place, f"the ARC's name, {name}, is too long", "Shorten the behavior's name")
             continue
         if name in reserved:
-            report.fault(place, f"the {what} has the name {told(name)} of a core service", "Choose another name")
+            report.fault(place, f"the {what} has the name {quoted(name)} of a core service", "Choose another name")
             continue
         before, there = first.setdefault(name, (what, place))
         if there != place:
             told_twice = (
-                f"a second {what} {told(name)}; the first is in line {there.line}"
+                f"a second {what} {quoted(name)}; the first is in line {there.line}"
                 if what == before
-                else f"the {what} has the name {told(name)} of the {before} in line {there.line}"
+                else f"the {what} has the name {quoted(name)} of the {before} in line {there.line}"
             )
             report.fault(place, told_twice, "Give each component of the mission its own name")
 

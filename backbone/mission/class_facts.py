@@ -66,7 +66,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
         return "; ".join(part for part in (self.doc.rstrip("."), self.legal_values) if part)
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """Type, range and default on one line."""
         return ", ".join([self.type, *self._span, f"default {self.default}" if self.default else "required"])
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 from xml.parsers import expat
 
 from backbone.mission.declaration.values import decimal, flag
-from backbone.mission.report import Place, Report, told
+from backbone.mission.report import Place, Report, quoted
 
 MAX_BYTES = 1024 * 1024  # chosen: a robot with its behavior is 600 bytes, so this is more than a thousand robots
 MAX_ELEMENTS = 20_000  # chosen: same; a robot with its behavior is 10 elements
@@ -296,5 +296,5 @@ class _Parse:
         blanks = len(text) - len(text.lstrip())
         place = Place(self._here().line, self._here().column + blanks)
         self._report.fault(
-            place, f"text {told(text.strip())} between elements", "Remove it, or make it a <!-- comment -->."
+            place, f"text {quoted(text.strip())} between elements", "Remove it, or make it a <!-- comment -->."
         )

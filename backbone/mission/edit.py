@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.document import MAX_BYTES, attribute_spans, parse
 from backbone.mission.outline import EditRefused, Node, Path, outline
-from backbone.mission.report import Report, told, told_names
+from backbone.mission.report import Report, listed, quoted
 
 __all__ = [
     "EditRefused",
@@ -179,9 +179,9 @@ def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
 def _may_have(tag: str, name: str) -> None:
     rule = vocabulary().get(tag)
     if rule is None or name not in rule.attributes:
-        known = told_names(rule.attributes) if rule is not None else ""
+        known = listed(rule.attributes) if rule is not None else ""
         raise EditRefused(
-            f"<{tag}> has no attribute {told(name)}", remedy=f"Its attributes: {known}" if known else "It has none."
+            f"<{tag}> has no attribute {quoted(name)}", remedy=f"Its attributes: {known}" if known else "It has none."
         )
 
 
@@ -189,7 +189,7 @@ def _may_hold(node: Node, tag: str) -> None:
     rule = vocabulary().get(node.tag)
     allowed = {} if rule is None else rule.children
     if tag not in allowed:
-        there = told_names([f"<{one}>" for one in allowed])
+        there = listed([f"<{one}>" for one in allowed])
         raise EditRefused(
             f"<{tag}> does not belong in <{node.tag}>",
             remedy=f"In <{node.tag}> may stand: {there}" if there else f"<{node.tag}> has no elements inside.",

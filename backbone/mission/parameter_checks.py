@@ -12,7 +12,7 @@ from collections.abc import Collection, Sequence
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
-from backbone.mission.report import Report, told, told_names
+from backbone.mission.report import Report, listed, quoted
 from backbone.mission.tables import (
     CORE_SERVICES,
     NETWORK_ID,
@@ -145,8 +145,8 @@ def _check_given(
         if name not in by_name and name not in reserved and _NAME.fullmatch(name):
             report.fault(
                 parameter.place_of("name"),
-                f"{kind} has no parameter {told(name)}{report.hint(name, by_name)}",
-                f"There is: {told_names(by_name)}" if by_name else if_none,
+                f"{kind} has no parameter {quoted(name)}{report.hint(name, by_name)}",
+                f"There is: {listed(by_name)}" if by_name else if_none,
             )
     _check_values(element, by_name, report)
 
@@ -159,5 +159,5 @@ def _check_values(element: Element, known: dict[str, ParameterFacts], report: Re
         if not one.accepts(parameter_value(text)):
             hint = report.hint(text, one.words) if one.words else ""
             report.fault(
-                parameter.place_of("value"), f"{one.name}={told(text)} is illegal{hint}", f"{one.name}: {one.meaning}"
+                parameter.place_of("value"), f"{one.name}={quoted(text)} is illegal{hint}", f"{one.name}: {one.meaning}"
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from backbone.mission.document import Element
-from backbone.mission.report import Report, told, told_names
+from backbone.mission.report import Report, listed, quoted
 from backbone.mission.tables import Tables, host_tags_lacking, section
 from backbone.naming import is_legal
 
@@ -34,7 +34,7 @@ def check_processes(tables: Tables, core: Collection[str], report: Report) -> No
             )
             report.fault(
                 those[0].place_of(PROCESS),
-                f"process {told(process)} has the name of {whose}",
+                f"process {quoted(process)} has the name of {whose}",
                 "Choose another name for the process",
             )
         if _are_on_one_host(process, those, tables, report):
@@ -75,6 +75,6 @@ def _check_tags(process: str, members: list[Element], tables: Tables, report: Re
         reasons = "; ".join(f"{name} lacks {', '.join(tags)}" for name, tags in lacking.items())
         report.fault(
             members[0].place_of(PROCESS),
-            f"no host can run all of process {process} ({told_names([m.text('name') for m in members])}): {reasons}",
+            f"no host can run all of process {process} ({listed([m.text('name') for m in members])}): {reasons}",
             "Give a host all these tags, or let those who need them have another process",
         )

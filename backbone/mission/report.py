@@ -11,8 +11,8 @@ from backbone.errors import BackboneError
 from backbone.naming import MAX_NAME_LENGTH
 
 HINTS_AT_MOST = 50  # chosen: nobody reads more at once, and looking for one costs milliseconds
-NAMES_TOLD_AT_MOST = 8  # chosen: fits a line
-VALUE_LENGTH_TOLD = 60  # chosen: same
+NAMES_LISTED = 8  # chosen: fits a line
+QUOTED_LENGTH = 60  # chosen: same
 
 
 class Place(NamedTuple):
@@ -94,19 +94,19 @@ class Report:
         return sorted(dict.fromkeys(self._faults), key=lambda fault: (fault.line, fault.column))
 
 
-def told(value: str) -> str:
+def quoted(value: str) -> str:
     """Return the value quoted, shortened if it is long."""
-    return repr(value if len(value) <= VALUE_LENGTH_TOLD else f"{value[:VALUE_LENGTH_TOLD]}…")
+    return repr(value if len(value) <= QUOTED_LENGTH else f"{value[:QUOTED_LENGTH]}…")
 
 
-def told_names(names: Collection[str]) -> str:
+def listed(names: Collection[str]) -> str:
     """Return names as a list for people, shortened if there are many.
 
     Example:
-        >>> told_names(["radio", "grabber"])
+        >>> listed(["radio", "grabber"])
         'radio, grabber'
     """
     each = list(dict.fromkeys(names))
-    first = each[:NAMES_TOLD_AT_MOST]
+    first = each[:NAMES_LISTED]
     rest = len(each) - len(first)
     return ", ".join(first) + (f" and {rest} more" if rest else "")

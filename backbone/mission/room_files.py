@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from backbone.mission.document import Element, parse
-from backbone.mission.report import Report, told
+from backbone.mission.report import Report, quoted
 
 MAX_BYTES = 1024 * 1024  # chosen: as a mission file's; a room of ten thousand boxes fits
 
@@ -55,7 +55,7 @@ def room_text(mission_file: str, name: str) -> str:
     for element in root:
         if element.tag == "include" or element.text("file"):
             raise RoomInvalid(
-                f"needs the file {told(element.text('file'))} in line {element.place.line}",
+                f"needs the file {quoted(element.text('file'))} in line {element.place.line}",
                 "Write what is in that file into the room's file; only this one travels with the mission",
             )
     return text
@@ -70,4 +70,4 @@ def check_room_file(room: Element, report: Report) -> None:
         room_text(report.file, name)
     except RoomInvalid as invalid:
         message, remedy = invalid.args
-        report.fault(room.place_of("mjcf"), f"room {told(name)} {message}", remedy)
+        report.fault(room.place_of("mjcf"), f"room {quoted(name)} {message}", remedy)

@@ -9,7 +9,7 @@ import msgspec
 
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import Element
-from backbone.mission.report import Report, told, told_names
+from backbone.mission.report import Report, listed, quoted
 from backbone.naming import Subsystem, is_legal
 
 CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "dependency_database", "rc_manager")
@@ -148,8 +148,8 @@ def is_known(element: Element, attribute: str, what: str, known: Collection[str]
     if name in known:
         return True
     if is_legal(name):
-        there = f"There is: {told_names(known)}" if known else f"Declare a {what} of this name"
-        report.fault(element.place_of(attribute), f"no {what} is named {told(name)}{report.hint(name, known)}", there)
+        there = f"There is: {listed(known)}" if known else f"Declare a {what} of this name"
+        report.fault(element.place_of(attribute), f"no {what} is named {quoted(name)}{report.hint(name, known)}", there)
     return False
 
 
@@ -162,7 +162,7 @@ def check_unique(elements: Iterable[Element], attribute: str, what: str, report:
         if name and before is not element:
             report.fault(
                 element.place_of(attribute),
-                f"a second {what} {told(name)}; the first is in line {before.place.line}",
+                f"a second {what} {quoted(name)}; the first is in line {before.place.line}",
                 "Give each its own name, or remove one",
             )
 
@@ -175,8 +175,8 @@ def check_parameters(element: Element, reserved: Collection[str], report: Report
         if parameter.text("name") in reserved:
             report.fault(
                 parameter.place_of("name"),
-                f"parameter {told(parameter.text('name'))} of a <{element.tag}> is set by the rest of the file",
-                f"Give the parameter another name; taken are: {told_names(sorted(reserved))}",
+                f"parameter {quoted(parameter.text('name'))} of a <{element.tag}> is set by the rest of the file",
+                f"Give the parameter another name; taken are: {listed(sorted(reserved))}",
             )
 
 
@@ -191,7 +191,7 @@ def check_host(element: Element, tables: Tables, report: Report) -> None:
     if lacking:
         report.fault(
             element.place_of("host"),
-            f"host {element.text('host')} lacks {told_names(lacking)}, which type {element.text('type')} asks for",
+            f"host {element.text('host')} lacks {listed(lacking)}, which type {element.text('type')} asks for",
             "Name a host with these tags, or add them to the host",
         )
 

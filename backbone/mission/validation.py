@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from backbone.mission.declaration.elements import MissionElement
 from backbone.mission.declaration.vocabulary import ROOT, ElementRule, vocabulary
 from backbone.mission.document import Attribute, Element
-from backbone.mission.report import Report, told, told_names
+from backbone.mission.report import Report, listed, quoted
 
 FOR_EDITORS = frozenset({"xmlns:xsi", "xsi:noNamespaceSchemaLocation"})  # let an editor complete; mean nothing here
 
@@ -28,7 +28,7 @@ def repair(root: Element, report: Report) -> bool:
     if root.tag != ROOT:
         report.fault(
             root.place,
-            f"<{told(root.tag)[1:-1]}> is no mission{report.hint(root.tag, [ROOT])}",
+            f"<{quoted(root.tag)[1:-1]}> is no mission{report.hint(root.tag, [ROOT])}",
             f"Let the file begin with <{ROOT} name=… priority=…>.",
         )
         return False
@@ -108,8 +108,8 @@ def _rename(parent: Element, child: Element, rule: ElementRule, report: Report) 
     """Report a stranger; give it the tag it was probably meant to have and say whether there is one."""
     meant = report.nearest(child.tag, rule.children)
     known = child.tag in vocabulary()
-    what = f"<{child.tag}> does not belong in <{parent.tag}>" if known else f"no element is called {told(child.tag)}"
-    allowed = told_names([f"<{tag}>" for tag in rule.children])
+    what = f"<{child.tag}> does not belong in <{parent.tag}>" if known else f"no element is called {quoted(child.tag)}"
+    allowed = listed([f"<{tag}>" for tag in rule.children])
     remedy = f"In <{parent.tag}> may stand: {allowed}" if allowed else f"<{parent.tag}> has no elements inside"
     report.fault(child.place, what + _remark(meant), remedy)
     child.tag = meant or child.tag
@@ -120,9 +120,9 @@ def _repair_attributes(element: Element, rule: ElementRule, report: Report) -> N
     for name in [name for name in element.attributes if name not in rule.attributes]:
         stranger = element.attributes.pop(name)
         meant = report.nearest(name, rule.attributes)
-        allowed = told_names(rule.attributes)
+        allowed = listed(rule.attributes)
         remedy = f"Its attributes: {allowed}" if allowed else "It has no attributes"
-        report.fault(stranger.place, f"<{element.tag}> has no attribute {told(name)}{_remark(meant)}", remedy)
+        report.fault(stranger.place, f"<{element.tag}> has no attribute {quoted(name)}{_remark(meant)}", remedy)
         if meant and meant not in element.attributes:
             element.attributes[meant] = stranger
 
@@ -171,5 +171,5 @@ def _report(element: Element, name: str, error: ErrorDetails, report: Report) ->
         return
     value = element.text(name)
     hint = report.hint(value, declared.words)
-    message = f"{name}={told(value)} in <{element.tag}> is illegal{hint}"
+    message = f"{name}={quoted(value)} in <{element.tag}> is illegal{hint}"
     report.fault(element.place_of(name), message, f"{name}: {declared.remedy}")

@@ -8,7 +8,7 @@ from itertools import pairwise
 from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.parameter_checks import check_class_parameters
-from backbone.mission.report import Report, told
+from backbone.mission.report import Report, quoted
 from backbone.mission.room_files import check_room_file
 from backbone.mission.tables import (
     NETWORK_ID,
@@ -101,7 +101,7 @@ def _check_robots(world: Element, tables: Tables, report: Report) -> None:
         if robot.text("driver") == SIMULATED and name not in bodies and is_legal(name):
             report.fault(
                 robot.place_of("name"),
-                f"simulated robot {told(name)} has no body in the world"
+                f"simulated robot {quoted(name)} has no body in the world"
                 f"{report.hint(name, sorted(bodies - tables.resources.keys()))}",
                 f'Add <scout name="{name}" x-m="…" y-m="…"/> to <world>',
             )

@@ -16,12 +16,12 @@ from typing import Any, assert_never
 
 import msgspec
 
+from backbone.authentication import NoSecret, dictionary_of
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import AskState, ComponentState
-from backbone.door import NoSecret, dictionary_of
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (
@@ -56,10 +56,10 @@ class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=Tr
     listen: list[str] = []
 
 
-class FixedDoor(Refusal):
-    """The hub listens where it listened at its start."""
+class FixedEndpoints(Refusal):
+    """The endpoints of a running hub cannot be changed."""
 
-    code = "nameserver.fixed_door"
+    code = "nameserver.fixed_endpoints"
     remedy = "Change address or port of the first host in the mission file, and bring the mission up again."
 
 
@@ -103,9 +103,11 @@ class Nameserver(Component[NameserverParameters]):
         """Refuse: an open hub does not change its endpoints.
 
         Raises:
-            FixedDoor: Always.
+            FixedEndpoints: Always.
         """
-        raise FixedDoor(f"{self.name} listens at {self.launch.endpoint} and {self.launch.parameters.get('listen', [])}")
+        raise FixedEndpoints(
+            f"{self.name} listens at {self.launch.endpoint} and {self.launch.parameters.get('listen', [])}"
+        )
 
     async def serve(self) -> None:
         """Ask those who stand behind new tokens who they are."""

@@ -1,4 +1,4 @@
-"""What can be said to the placer: the one who starts and stops everything that is no core service."""
+"""Messages to the placer, which starts and stops all components that are no core services."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Start(Message, frozen=True):
 
     Attributes:
         type: Component type.
-        name: Unique in the mission; empty: the placer numbers it, ``<type>-<n>``.
+        name: Unique in the mission; empty: the placer chooses ``<type>-<n>``.
         parameters: Values for its ``Parameters``.
-        host: Must run there; empty: wherever tags and load say.
-        tags: Tags the host must have, besides the type's own.
-        process: Name of the process it shares with others, which are on the same host then; empty: its own.
+        host: The only possible host; empty: the placer chooses by tags and load.
+        tags: Tags that the host must have, besides the tags of the type.
+        process: Name of the shared process, whose members run on one host; empty: a process of its own.
     """
 
     type: Mention
@@ -33,11 +33,11 @@ class Start(Message, frozen=True):
 
 
 class Started(Message, frozen=True):
-    """Answer to ``Start``: it is ready, here.
+    """Answer to ``Start``: the component is ready.
 
     Attributes:
-        address: Where to ask it.
-        host: Where it runs.
+        address: Address of the component.
+        host: Its host.
         pid: Its process.
         reasons: One line a host: why it was chosen or not.
     """
@@ -49,21 +49,21 @@ class Started(Message, frozen=True):
 
 
 class StopComponent(Message, frozen=True):
-    """End a component and forget that it was wanted."""
+    """End a component; it is no longer wanted."""
 
     name: Mention
     reason: Text = ""
 
 
 class Ended(Message, frozen=True):
-    """Answer to ``StopComponent``: it is gone."""
+    """Answer to ``StopComponent``: the component has ended."""
 
     name: Mention
     by: EndedBy
 
 
 class AskPlacement(Message, frozen=True):
-    """Why is this component where it is?"""
+    """Ask for the host of a component and the reasons."""
 
     name: Mention
 
@@ -74,8 +74,8 @@ class Placement(Message, frozen=True):
     Attributes:
         name: The component.
         type: Its type.
-        host: Where it was placed.
-        requester: Who wanted it.
+        host: Its host.
+        requester: Address of its owner.
         since_s: Mission time of the decision.
         reasons: One line a host: why it was chosen or not.
     """
@@ -89,7 +89,7 @@ class Placement(Message, frozen=True):
 
 
 class ListPlacements(Message, frozen=True):
-    """What was placed where?"""
+    """Ask for all placements."""
 
 
 class Placements(Message, frozen=True):
@@ -97,8 +97,8 @@ class Placements(Message, frozen=True):
 
     Attributes:
         placements: Sorted by name.
-        stopped: Names that were ordered to stop and not started since, with the reason: their owners must not start
-            them again.
+        stopped: Names that were ordered to stop and were not started since, with the reason. Their owners must not
+            start them again.
     """
 
     placements: Annotated[list[Placement], MANY]
@@ -106,21 +106,21 @@ class Placements(Message, frozen=True):
 
 
 class NoHost(Refusal):
-    """No host can take the component; the detail names every host and why not."""
+    """No host is possible for the component; the detail gives the reason of each host."""
 
     code = "placer.no_host"
     remedy = "Add a host with these tags, or change the component's tags or host."
 
 
 class CreatorSilent(Refusal):
-    """The creator asked did not answer; fact ``outcome``: ``unknown``, or ``not_running`` if that much is sure."""
+    """The creator did not answer; fact ``outcome``: ``unknown``, or ``not_running`` if that is certain."""
 
     code = "placer.creator_silent"
     remedy = "See with 'scout-backbone status' whether it runs; start or stop it again."
 
 
 class StoppedMeanwhile(Refusal):
-    """The component was to be stopped before it had started, and was."""
+    """An order stopped the component before it had started."""
 
     code = "placer.stopped"
     remedy = "Start it again if it is still wanted."
@@ -130,7 +130,7 @@ class NotPlaced(Refusal):
     """The placer has no component of this name; fact ``stopped``: whether it was ordered to stop."""
 
     code = "placer.unknown"
-    remedy = "See 'scout-backbone status' for the names that are there."
+    remedy = "See 'scout-backbone status' for the names of all components."
 
 
 PlacerQuestion = Start | StopComponent | AskPlacement | ListPlacements

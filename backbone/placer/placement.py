@@ -2,11 +2,12 @@
 
 Rules:
 
-* A host must be there (its creator lives), be the one asked for if one is, and have every tag needed.
-* Those who share a process go where the first of them is, unless another host is asked for.
-* Among those the least burdened is chosen: components per core, with a busy processor counting like
-  further components. Equal hosts so get equal numbers, a loaded one gets fewer.
-* Equally burdened hosts are taken in the order of their names, so the same state gives the same choice.
+* The creator of the host must live, and the host must have every needed tag. If the order names a host, only that
+  host is possible.
+* Members of a shared process go to the host of its first member, unless the order names a host.
+* Among the possible hosts the placer chooses the host with the least load: components per core, with a busy processor
+  counted as further components. So equal hosts get equal numbers of components, and a busy host gets fewer.
+* Hosts of equal load are chosen in the order of their names, so the same state gives the same choice.
 * Every answer, also a refusal, has one line for every host.
 
 Source: S000, "component placer": processes go to a host that has the hardware and the least load.
@@ -31,10 +32,10 @@ class HostView:
 
     Attributes:
         name: Name in the mission file.
-        tags: What it has.
+        tags: Its tags.
         alive: True while its creator's token stands.
-        components: Placed there, those just starting included.
-        cpu: Busy share of all cores, 0 to 1, as its creator told last.
+        components: Number of its components, starting ones included.
+        cpu: Busy share of all cores, 0 to 1, as last published by its creator.
         memory: Used share of memory, 0 to 1.
         cores: Number of cores.
     """
@@ -48,13 +49,13 @@ class HostView:
     cores: int = 1
 
     @property
-    def burden(self) -> float:
-        """Components per core this host would have with one more, a busy processor counted as components."""
+    def load(self) -> float:
+        """Components per core with one more component, a busy processor counted as components."""
         busy = 1.0 if self.memory > FULL_MEMORY else round(self.cpu * BUSY_STEPS) / BUSY_STEPS
         return (self.components + 1) / max(1, self.cores) + busy * BUSY_AS_COMPONENTS
 
     def describe(self) -> str:
-        """Say how burdened it is, for people."""
+        """Return its load in words."""
         return (
             f"{self.components} components on {self.cores} cores, "
             f"processor {self.cpu:.0%} and memory {self.memory:.0%} in use"
@@ -63,7 +64,7 @@ class HostView:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """Where the component goes.
+    """The chosen host.
 
     Attributes:
         host: The host's name.
@@ -74,53 +75,53 @@ class Choice:
     reasons: tuple[str, ...]
 
 
-def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView], company: str = "") -> Choice:
+def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView], colocation: str = "") -> Choice:
     """Return the host for one more component.
 
     Args:
-        name: Of the component, for the refusal.
-        tags: Every one must be on the host.
-        pin: The only host allowed; empty: any.
-        hosts: All that are known; their order does not matter.
-        company: Where those are with whom it shares its process; empty: nowhere.
+        name: Name of the component, for the refusal.
+        tags: Tags that the host must have.
+        pin: The only possible host; empty: any.
+        hosts: All known hosts, in any order.
+        colocation: Host of the other members of its process; empty: none.
 
     Raises:
-        NoHost: None can take it; the detail has a line for each.
+        NoHost: No host is possible; the detail has a line for each host.
     """
     known = sorted(hosts, key=lambda host: host.name)
-    company = "" if pin else company
-    obstacles = {host.name: obstacle(host, tags, pin, company) for host in known}
+    colocation = "" if pin else colocation
+    obstacles = {host.name: obstacle(host, tags, pin, colocation) for host in known}
     able = [host for host in known if not obstacles[host.name]]
     if not able:
-        raise NoHost(_nobody(name, pin, known, obstacles), name=name)
-    chosen = min(able, key=lambda host: (host.burden, host.name))
+        raise NoHost(_no_host(name, pin, known, obstacles), name=name)
+    chosen = min(able, key=lambda host: (host.load, host.name))
 
     def reason(host: HostView) -> str:
         if host is chosen:
-            why = "asked for" if pin else "with the rest of its process" if company else "least burdened"
+            why = "asked for" if pin else "with the rest of its process" if colocation else "least loaded"
             return f"{host.name}: chosen, {why}: {host.describe()}"
         if obstacles[host.name]:
             return f"{host.name}: {obstacles[host.name]}"
-        return f"{host.name}: {'more burdened' if host.burden > chosen.burden else 'as burdened'}: {host.describe()}"
+        return f"{host.name}: {'more loaded' if host.load > chosen.load else 'as loaded'}: {host.describe()}"
 
     return Choice(chosen.name, tuple(reason(host) for host in known))
 
 
-def obstacle(host: HostView, tags: Collection[str], pin: str, company: str = "") -> str:
-    """Return why this host cannot take it, empty if it can."""
+def obstacle(host: HostView, tags: Collection[str], pin: str, colocation: str = "") -> str:
+    """Return why this host is impossible, empty if it is possible."""
     if pin and host.name != pin:
         return f"not {pin}, which was asked for"
-    if company and host.name != company:
-        return f"not {company}, where the rest of its process is"
+    if colocation and host.name != colocation:
+        return f"not {colocation}, where the rest of its process is"
     missing = sorted(set(tags) - host.tags)
     if missing:
         return f"lacks {', '.join(missing)}"
     return "" if host.alive else "its creator is gone"
 
 
-def _nobody(name: str, pin: str, known: list[HostView], obstacles: dict[str, str]) -> str:
+def _no_host(name: str, pin: str, known: list[HostView], obstacles: dict[str, str]) -> str:
     if not known:
-        return f"no host for {name}: no creator has been heard of"
+        return f"no host for {name}: no creator is known"
     lines = "; ".join(f"{host.name}: {obstacles[host.name]}" for host in known)
     names = [host.name for host in known]
     unknown = f"{pin} is no host with a creator{did_you_mean(pin, names)}; " if pin and pin not in names else ""

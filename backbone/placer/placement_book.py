@@ -1,25 +1,24 @@
-"""Placement book: what was placed where, and what to do when a host is lost or comes back.
+"""Placement book: the host of each component, and the decisions when a host is lost or returns.
 
 Events go in, instructions come out. The caller owns the bus and the clock.
 
 Rules:
 
-* A name is in the book once, from its admission on, so two starts never get the same name and each
-  choice of a host counts those that are still starting.
-* Truth lives at the edge: a creator's list of processes settles what runs on its host. The book of a
-  restarted placer is rebuilt from these lists.
-* A record is a wish: it stands until its component is ordered to stop. However the component came to be missing,
-  it is placed again: with its host, or by an end nobody ordered. Only components without restart (ARCs) are
-  forgotten then: their owners claim new ones.
-* A host whose creator died has lost its components (creators take them along). Those that are pinned wait until
-  that creator is back.
-* An order to stop is remembered, so that owners that compare wish and fact do not start the component again.
-* A host that fell silent may only be cut off, and runs on for a while. What it ran is *fenced*: it is started
-  elsewhere only when that host has ended it by itself, or is back and tells what it runs.
-* A host that was cut off comes back with components that were stopped meanwhile. These are ended there.
+* A name is in the book once, from its admission on. So two starts never get the same name, and each choice of a host
+  counts the components that are still starting.
+* Truth lives at the edge: a creator's list of processes decides which components its host has. A restarted placer
+  rebuilds its book from these lists.
+* A record is a wish: it stands until an order stops its component. A missing component is placed again, whether its
+  host was lost or it ended without an order. Only components without restart (ARCs) are forgotten, because their
+  owners claim new ones.
+* When a creator dies, its components die with it. Pinned components wait until their creator is back.
+* The book remembers each order to stop, so that owners that compare wish and fact do not start the component again.
+* A silent host may only be cut off and run on for a while. Its components are *fenced*: they are started elsewhere only
+  when that host has ended them by itself, or when its creator is back and has listed its processes.
+* A host that was cut off may return with components that were stopped meanwhile. The placer ends these orphans.
 
-A start whose creator dies before it answered stays in the book: it goes to another host, or waits
-for that creator to come back, and its asker is answered then.
+If a creator dies before it answers a start, the start stays in the book: the component goes to another host or waits
+for that creator, and then its requester gets the answer.
 """
 
 from __future__ import annotations
@@ -36,13 +35,13 @@ from backbone.naming import Subsystem, address, did_you_mean
 from backbone.placer.messages import NotPlaced, Placement
 from backbone.placer.placement import Choice, HostView, obstacle, place
 
-STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; nobody stops so many in that time
+STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stops so many in that time
 
 
 class Phase(StrEnum):
-    """How far a placement is."""
+    """Phase of a placement."""
 
-    STARTING = "starting"  # somebody waits for it to become ready
+    STARTING = "starting"  # its creator has the order; it is not ready yet
     RUNNING = "running"  # its creator has it
     WAITING = "waiting"  # wanted, but lost its host or its process
 
@@ -52,19 +51,19 @@ class Record:
     """One placement.
 
     Attributes:
-        spawn: The order it is started by.
-        pin: The only host it may run on; empty: any.
-        phase: How far it is.
-        host: Where it is or is being started; empty: nowhere.
-        pid: Its process; 0 if not known.
+        spawn: The order to its creator.
+        pin: The only possible host; empty: any.
+        phase: Its phase.
+        host: The host on which it runs or starts; empty: none.
+        pid: Its process; 0 if unknown.
         since_s: Mission time of the last decision about it.
         reasons: One line a host.
-        unwanted: True from the moment it is to be stopped.
-        suspect: True while its creator must be asked whether it still has it.
-        lost: True from the loss of its host until it has another: it may come back with the old one.
-        missing_since_s: Mission time from which on a component that ran is missing; negative: it is not.
+        unwanted: True from the order to stop it.
+        suspect: True while the placer must ask its creator whether it still runs.
+        lost: True from the loss of its host until it has another; it may return with the old host.
+        missing_since_s: Mission time from which on it is missing; negative: it is not missing.
         cause: Why it is missing.
-        doing: What the placer does about it.
+        doing: What the placer does to start it again.
     """
 
     spawn: Spawn
@@ -83,21 +82,21 @@ class Record:
 
     @property
     def address(self) -> str:
-        """Where to ask the component."""
+        """Address of the component."""
         return address(self.spawn.subsystem, self.spawn.name)
 
     def placement(self) -> Placement:
-        """Return the record as others see it."""
+        """Return the record as a message."""
         spawn = self.spawn
         return Placement(spawn.name, spawn.type, self.host, spawn.requester, self.since_s, list(self.reasons))
 
     def runs(self, pid: int) -> None:
-        """Take note that it has a process, and is missed no longer."""
+        """Record that it has a process and is no longer missing."""
         self.pid, self.suspect = pid, False
         self.missing_since_s, self.cause, self.doing = -1.0, "", ""
 
     def misses(self, cause: str, now_s: float) -> None:
-        """Take note that the component ran and is missing now."""
+        """Record that the component, which ran, is missing."""
         self.phase, self.host, self.pid, self.suspect = Phase.WAITING, "", 0, False
         self.cause, self.doing = cause, "is to be placed again"
         if self.missing_since_s < 0:
@@ -106,14 +105,14 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class PlaceAgain:
-    """Start this component again; it lost its host."""
+    """Start this component again, which is missing."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class EndStray:
-    """End what runs on this host under this name; it is wanted elsewhere or not at all."""
+class EndOrphan:
+    """End the component of this name on this host, because it is wanted on another host or not at all."""
 
     host: str
     name: str
@@ -121,30 +120,30 @@ class EndStray:
 
 @dataclass(frozen=True, slots=True)
 class Inspect:
-    """Ask this host's creator what it runs, and report the answer."""
+    """Ask this host's creator for its processes, and report the answer."""
 
     host: str
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Keep in the story that this happened to the subject."""
+    """Add this event about the subject to the story."""
 
     subject: str
     what: str
 
 
-Instruction = PlaceAgain | EndStray | Inspect | Note
+Instruction = PlaceAgain | EndOrphan | Inspect | Note
 
 
 @dataclass(slots=True)
 class _Host:
-    """What is known of one host: its view, but for the count of components, and its creator's process."""
+    """One host: its view without the count of components, and its creator's pid."""
 
     view: HostView
     creator_pid: int
-    told: tuple[int, int] = (-1, -1)
-    """The counts of components, by its creator and by the book, about which it was asked last."""
+    reported: tuple[int, int] = (-1, -1)
+    """Counts of components, by its creator and by the book, at the last inspection."""
 
 
 class PlacementBook:
@@ -163,7 +162,7 @@ class PlacementBook:
         """Return the record of this name.
 
         Raises:
-            NotPlaced: There is none.
+            NotPlaced: The book has no record of this name.
         """
         found = self._records.get(name)
         if found is None:
@@ -188,21 +187,21 @@ class PlacementBook:
         return [replace(self._hosts[name].view, components=counts.get(name, 0)) for name in sorted(self._hosts)]
 
     def is_alive(self, host: str) -> bool:
-        """Say whether this host's creator is known to be there."""
+        """Return whether this host's creator is alive."""
         return host in self._hosts and self._hosts[host].view.alive
 
     def knows_creator(self, host: str, pid: int) -> bool:
-        """Say whether this very process is known as the host's living creator."""
+        """Return whether this pid is the host's living creator."""
         return self.is_alive(host) and self._hosts[host].creator_pid == pid
 
     def may_find_host(self, name: str) -> bool:
-        """Say whether a host that is gone could take it, were its creator back; also if no host is known at all."""
+        """Return whether the return of a creator would make a host possible; True if no host is known."""
         record = self.record(name)
         revived = [replace(view, alive=True) for view in self.hosts()]
         return not revived or any(not obstacle(view, record.spawn.tags, record.pin) for view in revived)
 
     def fenced_until_s(self, name: str, now_s: float) -> float | None:
-        """Return until when a host that fell silent may still run this name; None: no host does."""
+        """Return the time until which a silent host may still run this component; None: no host may."""
         host, until_s = self._fences.get(name, ("", 0.0))
         if host and until_s > now_s and not self.is_alive(host):
             return until_s
@@ -210,11 +209,11 @@ class PlacementBook:
         return None
 
     def stopped(self) -> dict[str, str]:
-        """Return the names that were ordered to stop and not started since, with the reason."""
+        """Return the names that were ordered to stop and were not started since, with the reason."""
         return dict(self._stopped)
 
     def owned_by(self, owner: str) -> list[str]:
-        """Return the names that this address asked for."""
+        """Return the names of this owner's components."""
         return [record.spawn.name for record in self.records() if record.spawn.requester == owner]
 
     def ownerless(self) -> dict[str, list[str]]:
@@ -228,7 +227,7 @@ class PlacementBook:
         return found
 
     def absences(self) -> list[Absence]:
-        """Return what ran, is wanted, and is on no host now; what a creator restarts is that creator's to report."""
+        """Return the wanted components that ran and have no host now. Creators report components that they restart."""
         return [
             Absence(record.spawn.name, record.missing_since_s, record.cause, record.doing)
             for record in self.records()
@@ -237,17 +236,17 @@ class PlacementBook:
 
     # ------------------------------------------------------------------ starting and stopping
     def number(self, type_name: str) -> str:
-        """Return ``<type>-<n>`` with an n that was not used before; numbers only grow, so stories never mix."""
+        """Return ``<type>-<n>`` with a new n; numbers only grow, so the stories of two components never mix."""
         self._numbers[type_name] = self._numbers.get(type_name, 0) + 1
         return f"{type_name}-{self._numbers[type_name]}"
 
     def refuse_second(self, component_type: ComponentType, name: str) -> None:
         """Return unless the type may run only once and another name of it is in the book.
 
-        The nameserver cannot see one that waits for its restart or for a host; the book can.
+        The nameserver does not know a component that waits for its restart or for a host; the book does.
 
         Raises:
-            MultiplicityExceeded: It is.
+            MultiplicityExceeded: Another name of this type is in the book.
         """
         if component_type.multiplicity is Multiplicity.MANY:
             return
@@ -282,79 +281,79 @@ class PlacementBook:
         return record
 
     def choose(self, name: str, now_s: float) -> Choice:
-        """Give the component a host; from here on it counts there.
+        """Choose a host for the component; from now on the component counts there.
 
         Raises:
-            NoHost: None can take it.
+            NoHost: No host is possible.
         """
         record = self.record(name)
-        record.host = ""  # it must not count against the host it is leaving
-        choice = place(name, record.spawn.tags, record.pin, self.hosts(), company=self._company(record))
+        record.host = ""  # it must not count on the host that it leaves
+        choice = place(name, record.spawn.tags, record.pin, self.hosts(), colocation=self._colocation(record))
         record.phase, record.host, record.reasons, record.since_s = Phase.STARTING, choice.host, choice.reasons, now_s
         record.pid, record.lost = 0, False
         return choice
 
     def started(self, name: str, pid: int, now_s: float) -> None:
-        """Take note that it is ready."""
+        """Record that the component is ready."""
         record = self.record(name)
         record.phase, record.since_s = Phase.RUNNING, now_s
         record.runs(pid)
 
     def unsure(self, name: str, now_s: float) -> None:
-        """Take note that nobody knows whether it runs; its creator's next word settles it."""
+        """Record that it is unknown whether the component runs; its creator's next list decides."""
         record = self.record(name)
         record.phase, record.since_s, record.suspect = Phase.RUNNING, now_s, True
 
     def waits(self, name: str, why: str = "") -> None:
-        """Take note that no host can have it now."""
+        """Record that no host is possible now."""
         record = self.record(name)
         record.phase, record.host, record.doing = Phase.WAITING, "", f"waits for a host: {why}"
 
     def forget(self, name: str) -> None:
-        """Take the name out of the book; right also if it is not in it."""
+        """Remove the name from the book. Idempotent."""
         self._records.pop(name, None)
 
     def stop_ordered(self, name: str, reason: str) -> None:
-        """Take the name out of the book and remember that this was meant."""
+        """Remove the name from the book and remember the order to stop it."""
         self.forget(name)
         self._stopped.pop(name, None)
         self._stopped[name] = reason
         while len(self._stopped) > STOPPED_KEPT:
             del self._stopped[next(iter(self._stopped))]
 
-    # ------------------------------------------------------------------ what creators and nameserver tell
+    # ------------------------------------------------------------------ reports of creators and nameserver
     def creator_up(
         self, host: str, tags: Collection[str], creator_pid: int, processes: Collection[ProcessState], asked_s: float
     ) -> list[Instruction]:
-        """Take a creator's answer to a question of that mission time, and find hosts for those who wait."""
-        told: list[Instruction] = []
+        """Enter a creator's answer to a question of that mission time, and place waiting components again."""
+        instructions: list[Instruction] = []
         if self.is_alive(host) and not self.knows_creator(host, creator_pid):
-            told += self.creator_down(host, asked_s)
+            instructions += self.creator_down(host, asked_s)
         old = self._hosts[host].view if host in self._hosts else HostView(host)
         if not self.is_alive(host):
-            told.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
+            instructions.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
         self._hosts[host] = _Host(replace(old, tags=frozenset(tags), alive=True), creator_pid)
         for process in processes:
-            told += self._found(host, process, asked_s)
+            instructions += self._found(host, process, asked_s)
         self._left_behind = {(where, name) for where, name in self._left_behind if where != host}
-        told += self.inspected(host, processes, asked_s)
-        return told + [
+        instructions += self.inspected(host, processes, asked_s)
+        return instructions + [
             PlaceAgain(record.spawn.name)
             for record in self.records()
             if record.phase is Phase.WAITING and not record.unwanted
         ]
 
     def creator_down(self, host: str, now_s: float, fence_s: float = 0.0) -> list[Instruction]:
-        """Take note that a host's creator died, and with it all it ran.
+        """Record that a host's creator died with all its components.
 
         Args:
-            fence_s: Mission seconds for which the host may still run it, if nobody saw it die.
+            fence_s: Mission seconds for which the host may still run them, because its death was not observed.
         """
         if not self.is_alive(host):
             return []
         known = self._hosts[host]
         known.view = replace(known.view, alive=False)
-        told: list[Instruction] = [Note(host, "lost its creator and all it ran")]
+        instructions: list[Instruction] = [Note(host, "lost its creator and all it ran")]
         for record in self.records():
             if record.host != host:
                 continue
@@ -363,18 +362,18 @@ class PlacementBook:
             if fence_s > 0:
                 self._fences[name] = (host, now_s + fence_s)
             if record.phase is Phase.STARTING:
-                continue  # whoever waits for it finds out and decides
+                continue  # the task that starts it finds out and decides
             if record.phase is Phase.RUNNING and record.spawn.policy.restart and not record.unwanted:
                 record.misses(f"was lost with the creator of {host}", now_s)
                 record.lost = True
-                told += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
+                instructions += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
             else:
                 self.forget(name)
-                told.append(Note(name, f"was lost with {host} and is not started again"))
-        return told
+                instructions.append(Note(name, f"was lost with {host} and is not started again"))
+        return instructions
 
     def load_heard(self, load: HostLoad) -> list[Instruction]:
-        """Take over a host's load; its creator is asked if it does not run as many as the book says."""
+        """Record a host's load; inspect the creator if its count of components differs from the book's."""
         known = self._hosts.get(load.host)
         if known is None:
             return []
@@ -386,13 +385,13 @@ class PlacementBook:
             return [Inspect(load.host)]
         counts = (load.components, len(here))
         settled = all(record.phase is not Phase.STARTING for record in here)
-        if settled and load.components != len(here) and counts != known.told:
-            known.told = counts
+        if settled and load.components != len(here) and counts != known.reported:
+            known.reported = counts
             return [Inspect(load.host)]
         return []
 
     def component_disappeared(self, component_address: str) -> list[Instruction]:
-        """Take note that a token fell; the creator knows whether its component ended, or is being restarted."""
+        """Record a fallen token; the creator knows whether its component has ended or is being restarted."""
         for record in self._records.values():
             if record.address == component_address and record.phase is Phase.RUNNING and not record.unwanted:
                 record.suspect = True
@@ -400,15 +399,15 @@ class PlacementBook:
         return []
 
     def component_appeared(self, component_address: str, host: str, pid: int) -> None:
-        """Take note that a component is ready again."""
+        """Record that a component is ready again."""
         for record in self._records.values():
             if (record.address, record.host) == (component_address, host) and record.phase is Phase.RUNNING:
                 record.runs(pid)
 
     def inspected(self, host: str, processes: Collection[ProcessState], asked_s: float) -> list[Instruction]:
-        """Settle the records of this host by what its creator answered to a question of that mission time."""
+        """Update the records of this host from its creator's answer to a question of that mission time."""
         listed = {process.spawn.name: process for process in processes}
-        told: list[Instruction] = []
+        instructions: list[Instruction] = []
         for record in self.records():
             name = record.spawn.name
             if record.host != host or record.phase is not Phase.RUNNING or record.since_s > asked_s:
@@ -419,15 +418,15 @@ class PlacementBook:
                     record.runs(process.pid)
             elif record.unwanted or not record.spawn.policy.restart:
                 self.forget(name)
-                told.append(Note(name, f"ended on {host}"))
+                instructions.append(Note(name, f"ended on {host}"))
             else:
                 record.misses(f"its creator on {host} does not have it", asked_s)
-                told += [Note(name, f"is missing on {host}"), PlaceAgain(name)]
-        return told
+                instructions += [Note(name, f"is missing on {host}"), PlaceAgain(name)]
+        return instructions
 
     # ------------------------------------------------------------------
-    def _company(self, record: Record) -> str:
-        """Return the host of those it shares its process with; empty if they are on none, or it shares with nobody."""
+    def _colocation(self, record: Record) -> str:
+        """Return the host of the other members of its process; empty if they have none or there are none."""
         if not record.spawn.process:
             return ""
         hosts = [
@@ -438,11 +437,11 @@ class PlacementBook:
         return hosts[0] if hosts else ""
 
     def _found(self, host: str, process: ProcessState, asked_s: float) -> list[Instruction]:
-        """Settle one process a creator came up with."""
+        """Update the book from one process of a creator's list."""
         spawn, record = process.spawn, self._records.get(process.spawn.name)
         if record is None:
             if (host, spawn.name) in self._left_behind or spawn.name in self._stopped:
-                return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
+                return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
             self._remember_number(spawn)
             record = Record(spawn, host if spawn.pinned else "", Phase.RUNNING, host, asked_s)
             self._records[spawn.name] = record
@@ -453,17 +452,17 @@ class PlacementBook:
         if record.lost and not record.unwanted:
             _adopt(record, host, process, asked_s)
             return [Note(spawn.name, f"came back with {host}")]
-        return [EndStray(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
+        return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, but is wanted elsewhere")]
 
     def _remember_number(self, spawn: Spawn) -> None:
-        """Never give the number of a name that is or was there again."""
+        """Never use the number of a present or former name again."""
         type_name, _, number = spawn.name.rpartition("-")
         if type_name == spawn.type and number.isdecimal():
             self._numbers[type_name] = max(self._numbers.get(type_name, 0), int(number))
 
 
 def _adopt(record: Record, host: str, process: ProcessState, asked_s: float) -> None:
-    """Take over what a creator runs as what was wanted."""
+    """Accept a creator's process as the one that this record wants."""
     record.phase, record.missing_since_s = Phase.RUNNING, -1.0
     record.host, record.pid, record.since_s = host, process.pid, asked_s
     record.reasons, record.lost, record.suspect = (f"{host}: its creator has it",), False, False

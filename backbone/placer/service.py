@@ -1,10 +1,9 @@
-"""The placer: the one who starts and stops every component that is no core service.
+"""The placer: starts and stops all components that are no core services.
 
-A start is admitted by the component database, given a host by the book, and carried out by that
-host's creator. Whether an unanswered order was carried out is asked of the creator, never guessed:
-nothing is started twice.
+The component database admits a start, the book chooses its host, and the creator of that host carries it out. If an
+order gets no answer, the placer asks the creator whether it was carried out. So no component is started twice.
 
-Source: S000, "component placer": everybody asks it; it asks the creator of the host it chose.
+Source: S000, "component placer": all components ask it; it asks the creator of the chosen host.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ from backbone.placer.messages import (
     StoppedMeanwhile,
 )
 from backbone.placer.placement_book import (
-    EndStray,
+    EndOrphan,
     Inspect,
     Instruction,
     Note,
@@ -83,18 +82,18 @@ from backbone.placer.placement_book import (
 from backbone.wire import Envelope, Message, UnknownMessage
 
 ANSWER_EACH_S, ANSWER_WITHIN_S = 1.0, 5.0  # chosen: a killed core service is back within one second
-SPAWN_WITHIN_S = START_MOST_S + 5.0  # chosen: a creator's own limit and a moment; it judges by silence long before
+SPAWN_WITHIN_S = START_MOST_S + 5.0  # chosen: a creator's limit and a moment; silence ends a start long before
 END_MARGIN_S = 5.0  # chosen: the same for ends
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
-OLD_LIFE_S = 5.0  # chosen: longer than any lease by which a lost host's components are still seen
+OLD_LIFE_S = 5.0  # chosen: longer than any lease that keeps tokens of a lost host's components
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED, LifeState.FAILED)
-SPAWN_TRIES = 3  # chosen: two creators may die of something else; a third dies of the order
+SPAWN_TRIES = 3  # chosen: two creators may die for other reasons; a third dies of the order
 AGAIN_PAUSES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)  # chosen: before each try to place a missing component again
 COMPARE_EVERY_S = 5.0  # chosen: wishes without an owner are rare: the owner and the placer died at the same time
 
 
 class Fate(Enum):
-    """What became of an order that was not answered."""
+    """Outcome of an order that was not answered."""
 
     DONE = "done"
     NOT_DONE = "not done"
@@ -103,35 +102,35 @@ class Fate(Enum):
 
 
 class Placer(Component[NoParameters]):
-    """Places components, and again those that lost their host."""
+    """Places components, and places them again when they are missing."""
 
     accepts = PlacerQuestion
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._book = PlacementBook()
-        self._to_do: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
+        self._queue: asyncio.Queue[Callable[[], None]] = asyncio.Queue()
         self._something_happened = asyncio.Event()
         self._meeting: dict[str, int] = {}
         self._newest: dict[str, int] = {}
         self._inspecting: set[str] = set()
         self._ears: dict[str, list[Subscription]] = {}
         self._type_locks: dict[str, asyncio.Lock] = {}
-        self._starts = self._refused = self._again = self._stops = self._strays = 0
+        self._starts = self._refused = self._again = self._stops = self._orphans = 0
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
-        """Learn from the creators that are there what runs; a restarted placer knows it before anybody asks."""
-        self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_of_somebody)
+        """Recovery: collect the processes of all creators before the first question can arrive."""
+        self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._component_changed)
         found = await self._creators()
         await asyncio.gather(*(self._meet(creator) for creator in found.components))
         self.bus.watch_alive(NAMESERVER, self._nameserver_changed)
 
     async def serve(self) -> None:
-        """Begin what events led to."""
+        """Carry out the queued work, and stop components without an owner."""
         self.start_task(self._stop_ownerless(), "stop ownerless")
         while True:
-            begin = await self._to_do.get()
+            begin = await self._queue.get()
             begin()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -152,11 +151,11 @@ class Placer(Component[NoParameters]):
                 raise UnknownMessage(f"{type(other).__name__} is not answered here")
 
     def absences(self) -> list[Absence]:
-        """Return the wishes that no host fulfills now."""
+        """Return the wanted components that have no host now."""
         return self._book.absences()
 
     def statistics(self) -> dict[str, float]:
-        """Return how many hosts and placements there are and what happened to them."""
+        """Return counts of hosts, placements, starts and stops."""
         records, hosts = self._book.records(), self._book.hosts()
         return {
             "hosts": float(len(hosts)),
@@ -167,7 +166,7 @@ class Placer(Component[NoParameters]):
             "starts_refused": float(self._refused),
             "placed_again": float(self._again),
             "stops": float(self._stops),
-            "strays_ended": float(self._strays),
+            "orphans_ended": float(self._orphans),
         }
 
     # ------------------------------------------------------------------ start
@@ -213,16 +212,16 @@ class Placer(Component[NoParameters]):
         return admitted.component_type
 
     async def _bring_up(self, record: Record) -> Started:
-        """Have the component running on some host.
+        """Start the component on a host and return when it is ready.
 
         Raises:
-            Refusal: It does not run; the record is left STARTING, or RUNNING and suspect if its fate is unknown.
+            Refusal: It does not run; the record stays STARTING, or RUNNING and suspect if the outcome is unknown.
         """
         name = record.spawn.name
         await self._unfenced(record)
         for tries_left in reversed(range(SPAWN_TRIES)):
             await self._choose(record)
-            if record.phase is not Phase.STARTING:  # a host that was only cut off brought it back
+            if record.phase is not Phase.STARTING:  # it returned with a host that was only cut off
                 return _started(record)
             self.story.note(name, f"goes to {record.host}: {'; '.join(record.reasons)}")
             spawn = record.spawn
@@ -257,20 +256,20 @@ class Placer(Component[NoParameters]):
         return _started(record)
 
     async def _unfenced(self, record: Record) -> None:
-        """Return when no host that fell silent can run the component any more, or it came back with its host."""
+        """Return when no silent host can run the component any more, or when it has returned with its host."""
         name = record.spawn.name
         while record.phase is Phase.STARTING and not record.unwanted:
             until_s = self._book.fenced_until_s(name, self.clock.now_s())
             if until_s is None:
                 return
-            record.doing = "waits until the host that fell silent has ended it"
+            record.doing = "waits until the silent host has ended it"
             await self._news_or(until_s)
 
     async def _choose(self, record: Record) -> None:
-        """Give the component a host unless it came back; wait a while if only a creator's return can give it one.
+        """Choose a host unless the component has returned; wait a while if only a creator's return makes one possible.
 
         Raises:
-            NoHost: None can take it.
+            NoHost: No host is possible.
         """
         name, until_s = record.spawn.name, self.clock.now_s() + CREATOR_BACK_S * self.clock.rate
         while record.phase is Phase.STARTING:
@@ -290,9 +289,9 @@ class Placer(Component[NoParameters]):
             raise StoppedMeanwhile(f"{record.spawn.name} was stopped before it had started")
 
     async def _fate_of_spawn(self, record: Record) -> tuple[Fate, int]:
-        """Learn from the creator what became of an unanswered order, and the pid if it is done.
+        """Ask the creator for the outcome of an unanswered order, and for the pid if the component is ready.
 
-        A component that still becomes ready is waited for: the answer was lost, not the order.
+        If only the answer was lost, the component still becomes ready, and this method waits for it.
         """
         until_s = self.clock.now_s() + SPAWN_WITHIN_S * self.clock.rate
         while True:
@@ -354,7 +353,7 @@ class Placer(Component[NoParameters]):
         return Ended(name, by)
 
     def _stop_owned(self, owner: str, reason: str) -> None:
-        """Stop what this owner wanted: with the owner's end its wishes end."""
+        """Stop this owner's components, because an owner's wishes end with the owner."""
         for name in self._book.owned_by(owner):
             self.start_task(self._stop_quietly(name, reason), f"stop {name}")
 
@@ -365,7 +364,7 @@ class Placer(Component[NoParameters]):
             self.story.note(name, f"could not be stopped: {refusal.detail}")
 
     async def _stop_ownerless(self) -> None:
-        """Stop again and again what decision processes wanted that are wanted by nobody and do not live any more."""
+        """Stop the components of decision processes that are neither wanted nor alive; repeat for ever."""
         suspects: set[str] = set()
         while True:
             await self.clock.sleep_s(COMPARE_EVERY_S * self.clock.rate)
@@ -381,16 +380,16 @@ class Placer(Component[NoParameters]):
             suspects = owners
 
     async def _start_left_off(self, record: Record) -> None:
-        """Return when whoever was starting the component has seen that it is unwanted, and it is out of the book."""
+        """Return when the task that starts the component has ended and the component is out of the book."""
         until_s = self.clock.now_s() + SPAWN_WITHIN_S * self.clock.rate
         while self._book.find(record.spawn.name) is record and self.clock.now_s() < until_s:
             await self._news_or(until_s)
 
     async def _end_on(self, host: str, name: str, reason: str) -> EndedBy:
-        """End what runs there under this name.
+        """End the component on this host.
 
         Raises:
-            CreatorSilent: Its creator does not answer, but lives; the outcome is unknown.
+            CreatorSilent: The creator lives but does not answer; the outcome is unknown.
         """
         order = EndProcess(name, reason)
         within_s = order.ask_s + order.term_s + END_MARGIN_S
@@ -411,23 +410,23 @@ class Placer(Component[NoParameters]):
             ) from error
 
     # ------------------------------------------------------------------ events
-    def _heard_of_somebody(self, heard: Envelope[Any]) -> None:
+    def _component_changed(self, heard: Envelope[Any]) -> None:
         match heard.body:
             case Appeared(component=component) if component.type == CREATOR:
-                self._do(partial(self._begin_meeting, component))
+                self._enqueue(partial(self._begin_meeting, component))
             case Appeared(component=component):
                 self._book.component_appeared(component.address, component.host, component.pid)
                 self._tell_news()
             case Disappeared(address=gone) if gone.startswith(_creator("")):
                 host = gone.removeprefix(_creator(""))
-                self._do(lambda: self._lost_sight_of(host))
+                self._enqueue(lambda: self._lost_sight_of(host))
             case Disappeared(address=gone):
-                self._do(lambda: self._carry_out(self._book.component_disappeared(gone)))
+                self._enqueue(lambda: self._carry_out(self._book.component_disappeared(gone)))
 
     def _nameserver_changed(self, _address: str, alive: bool) -> None:
-        """What was told while the link or the hub was down is lost: look again."""
+        """Compare again, because messages were lost while the link or the hub was down."""
         if alive:
-            self._do(partial(self._begin, self._look_again, "look again"))
+            self._enqueue(partial(self._begin, self._look_again, "look again"))
 
     def _load_heard(self, heard: Envelope[HostLoad]) -> None:
         self._carry_out(self._book.load_heard(heard.body))
@@ -440,9 +439,9 @@ class Placer(Component[NoParameters]):
         if record is not None and fell.restart_in_s < 0:
             self._carry_out(self._book.component_disappeared(record.address))
 
-    def _do(self, begin: Callable[[], None]) -> None:
-        """Have ``serve`` begin this; events come before the component serves."""
-        self._to_do.put_nowait(begin)
+    def _enqueue(self, begin: Callable[[], None]) -> None:
+        """Queue this for ``serve``, because events arrive before the component serves."""
+        self._queue.put_nowait(begin)
 
     def _begin(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
         self.start_task(work(), name)
@@ -451,14 +450,14 @@ class Placer(Component[NoParameters]):
         for instruction in instructions:
             match instruction:
                 case PlaceAgain(name=name):
-                    self._do(partial(self._begin, partial(self._place_again, name), f"place {name} again"))
-                case EndStray(host=host, name=name):
-                    self._do(partial(self._begin, partial(self._end_stray, host, name), f"end {name} on {host}"))
+                    self._enqueue(partial(self._begin, partial(self._place_again, name), f"place {name} again"))
+                case EndOrphan(host=host, name=name):
+                    self._enqueue(partial(self._begin, partial(self._end_orphan, host, name), f"end {name} on {host}"))
                 case Inspect(host=host) if host in self._inspecting:
-                    pass  # whoever is still suspect after that is asked about again with the next load
+                    pass  # the next load inspects components that are still suspect
                 case Inspect(host=host):
                     self._inspecting.add(host)
-                    self._do(partial(self._begin, partial(self._inspect, host), f"inspect {host}"))
+                    self._enqueue(partial(self._begin, partial(self._inspect, host), f"inspect {host}"))
                 case Note(subject=subject, what=what):
                     self.story.note(subject, what)
                 case _:
@@ -467,7 +466,7 @@ class Placer(Component[NoParameters]):
         self.changed()
 
     def _creator_status_heard(self, heard: Envelope[ComponentState]) -> None:
-        """Move a creator's components at its first word of leaving; its token still stands while it ends them."""
+        """Place a creator's components again as soon as it drains; its token stands until it has ended them."""
         creator = heard.body
         if creator.state in LEAVING and self._book.knows_creator(creator.host, creator.pid):
             self._carry_out(self._book.creator_down(creator.host, self.clock.now_s()))
@@ -485,12 +484,12 @@ class Placer(Component[NoParameters]):
         )
 
     async def _look_again(self) -> None:
-        """Compare the nameserver's list of creators with the book, once it is complete with what is missing too."""
+        """Compare the nameserver's list of creators with the book; a complete list also shows missing creators."""
         while True:
             try:
                 found = await self._creators()
-            except LinkError as error:  # its token rises again when it is back, and this begins anew
-                self.story.note(component_of(NAMESERVER), f"does not tell who is there: {error}")
+            except LinkError as error:  # when the nameserver is back, its token starts this again
+                self.story.note(component_of(NAMESERVER), f"does not list the creators: {error}")
                 return
             for creator in found.components:
                 if self._book.knows_creator(creator.host, creator.pid):
@@ -507,7 +506,7 @@ class Placer(Component[NoParameters]):
                 self._lost_sight_of(host.name)
 
     def _lost_sight_of(self, host: str) -> None:
-        """Take note that a creator's token fell without a word: on this host it died, another may be cut off."""
+        """Record a creator's fallen token: a creator of this host died, one of another host may be cut off."""
         fence_s = 0.0 if host == self.launch.host else CUT_OFF_ENDS_WITHIN_S * self.clock.rate
         self._carry_out(self._book.creator_down(host, self.clock.now_s(), fence_s))
 
@@ -517,7 +516,7 @@ class Placer(Component[NoParameters]):
             self._begin(partial(self._meet, creator), f"meet {creator.host}")
 
     async def _meet(self, creator: ComponentState) -> None:
-        """Learn what a creator has and runs, and listen to it from here on."""
+        """Collect a creator's tags and processes, and subscribe to its reports."""
         host, asked_s = creator.host, self.clock.now_s()
         self._newest[host] = creator.pid
         self._meeting[host] = self._meeting.get(host, 0) + 1
@@ -538,16 +537,16 @@ class Placer(Component[NoParameters]):
                 each_s=ANSWER_EACH_S,
                 within_s=ANSWER_WITHIN_S,
             )
-        except LinkError as error:  # it may only be slow: it is asked again for as long as it is there
-            self.story.note(host, f"its creator does not tell what it runs: {error}")
-            self._do(partial(self._begin, partial(self._meet_later, creator), f"meet {host} later"))
+        except LinkError as error:  # it may only be slow: ask again while its token stands
+            self.story.note(host, f"its creator does not list its processes: {error}")
+            self._enqueue(partial(self._begin, partial(self._meet_later, creator), f"meet {host} later"))
             return
         finally:
             self._meeting[host] -= 1
             if not self._meeting[host]:
                 del self._meeting[host]
             self._tell_news()
-        if self._newest[host] == creator.pid:  # else its successor is being met, and answers for itself
+        if self._newest[host] == creator.pid:  # else the placer meets its successor instead
             self._carry_out(self._book.creator_up(host, answered.tags, creator.pid, answered.processes, asked_s))
 
     async def _meet_later(self, creator: ComponentState) -> None:
@@ -568,7 +567,7 @@ class Placer(Component[NoParameters]):
             self._carry_out(self._book.inspected(host, processes.processes, asked_s))
 
     async def _ask_processes(self, host: str) -> Processes | None:
-        """Return what the host's creator says it runs; None if it does not answer or is known to be gone."""
+        """Return the list of the host's creator; None if it does not answer or is gone."""
         until_s = self.clock.now_s() + ANSWER_WITHIN_S * self.clock.rate
         while self.clock.now_s() < until_s and self._book.is_alive(host):
             try:
@@ -579,7 +578,7 @@ class Placer(Component[NoParameters]):
 
     # ------------------------------------------------------------------ after a loss
     async def _place_again(self, name: str) -> None:
-        """Start a missing component again until it runs or is unwanted; without a host it waits for a creator."""
+        """Start a missing component until it runs or is unwanted; without a possible host it waits for a creator."""
         record = self._book.find(name)
         if record is None or record.phase is not Phase.WAITING or record.unwanted:
             return
@@ -600,7 +599,7 @@ class Placer(Component[NoParameters]):
             except Refusal as refusal:
                 self.story.note(name, f"could not be started again: {refusal.detail}")
                 record.cause = f"could not be started again: {refusal.detail}"
-                if record.phase is not Phase.STARTING:  # its creator will tell whether it runs
+                if record.phase is not Phase.STARTING:  # its creator's list decides whether it runs
                     break
                 self.changed()
             else:
@@ -610,13 +609,13 @@ class Placer(Component[NoParameters]):
         self.changed()
 
     async def _pause(self, record: Record, pause_s: float) -> None:
-        """Return after this many seconds of the machine, at once if the component is unwanted."""
+        """Return after this many seconds of the machine, or when the component is unwanted."""
         until_s = self.clock.now_s() + pause_s * self.clock.rate
         while self.clock.now_s() < until_s and not record.unwanted:
             await self._news_or(until_s)
 
     async def _old_life_ended(self, record: Record) -> None:
-        """Return when nobody has the name any more: its last holder dies a moment after its creator, or comes back."""
+        """Return when the name is free or has returned, because a component dies a moment after its creator."""
         name, until_s = record.spawn.name, self.clock.now_s() + OLD_LIFE_S * self.clock.rate
         while self.clock.now_s() < until_s and record.phase is Phase.STARTING and not record.unwanted:
             try:
@@ -624,25 +623,25 @@ class Placer(Component[NoParameters]):
             except UnknownName:
                 return
             except LinkError as error:
-                self.story.note(name, f"nobody tells whether its old life ended: {error}")
+                self.story.note(name, f"it is unknown whether its old process has ended: {error}")
             await self._news_or(min(until_s, self.clock.now_s() + ANSWER_EACH_S / 5 * self.clock.rate))
 
-    async def _end_stray(self, host: str, name: str) -> None:
+    async def _end_orphan(self, host: str, name: str) -> None:
         try:
             by = await self._end_on(host, name, "it is not wanted here any more")
         except Refusal as refusal:
             self.story.note(name, f"could not be ended on {host}: {refusal.detail}")
             return
-        self._strays += 1
+        self._orphans += 1
         self.story.note(name, f"was ended on {host}, by {by}")
 
-    # ------------------------------------------------------------------ waiting for what others tell
+    # ------------------------------------------------------------------ waiting for news
     def _tell_news(self) -> None:
         self._something_happened.set()
         self._something_happened = asyncio.Event()
 
     async def _news_or(self, at_s: float) -> None:
-        """Return when something was heard, or at this mission time."""
+        """Return after the next event, or at this mission time."""
         news = asyncio.ensure_future(self._something_happened.wait())
         time = asyncio.ensure_future(self.clock.sleep_until_s(at_s))
         try:

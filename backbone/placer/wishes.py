@@ -1,9 +1,9 @@
-"""A wish: one component that its owner wants to run, kept true through the placer.
+"""A wish: one component that its owner wants to run; the owner keeps it placed through the placer.
 
-``Wish`` is pure: it turns what happened into pauses and into the absence that the owner reports. ``keep_placed`` is
-the loop around it. The owner compares wish and fact again and again: how a component came to be missing (an exit
-code, a signal, a lost host, a placer that lost its memory) makes no difference. Only two things end a wish: its owner
-cancels the loop, or the placer was ordered to stop the component.
+``Wish`` is pure: it turns events into pauses and into the absence that the owner reports. ``keep_placed`` is the loop
+around it. The owner compares wish and fact repeatedly, so the reason of an absence (an exit code, a signal, a lost
+host, a restarted placer) makes no difference. A wish ends in two ways: its owner cancels the loop, or an order to the
+placer stops the component.
 
 Prior art: level-triggered controllers of Kubernetes; permanent children of Erlang supervisors.
 """
@@ -16,8 +16,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.companion import Companion
 from backbone.component.messages import Absence
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import NameTaken
@@ -38,9 +38,9 @@ class Wish:
 
     Attributes:
         name: The component.
-        missing_since_s: When it was first found missing; negative: it is placed, or is being started.
+        missing_since_s: Mission time at which it was found missing; negative: it is placed, or is being started.
         cause: Why it is missing.
-        started: Whether it ever was placed.
+        started: True if it was ever placed.
     """
 
     name: str
@@ -50,23 +50,23 @@ class Wish:
     _pause_s: float = PAUSE_FIRST_S
 
     def placed(self) -> None:
-        """Take note that the placer has it."""
+        """Record that the placer has the component."""
         self.missing_since_s, self.cause, self.started, self._pause_s = -1.0, "", True, PAUSE_FIRST_S
 
     def missing(self, cause: str, now_s: float) -> None:
-        """Take note that the placer does not have it."""
+        """Record that the placer does not have the component."""
         self.cause = cause
         if self.missing_since_s < 0:
             self.missing_since_s = now_s
 
     def not_started(self, cause: str, now_s: float) -> float:
-        """Take note that a start failed; return the pause before the next one, seconds of the machine."""
+        """Record a failed start; return the pause before the next start, seconds of the machine."""
         self.missing(cause, now_s)
         pause_s, self._pause_s = self._pause_s, min(2 * self._pause_s, PAUSE_MOST_S)
         return pause_s
 
     def absence(self) -> Absence | None:
-        """Return what its owner reports about it; None while it is placed."""
+        """Return the absence that its owner reports; None while it is placed."""
         if self.missing_since_s < 0:
             return None
         return Absence(self.name, self.missing_since_s, self.cause, "its owner asks the placer to start it")
@@ -82,23 +82,23 @@ async def keep_placed(
     on_changed: Callable[[], None] = lambda: None,
     patience_s: float = 0.0,
 ) -> str:
-    """Have the component placed, and placed again whenever it is missing; return why it was ordered to stop.
+    """Place the component, and place it again whenever it is missing; return the reason of the order that stops it.
 
     Args:
-        bus: The owner's.
-        wish: Of this owner, for this component.
-        order: How it is started.
-        address: Of the component.
-        on_placed: Called whenever it was started, with True if it was running from before.
+        bus: Bus of the owner.
+        wish: The owner's wish for this component.
+        order: Order that starts it.
+        address: Address of the component.
+        on_placed: Called after each start, with True if the component ran already.
         on_changed: Called when ``wish.absence()`` may have changed.
-        patience_s: For so long the very first start is tried again after a refusal, seconds of the machine: a host
-            that is just coming back may be the reason.
+        patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be
+            returning.
 
     Raises:
-        Refusal: The very first start was refused: that is for the owner to judge.
+        Refusal: The first start was refused, and the owner decides what follows.
     """
     give_up_s = clock.now_s() + patience_s * clock.rate
-    component, placer = Companion(bus, address), Companion(bus, PLACER)
+    component, placer = PeerMonitor(bus, address), PeerMonitor(bus, PLACER)
     try:
         while True:
             try:
@@ -121,7 +121,7 @@ async def keep_placed(
 async def _start(
     bus: Bus, clock: Clock, wish: Wish, order: Start, on_changed: Callable[[], None], give_up_s: float
 ) -> tuple[Placement, bool]:
-    """Return the placement, and whether the component was running from before."""
+    """Return the placement, and whether the component ran already."""
     while True:
         try:
             started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
@@ -131,7 +131,7 @@ async def _start(
             except NotPlaced as refusal:
                 if wish.started and refusal.facts.get("stopped"):  # the order to stop is newer than this wish
                     raise StoppedMeanwhile(refusal.detail) from refusal
-                cause = refusal.detail  # its former life is ending
+                cause = refusal.detail  # its old process is ending
             except (LinkError, Refusal) as error:
                 cause = str(error)
         except StoppedMeanwhile:
@@ -152,9 +152,9 @@ async def _start(
 
 
 async def _wait_missing(
-    bus: Bus, clock: Clock, wish: Wish, component: Companion, placer: Companion, on_changed: Callable[[], None]
+    bus: Bus, clock: Clock, wish: Wish, component: PeerMonitor, placer: PeerMonitor, on_changed: Callable[[], None]
 ) -> NotPlaced:
-    """Return the placer's word that it does not have the component; one that cannot be reached is missed meanwhile."""
+    """Return the placer's answer that it lacks the component; meanwhile an unreachable component is absent."""
     compared_with = placer.times_risen
     while True:
         if component.is_there and wish.absence() is not None:
@@ -179,7 +179,7 @@ async def _wait_missing(
             log.info("the placer does not answer about %s: %s", wish.name, error)
             await clock.sleep_s(PAUSE_FIRST_S * clock.rate)
             continue
-        if not component.is_there:  # its creator or the placer works on it: compare again, not at once
+        if not component.is_there:  # its creator or the placer restarts it: compare again after a pause
             await _first_of(component.wait_there(), clock.sleep_s(PAUSE_MOST_S * clock.rate))
 
 

@@ -176,7 +176,7 @@ class LinkedNetwork(LocalNetwork):
         self.links: dict[SimulatedProcess, Link] = {}
         self._hub_name = hub
         self._hub: Link | None = None
-        self._told: dict[Watching, set[str]] = {}
+        self._reported: dict[Watching, set[str]] = {}
         self._host_cuts: dict[str, int] = {}
         self._hub_is_paused = 0
         self._begun: list[SimulatedProcess] = []
@@ -343,7 +343,7 @@ class LinkedNetwork(LocalNetwork):
 
     def _look(self, watching: Watching, address: str) -> None:
         if watching.closed:
-            self._told.pop(watching, None)
+            self._reported.pop(watching, None)
             return
         if not watching.concerns(address):
             return
@@ -353,7 +353,7 @@ class LinkedNetwork(LocalNetwork):
             for token in self.tokens.get(address, ())
             if not _bus(token).link.process.is_dead
         )
-        told = self._told.setdefault(watching, set())
+        told = self._reported.setdefault(watching, set())
         if stands is (address in told):
             return
         if stands:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
 from backbone.log_question import LONGEST_WORDS, LogQuestion, WrongSearch
-from backbone.mission_log import FOR_EVER_S, MOST_TOLD, AskLog
+from backbone.mission_log import FOR_EVER_S, MOST_EVENTS, AskLog
 from backbone.moments import NoMoment, Now
 
 NOW = Now(1000.0, datetime(2026, 5, 4, 14, 10, 30), rate=2.0)
@@ -29,7 +29,7 @@ def test_whatever_is_typed_the_question_has_the_limits_of_the_bus_or_is_refused(
         return
     assert msgspec.convert(msgspec.to_builtins(asked), AskLog) == asked
     assert 0 <= asked.since_s <= asked.until_s <= FOR_EVER_S
-    assert asked.most == MOST_TOLD
+    assert asked.most == MOST_EVENTS
 
 
 @pytest.mark.parametrize(

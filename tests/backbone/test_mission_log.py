@@ -34,11 +34,11 @@ TAKEN = event(40.0, "scout10", "was taken over by anna", LogLevel.NOTICE)
 ALL = [DROVE, STOPPED, FELL, TAKEN]
 
 
-def told(**asked: Any) -> list[StoryEvent]:
+def answer(**asked: Any) -> list[StoryEvent]:
     log = MissionLog()
     for one in ALL:
         log.add(one)
-    return log.told(AskLog(**asked)).events
+    return log.answer(AskLog(**asked)).events
 
 
 @pytest.mark.parametrize(
@@ -58,14 +58,14 @@ def told(**asked: Any) -> list[StoryEvent]:
     ],
 )
 def test_who_moved_a_robot_when_and_what_went_wrong_is_found(asked: dict[str, Any], found: list[StoryEvent]) -> None:
-    assert told(**asked) == found
+    assert answer(**asked) == found
 
 
 def test_what_is_left_out_and_what_is_not_kept_any_more_is_told() -> None:
     log = MissionLog(kept=3)
     for one in ALL:
         log.add(one)
-    assert log.told(AskLog(most=2)) == Log([FELL, TAKEN], left_out=1, since_s=20.0)
+    assert log.answer(AskLog(most=2)) == Log([FELL, TAKEN], left_out=1, since_s=20.0)
 
 
 @given(st.lists(st.tuples(st.floats(0, 100), st.sampled_from(list(LogLevel))), max_size=30), st.integers(1, 10))
@@ -73,7 +73,7 @@ def test_the_newest_that_fit_are_told_oldest_first(events: list[tuple[float, Log
     log = MissionLog()
     for at_s, level in events:
         log.add(event(at_s, "scout1", "happened", level))
-    found = log.told(AskLog(level=LogLevel.NOTICE, most=most))
+    found = log.answer(AskLog(level=LogLevel.NOTICE, most=most))
     fitting = sorted(at_s for at_s, level in events if level is not LogLevel.INFO)
     assert [one.at_s for one in found.events] == fitting[-most:]
     assert found.left_out == max(0, len(fitting) - most)
@@ -91,10 +91,10 @@ def test_the_keeper_hears_components_and_people_and_calls_people_by_their_names(
         acted = OperatorActed("Anna B.", OperatorAction.STOP_ROBOT, "scout1", "", 2.0)
         console.publish(CONSOLE, Conversation.OPERATORS, acted)
         await VirtualClock().sleep_s(0.1)
-        first, second = keeper.log.told(AskLog()).events
+        first, second = keeper.log.answer(AskLog()).events
         assert (first.subject, first.what) == ("Anna B.", "took it from Anna B.")
         assert (second.subject, second.user, second.level) == ("scout1", "Anna B.", LogLevel.ALARM)
-        assert keeper.log.told(AskLog(person="anna b.", level=LogLevel.ALARM)).events == [second]
+        assert keeper.log.answer(AskLog(person="anna b.", level=LogLevel.ALARM)).events == [second]
 
     run_virtual(main())
 

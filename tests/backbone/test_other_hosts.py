@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from backbone.cli import app
 from backbone.health import HealthWord, health
 from backbone.mission.model import Host, MissionDescription
-from backbone.other_hosts import OtherHosts, command_on, door_for_others
+from backbone.other_hosts import OtherHosts, command_on, endpoint_for_others
 
 BASE, FAR, ATTIC = (
     Host(name="base", address="192.0.2.1"),
@@ -26,8 +26,8 @@ def mission(*hosts: Host) -> MissionDescription:
 def test_hosts_with_loopback_addresses_are_this_machine() -> None:
     described = mission(BASE, Host(name="a", address="127.0.0.2"), Host(name="b", address="localhost"), FAR)
     assert [host.name for host in described.other_hosts] == ["far"]
-    assert door_for_others(mission(BASE)) == ""
-    assert door_for_others(described) == "tcp/192.0.2.1:7447"
+    assert endpoint_for_others(mission(BASE)) == ""
+    assert endpoint_for_others(described) == "tcp/192.0.2.1:7447"
 
 
 def test_each_is_missed_until_its_creators_token_stands_and_again_when_it_falls() -> None:

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from backbone.authentication import SocketPathTooLong
 from backbone.bring_up import run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.cli import app
 from backbone.core_launches import UpOptions
-from backbone.door import SocketPathTooLong
 from backbone.errors import Refusal
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission.reader import read_mission

@@ -13,8 +13,8 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.companion import Companion
 from backbone.component.launch import Launch
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.naming import Subsystem
 from ui_console.console_events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.driving import Drive
@@ -120,9 +120,9 @@ async def consoles_at_work(
         own = await ZenohBus.open_when_up(mission.name, console.launch.address, clock, client_config(found.endpoint))
         lives.append(console.run(own))
     for console in consoles:
-        companion = Companion(bus, console.launch.address)
-        await companion.wait_there()
-        companion.close()
+        monitor = PeerMonitor(bus, console.launch.address)
+        await monitor.wait_there()
+        monitor.close()
     try:
         yield consoles
     finally:

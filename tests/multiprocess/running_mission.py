@@ -21,9 +21,9 @@ from typing import Any
 import psutil
 
 from backbone import run_files
+from backbone.authentication import secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.door import secret_of
 
 MISSION_XML = Path(__file__).parents[2] / "mission.xml"
 READY_WITHIN_S = 60.0

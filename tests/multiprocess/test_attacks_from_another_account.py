@@ -108,7 +108,7 @@ async def test_no_attack_from_another_account_changes_a_mission_on_one_machine(v
 
 
 async def test_the_missions_own_account_starts_no_class_and_opens_no_file_through_a_creator(victim: Path) -> None:
-    """The attacks are real: inside the door those that a user may do succeed, and only those."""
+    """The attacks are real: from the mission's own account those that a user may do succeed, and only those."""
     with mission_up() as mission:
         async with mission.bus() as bus:
             await stop_scout3(bus)

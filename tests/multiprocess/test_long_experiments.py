@@ -108,7 +108,7 @@ def gaps(slices: Sequence[Slice]) -> list[float]:
     return [later.granted_s - earlier.revoked_s for earlier, later in pairwise(slices) if earlier.arc != later.arc]
 
 
-def told(what: str, values_s: Sequence[float]) -> None:
+def print_spread(what: str, values_s: Sequence[float]) -> None:
     ordered = sorted(values_s)
     p99 = ordered[min(len(ordered) - 1, len(ordered) * 99 // 100)]
     print(
@@ -130,8 +130,8 @@ def test_figure_2s_mission_for_ten_minutes(tmp_path: Path, judged: Judged) -> No
     slices = contested(trace, watchers)
     lengths = [one.revoked_s - one.granted_s for one in slices]
     between = gaps(slices)
-    told("slices beyond 5 s", [length - 5.0 for length in lengths])
-    told("switches beside settling", [gap - SETTLING_S for gap in between])
+    print_spread("slices beyond 5 s", [length - 5.0 for length in lengths])
+    print_spread("switches beside settling", [gap - SETTLING_S for gap in between])
     assert len(slices) >= (seconds - 10) / 5.4, len(slices)
     assert all(earlier.arc != later.arc for earlier, later in pairwise(slices)), slices
     assert all(abs(length - 5.0) <= SLICE_TOLERANCE_S for length in lengths), sorted(lengths)
@@ -294,9 +294,9 @@ async def test_two_groups_switch_on_their_own_clocks(tmp_path: Path, judged: Jud
     with_it, without_it = phases_of(trace, second)
     beside = [switches_in(slices, phase) for phase in with_it[:PHASES]]  # the mission ended in one more
     alone = [switches_in(slices, phase) for phase in without_it]
-    told("first group alone", [time_s for phase in alone for time_s in phase])
-    told("first group beside the second", [time_s for phase in beside for time_s in phase])
-    told(
+    print_spread("first group alone", [time_s for phase in alone for time_s in phase])
+    print_spread("first group beside the second", [time_s for phase in beside for time_s in phase])
+    print_spread(
         "second group",
         [time_s for phase in with_it[:PHASES] for time_s in switches_in(slices_of(trace, second), phase)],
     )
@@ -564,8 +564,8 @@ async def test_the_rc_manager_falls_a_hundred_times_in_a_busy_mission() -> None:
             }
             world = (await bus.ask(WORLD, AskStatistics(), Statistics, within_s=2)).values
         story = mission.story()
-    told("ready again", fallen.ready_s)
-    told("all requests known", fallen.known_s)
+    print_spread("ready again", fallen.ready_s)
+    print_spread("all requests known", fallen.known_s)
     compared = {arc: fallen.unchanged.count(arc) for arc in sorted(set(fallen.unchanged))}
     sent = require_that_all_told_was_sent(driver, seen)
     print(f"unchanged across falls: {compared}; {sent} commands applied and sent, {driven.refused} refused")

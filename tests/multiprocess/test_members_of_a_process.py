@@ -128,7 +128,7 @@ async def test_a_terminated_process_is_followed_by_one_with_all_its_members(host
     assert {(fell.name, fell.how) for fell in host.fell} == {("scout1", "exit code 0"), ("radio", "exit code 0")}
 
 
-async def test_a_member_that_hangs_is_killed_with_its_process_and_its_companions_come_back(host: CreatorHost) -> None:
+async def test_a_member_that_hangs_is_killed_with_its_process_and_the_others_come_back(host: CreatorHost) -> None:
     pid = await join(host, "scout1")
     await join(host, "stubborn", "Stubborn")
     assert (await host.end("stubborn")).by is EndedBy.SIGKILL

@@ -20,9 +20,9 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.component.companion import Companion
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, AskStory, ComponentState, Statistics, Story
+from backbone.component.peer_monitor import PeerMonitor
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
@@ -155,7 +155,7 @@ async def watcher_holds_scout1(bus: Bus) -> None:
     """Return when the watcher has its robot (again)."""
     told = asyncio.Event()
     status = bus.subscribe(WATCHER, Conversation.STATUS, ComponentState, lambda _state: told.set())
-    watcher = Companion(bus, WATCHER)
+    watcher = PeerMonitor(bus, WATCHER)
     try:
         async with asyncio.timeout(RESUMED_WITHIN_S):
             await watcher.wait_there()

@@ -1,4 +1,4 @@
-"""A network inside one process on which single speakers can be cut off: what is said meanwhile arrives afterwards."""
+"""A network inside one process that can cut off single components; their messages arrive when the cut is healed."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Act = Callable[[], None]
 
 
 class CutNetwork(LocalNetwork):
-    """Keeps questions, answers and publications of whoever is cut off until the cut is healed; tokens stand."""
+    """Keeps the messages of a component that is cut off until the cut is healed; tokens stand."""
 
     def __init__(self, mission: str) -> None:
         super().__init__(mission)
         self._kept: dict[str, list[Act]] = {}
 
     def cut(self, source: str) -> None:
-        """Let nothing pass to or from this speaker."""
+        """Let nothing pass to or from this component."""
         self._kept.setdefault(source, [])
 
     def heal(self, source: str) -> None:

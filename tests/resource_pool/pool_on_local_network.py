@@ -289,9 +289,9 @@ class Pool:
     def ear(self) -> Bus:
         return self.running["world"].bus
 
-    def voice(self, speaker: str) -> Bus:
-        """Return a bus on which the test speaks as this component of the resource pool."""
-        return self.voice_of(address(Subsystem.RESOURCE_POOL, speaker))
+    def voice(self, component: str) -> Bus:
+        """Return a bus on which the test acts as this component of the resource pool."""
+        return self.voice_of(address(Subsystem.RESOURCE_POOL, component))
 
     @property
     def manager_voice(self) -> Bus:

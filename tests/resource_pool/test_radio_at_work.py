@@ -35,7 +35,7 @@ async def load(pool: Pool, arc: str, epoch: int, payload: bytes, robot: str = "s
     await pool.voice(robot).ask(RADIO, order, PacketLoaded, within_s=1)
 
 
-def told(pool: Pool) -> list[tuple[str, str]]:
+def radio_log(pool: Pool) -> list[tuple[str, str]]:
     """Return what the radio says from now on about whom; grows."""
     said: list[tuple[str, str]] = []
 
@@ -95,7 +95,7 @@ def test_who_sends_at_once_as_often_as_it_can_takes_nobody_elses_turns(local_mis
 def test_a_packet_that_takes_longer_than_declared_raises_one_alarm_for_each_stream(local_mission: Any) -> None:
     async def main() -> None:
         async with a_pool(local_mission, ["radio"], manager=False) as pool:
-            said = told(pool)
+            said = radio_log(pool)
             await connect(pool, "one", 1, DRIVE, ASK)
             await load(pool, "one", 1, b"D")
             await pool.clock.sleep_s(0.5)
@@ -126,7 +126,7 @@ def test_a_simulated_radio_takes_as_long_as_the_bytes_at_its_rate(local_mission:
     async def main() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             await pool.rc("radio", options={"bits_per_s": 9600})
-            said = told(pool)
+            said = radio_log(pool)
             await connect(pool, "one", 1, DRIVE)
             await load(pool, "one", 1, b"D12345678")
             await pool.clock.sleep_s(0.2)

@@ -12,7 +12,7 @@ from resource_pool.simulation.audit import Happening
 from resource_pool.simulation.laws import Broken, first_broken, story_of
 from resource_pool.simulation.shape import MissionShape, OwnerShape, draw_shape
 
-Told = tuple[float, str, str, dict[str, Any]]
+Entry = tuple[float, str, str, dict[str, Any]]
 
 
 def shape_of(*owners: OwnerShape) -> MissionShape:
@@ -31,24 +31,24 @@ def owner(name: str, priority: int) -> OwnerShape:
 A, B = owner("a", 2), owner("b", 1)
 
 
-def judged(*told: Told) -> Broken | None:
-    return first_broken(shape_of(A, B), [Happening(*one) for one in told])
+def judged(*entries: Entry) -> Broken | None:
+    return first_broken(shape_of(A, B), [Happening(*one) for one in entries])
 
 
-def held(at_s: float, rc: str, arc: str, epoch: int) -> Told:
+def held(at_s: float, rc: str, arc: str, epoch: int) -> Entry:
     return (at_s, rc, "held", {"arc": arc, "epoch": epoch})
 
 
-def let_go(at_s: float, rc: str, arc: str, epoch: int) -> Told:
+def let_go(at_s: float, rc: str, arc: str, epoch: int) -> Entry:
     return (at_s, rc, "let go", {"arc": arc, "epoch": epoch})
 
 
-def packet(at_s: float, command: str, arc: str, epoch: int) -> Told:
+def packet(at_s: float, command: str, arc: str, epoch: int) -> Entry:
     return (at_s, "radio1", "packet", {"robot": 1, "command": command, "arc": arc, "epoch": epoch})
 
 
-def broken_law(*told: Told) -> str:
-    broken = judged(*told)
+def broken_law(*entries: Entry) -> str:
+    broken = judged(*entries)
     assert broken is not None
     return broken.law
 
@@ -69,7 +69,7 @@ def test_two_holders_of_a_radio_break_nothing() -> None:
 
 
 def test_an_epoch_that_does_not_grow_over_a_restart_breaks_epochs_grow() -> None:
-    restart: list[Told] = [(2, "scout1", "killed", {}), (3, "scout1", "begins", {})]
+    restart: list[Entry] = [(2, "scout1", "killed", {}), (3, "scout1", "begins", {})]
     assert judged(held(1, "scout1", "a-drive", 5), *restart, held(4, "scout1", "a-drive", 6)) is None
     assert broken_law(held(1, "scout1", "a-drive", 5), *restart, held(4, "scout1", "a-drive", 5)) == "epochs-grow"
 
@@ -93,23 +93,23 @@ def test_a_packet_for_an_arc_that_does_not_hold_the_radio_breaks_fenced() -> Non
 
 def test_a_radio_that_calls_itself_safe_after_a_drive_packet_breaks_safe() -> None:
     begun = (held(1, "radio1", "a-drive", 1), packet(1.1, "D", "a-drive", 1), let_go(2, "radio1", "a-drive", 1))
-    safe: Told = (2.1, "radio1", "safe", {"arc": "a-drive", "epoch": 1})
+    safe: Entry = (2.1, "radio1", "safe", {"arc": "a-drive", "epoch": 1})
     assert broken_law(*begun, safe) == "safe"
     assert judged(*begun, packet(2.05, "S", "a-drive", 1), safe) is None
 
 
 def test_an_arc_that_is_called_free_and_goes_on_holding_breaks_freed() -> None:
-    free: Told = (2, "rc_manager", "free", {"arc": "a-drive"})
-    later: Told = (3, "mission", "calm", {})
+    free: Entry = (2, "rc_manager", "free", {"arc": "a-drive"})
+    later: Entry = (3, "mission", "calm", {})
     assert broken_law(held(1, "scout1", "a-drive", 1), free, later) == "freed"
     assert judged(held(1, "scout1", "a-drive", 1), free, let_go(2.1, "scout1", "a-drive", 1), later) is None
 
 
 def test_an_rc_that_is_up_again_and_still_held_by_an_arc_that_is_called_free_breaks_freed() -> None:
-    free: Told = (2, "rc_manager", "free", {"arc": "a-drive"})
-    down: Told = (1.9, "rc_manager", "rc_state", {"id": "scout1", "state": "down"})
-    up: Told = (5, "rc_manager", "rc_state", {"id": "scout1", "state": "up"})
-    later: Told = (6, "mission", "calm", {})
+    free: Entry = (2, "rc_manager", "free", {"arc": "a-drive"})
+    down: Entry = (1.9, "rc_manager", "rc_state", {"id": "scout1", "state": "down"})
+    up: Entry = (5, "rc_manager", "rc_state", {"id": "scout1", "state": "up"})
+    later: Entry = (6, "mission", "calm", {})
     begun = (held(1, "scout1", "a-drive", 1), down, free)
     assert judged(*begun, later) is None
     assert broken_law(*begun, up, later) == "freed"
@@ -117,22 +117,22 @@ def test_an_rc_that_is_up_again_and_still_held_by_an_arc_that_is_called_free_bre
 
 
 def test_a_gate_that_opens_over_what_was_never_connected_breaks_whole_set() -> None:
-    opened: Told = (2, "a-drive", "open", {"epochs": {"scout1": 1, "radio1": 1}})
+    opened: Entry = (2, "a-drive", "open", {"epochs": {"scout1": 1, "radio1": 1}})
     assert broken_law(held(1, "scout1", "a-drive", 1), opened) == "whole-set"
 
 
 def test_an_owner_that_believes_for_too_long_what_is_not_so_breaks_true() -> None:
-    told: Told = (1, "a", "resumed", {"arc": "a-drive", "epochs": {"scout1": 1}})
-    assert judged(told, (5, "mission", "storm", {})) is None
-    assert broken_law(told, (30, "mission", "storm", {})) == "true"
-    assert broken_law(told, (2, "mission", "calm", {}), (11, "mission", "over", {})) == "true"
+    resumed: Entry = (1, "a", "resumed", {"arc": "a-drive", "epochs": {"scout1": 1}})
+    assert judged(resumed, (5, "mission", "storm", {})) is None
+    assert broken_law(resumed, (30, "mission", "storm", {})) == "true"
+    assert broken_law(resumed, (2, "mission", "calm", {}), (11, "mission", "over", {})) == "true"
 
 
 def test_who_wants_and_never_gets_breaks_progress_unless_somebody_is_above_it() -> None:
-    calm: Told = (1, "mission", "calm", {})
-    over: Told = (20, "mission", "over", {})
-    wants: list[Told] = [(2, "a", "wants", {}), (2, "b", "wants", {})]
-    run: list[Told] = [
+    calm: Entry = (1, "mission", "calm", {})
+    over: Entry = (20, "mission", "over", {})
+    wants: list[Entry] = [(2, "a", "wants", {}), (2, "b", "wants", {})]
+    run: list[Entry] = [
         held(3, "scout1", "a-drive", 1),
         (3, "a-drive", "open", {"epochs": {"scout1": 1}}),
         (3, "a", "resumed", {"arc": "a-drive", "epochs": {"scout1": 1}}),
@@ -149,8 +149,8 @@ def test_bugs_and_broken_promises_are_told(what: str, values: dict[str, str], la
 
 
 def test_a_story_is_about_those_concerned_and_ends_with_the_breach() -> None:
-    told = [held(1, "scout1", "a-drive", 1), held(1, "radio1", "c-drive", 1), held(2, "scout1", "b-drive", 2)]
-    happenings = [Happening(*one) for one in [*told, let_go(3, "scout1", "b-drive", 2)]]
+    entries = [held(1, "scout1", "a-drive", 1), held(1, "radio1", "c-drive", 1), held(2, "scout1", "b-drive", 2)]
+    happenings = [Happening(*one) for one in [*entries, let_go(3, "scout1", "b-drive", 2)]]
     broken = first_broken(shape_of(A, B), happenings)
     assert broken is not None
     assert story_of(broken, happenings) == [happenings[0], happenings[2]]
@@ -164,17 +164,17 @@ def test_a_seed_means_one_mission() -> None:
 
 
 def test_what_is_taken_undecided_after_the_rc_managers_death_breaks_kept() -> None:
-    running: list[Told] = [
+    running: list[Entry] = [
         held(1, "scout1", "a-drive", 1),
         (1, "a-drive", "open", {"epochs": {"scout1": 1}}),
         (1, "a", "resumed", {"arc": "a-drive", "epochs": {"scout1": 1}}),
         (5, "rc_manager", "killed", {}),
     ]
-    back: Told = (5.3, "rc_manager", "begins", {})
+    back: Entry = (5.3, "rc_manager", "begins", {})
     end = let_go(6, "scout1", "a-drive", 1)
 
-    def law_of(*told: Told) -> str:
-        broken = first_broken(shape_of(A, B), [Happening(*one) for one in told], all_arrived=True)
+    def law_of(*entries: Entry) -> str:
+        broken = first_broken(shape_of(A, B), [Happening(*one) for one in entries], all_arrived=True)
         return broken.law if broken is not None else ""
 
     assert law_of(*running, back, end) == "kept"

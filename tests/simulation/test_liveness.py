@@ -7,19 +7,19 @@ from typing import Any
 from resource_pool.simulation.audit import Happening
 from resource_pool.simulation.liveness import first_unhealed
 
-Told = tuple[float, str, str, dict[str, Any]]
+Entry = tuple[float, str, str, dict[str, Any]]
 
 
-def broken_law(*told: Told) -> str | None:
-    broken = first_unhealed([Happening(*one) for one in told])
+def broken_law(*entries: Entry) -> str | None:
+    broken = first_unhealed([Happening(*one) for one in entries])
     return broken.law if broken is not None else None
 
 
-def at_the_end(missing: dict[str, str], named: dict[str, str], word: str) -> Told:
+def at_the_end(missing: dict[str, str], named: dict[str, str], word: str) -> Entry:
     return (60.0, "health", "at the end", {"missing": missing, "named": named, "word": word})
 
 
-def fell(name: str, how: str) -> Told:
+def fell(name: str, how: str) -> Entry:
     return (5.0, name, "fell", {"how": how})
 
 

@@ -112,7 +112,7 @@ def description(entry: TypeEntry, facts: Mapping[str, ClassFacts]) -> list[str]:
     if not known.parameters:
         return [*lines, "no parameters"]
     for one in known.parameters:
-        lines.append(f"{one.name}: {one.told}")
+        lines.append(f"{one.name}: {one.summary}")
         if one.doc:
             lines.append(f"    {one.doc}")
     return lines

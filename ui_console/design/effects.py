@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from backbone.mission.edit import NewElement, Node, Path, add, move, outline, place_for, remove, set_attribute
-from backbone.mission.report import told
+from backbone.mission.report import quoted
 from backbone.mission.tables import NETWORK_ID, WORLD
 from backbone.naming import legal
 from ui_console.design.catalogue import stock_resource, stock_type
@@ -124,7 +124,7 @@ def _must_have_type(text: bytes, name: str) -> None:
 
 def _no_type(name: str) -> DesignRefused:
     return DesignRefused(
-        f"no type {told(name)} is declared, and the project brings none along",
+        f"no type {quoted(name)} is declared, and the project brings none along",
         remedy="Add a <type> with its class first.",
     )
 
@@ -305,7 +305,7 @@ def _free(root: Node, tag: str, name: str) -> None:
     kinds = _ONE_SPACE if tag in _ONE_SPACE else (tag,)
     for node in root:
         if node.tag in kinds and node.text("name") == name and _is_named(root, node):
-            raise NameTaken(f"a {node.tag} has the name {told(name)} already")
+            raise NameTaken(f"a {node.tag} has the name {quoted(name)} already")
 
 
 _ONE_SPACE = ("resource", "behavior", "world")  # components of the mission, which all have different names

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import NewElement, Node, Path
-from backbone.mission.report import told, told_names
+from backbone.mission.report import listed, quoted
 from ui_console.design.catalogue import Role, TypeEntry, entries, stock_resource
 from ui_console.design.commands import (
     Add,
@@ -112,8 +112,8 @@ def offer_at(mission: Node, path: Path, label: str) -> Offer:
     kind = label.partition(" ")[0]
     holders = [f"<{tag}>" for tag, rule in vocabulary().items() if kind in rule.children]
     raise DesignRefused(
-        f"{told(label)} cannot be added to <{mission.at(path).tag}> or what it stands in",
-        remedy=f"It belongs in {told_names(holders)}." if holders else "Choose something else.",
+        f"{quoted(label)} cannot be added to <{mission.at(path).tag}> or what it stands in",
+        remedy=f"It belongs in {listed(holders)}." if holders else "Choose something else.",
     )
 
 

@@ -122,7 +122,7 @@ def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> l
             one.default.strip('"') or None,
             not one.default,
             is_parameter=True,
-            doc=" ".join(part for part in (one.doc, f"({one.told})") if part),
+            doc=" ".join(part for part in (one.doc, f"({one.summary})") if part),
             choices=one.words,
         )
         for one in known

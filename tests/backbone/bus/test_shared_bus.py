@@ -107,7 +107,7 @@ async def test_a_neighbor_is_asked_with_the_object_itself_and_a_stranger_with_a_
     assert asked_with[1] is not packet
 
 
-async def test_a_publication_is_heard_once_by_neighbors_strangers_and_its_own_speaker(pool: Pool) -> None:
+async def test_a_publication_is_heard_once_by_neighbors_strangers_and_its_own_bus(pool: Pool) -> None:
     neighbor, own, stranger = Heard(), Heard(), Heard()
     pool.radio.subscribe("resource_pool/*", Conversation.COMMAND, Packet, neighbor)
     pool.scout.subscribe(SCOUT, Conversation.COMMAND, Packet, own)

@@ -62,7 +62,7 @@ class Gait(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Walker(Component[Gait]):
-    """Notes every hook in ``diary`` and stumbles where it is told to."""
+    """Notes every hook in ``diary`` and fails in the hooks that the test names."""
 
     parameters_type = Gait
     accepts = Poke
@@ -135,15 +135,15 @@ class Stage:
     def __init__(self, **walker: Any) -> None:
         self.network, self.clock = LocalNetwork(), VirtualClock()
         self.tower: Bus = self.network.join(TOWER, self.clock)
-        self.told: list[str] = []
+        self.observed: list[str] = []
         self.states: list[ComponentState] = []
         self.tower.subscribe(WALKER, Conversation.STATUS, ComponentState, self.heard)
-        self.tower.watch_alive(WALKER, lambda _address, alive: self.told.append("token" if alive else "no token"))
+        self.tower.watch_alive(WALKER, lambda _address, alive: self.observed.append("token" if alive else "no token"))
         self.walker = Walker(launch(), self.network.join(WALKER, self.clock), self.clock, **walker)
 
     def heard(self, envelope: Envelope[ComponentState]) -> None:
         self.states.append(envelope.body)
-        self.told.append(str(envelope.body.state))
+        self.observed.append(str(envelope.body.state))
 
     async def begin(self) -> asyncio.Task[None]:
         life = asyncio.create_task(self.walker.run())
@@ -173,7 +173,7 @@ def test_the_hooks_run_in_order_and_the_world_sees_each_state() -> None:
         stage.walker.end("enough")
         await life
         assert stage.walker.diary == ["connect connecting", "serve ready", "serve cancelled draining", "drain draining"]
-        assert stage.told == ["ready", "token", "draining", "stopped", "no token"]
+        assert stage.observed == ["ready", "token", "draining", "stopped", "no token"]
         assert stage.walker.state is LifeState.STOPPED
 
     live(law())
@@ -231,7 +231,7 @@ def test_while_it_drains_it_still_stands_and_answers() -> None:
         life = await stage.begin()
         stage.walker.end("enough")
         await stage.clock.sleep_s(1.0)
-        assert stage.told == ["ready", "token", "draining"]
+        assert stage.observed == ["ready", "token", "draining"]
         assert (await stage.ask(AskState(), ComponentState)).state is LifeState.DRAINING
         life.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -247,7 +247,7 @@ def test_told_to_end_while_it_connects_it_ends_without_draining() -> None:
         stage.walker.end("SIGTERM")
         await asyncio.wait_for(life, 1.0)
         assert stage.walker.diary == ["connect connecting"]
-        assert stage.told == ["stopped"]
+        assert stage.observed == ["stopped"]
 
     live(law())
 
@@ -258,7 +258,7 @@ def test_told_to_end_before_it_began_it_never_appears() -> None:
         stage.walker.end("SIGTERM")
         life = await stage.begin()
         await life
-        assert (stage.told, stage.walker.diary) == ([], [])
+        assert (stage.observed, stage.walker.diary) == ([], [])
 
     live(law())
 
@@ -271,7 +271,7 @@ def test_cancelled_it_dies_like_a_killed_process() -> None:
         with pytest.raises(asyncio.CancelledError):
             await life
         await stage.clock.sleep_s(0.1)
-        assert stage.told == ["ready", "token", "no token"]
+        assert stage.observed == ["ready", "token", "no token"]
         assert "drain draining" not in stage.walker.diary
 
     live(law())
@@ -302,7 +302,7 @@ def test_stop_is_answered_and_ends_it() -> None:
         life = await stage.begin()
         assert await stage.ask(Stop("the mission is over"), Stopping) == Stopping()
         await asyncio.wait_for(life, 1.0)
-        assert stage.told[-2:] == ["stopped", "no token"]
+        assert stage.observed[-2:] == ["stopped", "no token"]
         ends = [event for event in stage.walker.story.of() if event.what.startswith("ends")]
         assert [event.what for event in ends] == ["ends: the mission is over"]
         assert ends[0].cause.startswith(f"{TOWER}#")
@@ -345,7 +345,7 @@ def test_a_bug_in_a_hook_ends_it_failed_and_is_raised(
         assert stage.walker.diary == diary
         assert stage.states[-1].state is LifeState.FAILED
         assert stage.states[-1].feedback == f"KeyError: '{where}'"
-        assert stage.told[-1] in ("failed", "no token")
+        assert stage.observed[-1] in ("failed", "no token")
 
     with caplog.at_level(logging.CRITICAL):
         live(law())
@@ -358,7 +358,7 @@ def test_failed_is_said_before_the_token_falls() -> None:
         with pytest.raises(KeyError):
             await life
         await stage.clock.sleep_s(0.1)
-        assert stage.told == ["ready", "token", "draining", "failed", "no token"]
+        assert stage.observed == ["ready", "token", "draining", "failed", "no token"]
 
     live(law())
 

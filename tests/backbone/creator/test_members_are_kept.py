@@ -199,7 +199,7 @@ def test_a_terminated_process_is_followed_by_one_with_all_its_members(on_bench: 
     on_bench(body)
 
 
-def test_killing_a_member_that_hangs_restarts_its_companions_and_not_it(on_bench: Callable) -> None:
+def test_killing_a_member_that_hangs_restarts_the_other_members_and_not_it(on_bench: Callable) -> None:
     async def body(bench: Bench) -> None:
         await bench.start("Quiet", "scout1")
         await bench.start("Stubborn", "radio")

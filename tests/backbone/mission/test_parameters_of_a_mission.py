@@ -187,7 +187,7 @@ def test_facts_of_a_type_name_what_it_takes_for_people() -> None:
         c: bool = True
 
     assert [one.legal_values for one in parameters_of(Kinds)] == ["integer or null", "array", "true or false"]
-    assert [one.told for one in parameters_of(Kinds)][2] == "boolean, default true"
+    assert [one.summary for one in parameters_of(Kinds)][2] == "boolean, default true"
     assert [one.accepts(None) for one in parameters_of(Kinds)] == [True, False, False]
 
 

@@ -60,7 +60,7 @@ def test_a_chosen_host_lives_has_the_tags_and_is_the_one_asked_for(
         assert choice.host in {view.name for view in able}
         assert [line.partition(":")[0] for line in choice.reasons] == sorted(view.name for view in views)
         chosen = next(view for view in able if view.name == choice.host)
-        assert all(chosen.burden <= view.burden for view in able)
+        assert all(chosen.load <= view.load for view in able)
 
 
 @given(hosts(), WANTED_TAGS, PINS, st.randoms(use_true_random=False))
@@ -121,7 +121,7 @@ def test_a_refusal_names_every_host_and_why_not() -> None:
 def test_a_host_that_does_not_exist_is_answered_with_the_nearest_one() -> None:
     with pytest.raises(NoHost, match=r"alhpa is no host with a creator \(did you mean 'alpha'\?\)"):
         place("world", [], "alhpa", [HostView("alpha")])
-    with pytest.raises(NoHost, match="no creator has been heard of"):
+    with pytest.raises(NoHost, match="no creator is known"):
         place("world", [], "", [])
 
 

@@ -15,7 +15,7 @@ from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost, NotPlaced
 from backbone.placer.placement_book import (
     STOPPED_KEPT,
-    EndStray,
+    EndOrphan,
     Inspect,
     Instruction,
     Note,
@@ -67,7 +67,7 @@ class World:
             match instruction:
                 case PlaceAgain(name=name):
                     self.place(name)
-                case EndStray(host=host, name=name):
+                case EndOrphan(host=host, name=name):
                     del self.running[host][name]
                 case Inspect(host=host):
                     self.obey(self.book.inspected(host, self.listing(host), self.now_s))
@@ -231,7 +231,7 @@ def test_a_component_that_was_stopped_while_its_host_was_cut_off_is_ended_when_i
     run(book, spawn("w1"))
     book.creator_down("a", 2.0)
     book.forget("w1")
-    assert EndStray("a", "w1") in book.creator_up("a", [], 1, [process(spawn("w1"))], 3.0)
+    assert EndOrphan("a", "w1") in book.creator_up("a", [], 1, [process(spawn("w1"))], 3.0)
     assert book.find("w1") is None
 
 

@@ -202,7 +202,7 @@ class Mission:
     async def absent(self) -> list[Absence]:
         return (await self.bus.ask(ADDRESS, AskState(), ComponentState, within_s=1.0)).absent
 
-    async def told(self, name: str) -> list[str]:
+    async def story(self, name: str) -> list[str]:
         return [event.what for event in (await self.bus.ask(ADDRESS, AskStory(name), Story, within_s=1.0)).events]
 
 
@@ -276,7 +276,7 @@ async def test_a_placement_tells_who_wanted_it_and_why_it_is_there(one: Mission)
     assert (placed.host, placed.type, placed.requester) == ("b", "scout", "backbone/boss")
     assert placed.reasons[0] == "a: not b, which was asked for"
     assert placed.reasons[1].startswith("b: chosen, asked for")
-    assert (await one.told("scout1"))[-1] == "is ready on b, pid 7"
+    assert (await one.story("scout1"))[-1] == "is ready on b, pid 7"
 
 
 @on("a")
@@ -477,7 +477,7 @@ async def test_what_a_silent_host_may_still_run_is_started_elsewhere_only_when_i
     one.cut_off("b")
     await one.clock.sleep_s(CUT_OFF_ENDS_WITHIN_S - 1.0)
     assert one.creators["a"].spawns == ["w1"]
-    assert (await one.absent())[0].doing == "waits until the host that fell silent has ended it"
+    assert (await one.absent())[0].doing == "waits until the silent host has ended it"
     await one.creators["b"].kill_child("w2")
     await one.clock.sleep_s(2.0)
     assert one.creators["a"].spawns == ["w1", "w2"]

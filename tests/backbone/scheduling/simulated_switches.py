@@ -101,7 +101,7 @@ class Bench:
     Attributes:
         rcs: The RCs it plays.
         trace: All lines so far.
-        told: All instructions so far, with their times.
+        instructions: All instructions so far, with their times.
         fails: ARC → RC at which its next connections fail; empty name: at the ARC's gate.
     """
 
@@ -115,7 +115,7 @@ class Bench:
         self.manager = of
         self.now_s = 0.0
         self.trace: list[dict[str, Any]] = [dict(record.line) for record in of.opening_lines()]
-        self.told: list[tuple[float, object]] = []
+        self.instructions: list[tuple[float, object]] = []
         self.fails: dict[str, str] = {}
         self.rcs = rcs
         self._release_s = {rc.rc: rc.disconnect_s for rc in rcs}
@@ -134,7 +134,7 @@ class Bench:
     def tell(self, event: Event) -> None:
         """Let it happen now."""
         for instruction in self.manager.handle(event, self.now_s):
-            self.told.append((self.now_s, instruction))
+            self.instructions.append((self.now_s, instruction))
             match instruction:
                 case Record(line=line):
                     self.trace.append(dict(line))

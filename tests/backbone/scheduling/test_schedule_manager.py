@@ -40,8 +40,8 @@ from backbone.scheduling.requests import (
 from backbone.scheduling.rules import SchedulingRules
 
 
-def told(bench: Bench, kind: type) -> list:
-    return [instruction for _, instruction in bench.told if isinstance(instruction, kind)]
+def all_of(bench: Bench, kind: type) -> list:
+    return [instruction for _, instruction in bench.instructions if isinstance(instruction, kind)]
 
 
 def states(bench: Bench) -> dict[str, RequestState]:
@@ -57,7 +57,7 @@ def test_a_grant_counts_its_minimum_run_time_from_the_open_gate():
     bench.tell(ask("b", "v"))
     bench.run(6.0)
     assert bench.runs("a") == [(0.4, 5.4)]
-    assert told(bench, ConnectArc)[0].until_s == 5.3
+    assert all_of(bench, ConnectArc)[0].until_s == 5.3
 
 
 def test_the_slice_of_an_owner_with_nothing_to_bring_to_rest_ends_at_once():
@@ -65,7 +65,7 @@ def test_the_slice_of_an_owner_with_nothing_to_bring_to_rest_ends_at_once():
     bench.tell(ask("a", "v", stops_at_once=True))
     bench.tell(ask("b", "v"))
     bench.run(6.0)
-    assert [(order.arc, order.why, order.deadline_s) for order in told(bench, RevokeArc)] == [("a", "slice", 0.0)]
+    assert [(order.arc, order.why, order.deadline_s) for order in all_of(bench, RevokeArc)] == [("a", "slice", 0.0)]
 
 
 def test_a_slice_ends_politely_and_an_override_does_not_wait():
@@ -74,7 +74,7 @@ def test_a_slice_ends_politely_and_an_override_does_not_wait():
     bench.tell(ask("b", "v"))
     bench.run(6.0)
     bench.tell(ask("human", "v", priority=9, console=True))
-    polite, forced = told(bench, RevokeArc)
+    polite, forced = all_of(bench, RevokeArc)
     assert (polite.arc, polite.why, polite.by, polite.deadline_s) == ("a", "slice", "b", 0.2)
     assert (forced.arc, forced.why, forced.by, forced.deadline_s) == ("b", "higher", "human", 0.0)
     assert polite.expected_s == pytest.approx(10.0, abs=0.01)
@@ -88,7 +88,7 @@ def test_epochs_grow_from_the_largest_the_rc_has_seen():
     bench.tell(ask("a", "v"))
     bench.tell(ask("b", "v"))
     bench.run(11.0)
-    assert [order.epochs["v"] for order in told(bench, ConnectArc)] == [42, 43, 44]
+    assert [order.epochs["v"] for order in all_of(bench, ConnectArc)] == [42, 43, 44]
 
 
 def test_epochs_in_grants_grow_although_a_later_one_settles_sooner():
@@ -105,14 +105,14 @@ def test_rank_on_a_sharable_rc_counts_the_higher_holders():
     bench.tell(ask("low", {"r": load(0.1)}, priority=1))
     bench.tell(ask("high", {"r": load(0.1)}, priority=3))
     bench.tell(ask("middle", {"r": load(0.1)}, priority=2))
-    assert [order.ranks["r"] for order in told(bench, ConnectArc)] == [0, 0, 1]
+    assert [order.ranks["r"] for order in all_of(bench, ConnectArc)] == [0, 0, 1]
 
 
 def test_a_lone_arc_runs_on_and_hears_nothing():
     bench = Bench(manager(), unit("v"))
     bench.tell(ask("a", "v"))
     bench.run(100.0)
-    assert told(bench, RevokeArc) == []
+    assert all_of(bench, RevokeArc) == []
     assert bench.runs("a") == [(0, None)]
 
 
@@ -120,11 +120,11 @@ def test_it_asks_to_be_woken_for_a_slice_end_only_if_somebody_waits():
     bench = Bench(manager(), unit("v"))
     bench.tell(ask("a", "v"))
     bench.run(0.0)
-    assert told(bench, WakeAt) == []
+    assert all_of(bench, WakeAt) == []
     bench.tell(ask("b", "v"))
-    assert told(bench, WakeAt)[-1] == WakeAt(5.0)
+    assert all_of(bench, WakeAt)[-1] == WakeAt(5.0)
     bench.tell(Departed("b"))
-    assert told(bench, WakeAt)[-1] == WakeAt(None)
+    assert all_of(bench, WakeAt)[-1] == WakeAt(None)
 
 
 def test_leases_are_renewed_for_who_connects_or_runs_only():
@@ -266,7 +266,7 @@ def test_an_rc_that_was_away_for_a_moment_has_lost_its_holders():
     bench.tell(RcCameBack("v", 7))
     bench.run(2.0)
     assert bench.runs("a") == [(0, 1), (1, None)]
-    assert told(bench, ConnectArc)[-1].epochs == {"v": 8}
+    assert all_of(bench, ConnectArc)[-1].epochs == {"v": 8}
 
 
 def test_after_a_failed_connection_others_go_on_and_the_arc_waits_for_the_rc():
@@ -300,8 +300,8 @@ def test_less_capacity_takes_the_rcs_of_the_last_in_order():
         bench.tell(ask(name, {"r": load(0.3)}))
     bench.tell(CapacityChanged("r", 0.7))
     bench.run(0.0)
-    assert [order.arc for order in told(bench, RevokeArc)] == ["c"]
-    assert told(bench, RevokeArc)[0].why == "capacity"
+    assert [order.arc for order in all_of(bench, RevokeArc)] == ["c"]
+    assert all_of(bench, RevokeArc)[0].why == "capacity"
     assert bench.verdict() == []
 
 
@@ -328,7 +328,7 @@ def test_a_restarted_manager_lets_who_holds_run_on_to_the_end_of_its_slice():
     bench.tell(ask("b", "v"))
     bench.run(20.0)
     assert bench.runs("a")[:2] == [(1, 6), (11, 16)]
-    assert [order.epochs["v"] for order in told(bench, ConnectArc)] == [8, 9, 10]
+    assert [order.epochs["v"] for order in all_of(bench, ConnectArc)] == [8, 9, 10]
     assert [(lease.arc, lease.epoch) for lease in bench.manager.leases()] == [("b", 10)]
     assert bench.verdict() == []
 

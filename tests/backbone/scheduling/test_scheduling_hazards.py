@@ -50,11 +50,11 @@ def test_c_equals_on_a_radio_do_not_displace_each_other_again_and_again_at_one_i
     bench.tell(ask("h", "u"))
     bench.tell(ask("a", {"r": load(0.5)}))
     bench.run(6.0)
-    bench.told.clear()
+    bench.instructions.clear()
     bench.at(6.0, ask("y", {**ask("", "u").request.alternatives[0], "r": load(0.3)}))
     bench.at(6.0, ask("x", {"r": load(0.4)}))
     bench.run(6.0)
-    switches = [told for _, told in bench.told if isinstance(told, ConnectArc | RevokeArc)]
+    switches = [instruction for _, instruction in bench.instructions if isinstance(instruction, ConnectArc | RevokeArc)]
     assert [type(switch).__name__ + " " + switch.arc for switch in switches] == [
         "RevokeArc h",
         "RevokeArc a",

@@ -30,7 +30,7 @@ HAPPENS = re.compile(r"([\d.]+) s +(\w+) (idles|departs|goes down|comes back|can
 QUESTION = re.compile(r"([\d.]+) s +\?")
 
 
-def told(title: str) -> tuple[Bench, Why]:
+def played(title: str) -> tuple[Bench, Why]:
     """Play the story of a section until its question; return the bench and the answer."""
     rcs: list[RcKnown] = []
     rules: dict[str, Any] = {}
@@ -84,13 +84,13 @@ def test_the_page_has_its_examples_in_order() -> None:
 
 @pytest.mark.parametrize("title", SECTIONS)
 def test_the_answer_on_the_page_is_what_why_says(title: str) -> None:
-    bench, why = told(title)
+    bench, why = played(title)
     assert "\n".join(Reasons(why.name, why, None, None).lines(bench.now_s)) == SECTIONS[title]["answer"].rstrip()
 
 
 @pytest.mark.parametrize("title", SECTIONS)
 def test_without_those_the_page_names_the_wait_is_over(title: str) -> None:
-    bench, why = told(title)
+    bench, why = played(title)
     if why.state != RequestState.WAITING:
         return
     granted = len(bench.runs(why.name))

@@ -13,7 +13,7 @@ from web_stage import Browser, Stage
 
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.log_question import WrongSearch
-from backbone.mission_log import EVENTS_KEPT, MOST_TOLD, Log
+from backbone.mission_log import EVENTS_KEPT, MOST_EVENTS, Log
 from backbone.moments import NoMoment, Now
 from ui_console import feed
 from ui_console.feed import LogAway
@@ -72,8 +72,8 @@ async def test_of_twenty_thousand_events_a_page_gets_ten_thousand_and_reads_how_
         await anna.say(do="search_log", number=1)
         await anna.wait(lambda: anna.answers, "an answer")
         first = anna.answers.pop()["log"]
-        assert (first["total"], first["left_out"]) == (MOST_TOLD, EVENTS_KEPT - MOST_TOLD)
-        assert len(await fetched(anna, 2)) == MOST_TOLD
+        assert (first["total"], first["left_out"]) == (MOST_EVENTS, EVENTS_KEPT - MOST_EVENTS)
+        assert len(await fetched(anna, 2)) == MOST_EVENTS
 
 
 @pytest.mark.parametrize(

@@ -175,7 +175,7 @@ class Stage:
             log.add(event)
 
         async def answer(asked: Envelope[Any]) -> Message:
-            return log.told(asked.body) if isinstance(asked.body, AskLog) else PeopleKnown({})
+            return log.answer(asked.body) if isinstance(asked.body, AskLog) else PeopleKnown({})
 
         bus.serve(LAUNCHER, AskLog | AskPeople, answer)
         self._launchers.append(bus)

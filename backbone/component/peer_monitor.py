@@ -1,7 +1,7 @@
-"""Another component this one depends on: there, out of sight for a moment, or gone.
+"""Peer monitor: whether a component on which this one depends is present, hidden for a moment, or gone.
 
-A liveliness token also falls when the link to the hub is cut, and comes back a moment later when its
-component was restarted. Neither means that the other is gone for good; this file tells them apart.
+A liveliness token also falls when the link to the hub is cut, and a restarted component declares its token again
+within moments. In both cases the peer is hidden, not gone.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from backbone.bus.interface import Bus
 GONE_AFTER_S = 1.0  # chosen: a restarted hub or component is back within half of it; machine seconds
 
 
-class Companion:
-    """Watches one component's liveliness token.
+class PeerMonitor:
+    """Watches the liveliness token of one peer.
 
     Args:
-        bus: Of the one who depends on it.
-        address: Of the component.
-        gone_after_s: Seconds of the machine, with the own link up, after which an absent one counts as gone.
+        bus: Bus of the component that depends on the peer.
+        address: Address of the peer.
+        gone_after_s: Seconds of the machine, with the own link up, after which an absent peer counts as gone.
     """
 
     def __init__(self, bus: Bus, address: str, *, gone_after_s: float = GONE_AFTER_S) -> None:
@@ -31,31 +31,31 @@ class Companion:
 
     @property
     def is_there(self) -> bool:
-        """True while its token stands."""
+        """True while the token stands."""
         return self._token
 
     @property
     def times_risen(self) -> int:
-        """How often its token was seen to rise."""
+        """How often the token has risen."""
         return self._risen
 
     async def wait_there(self) -> None:
-        """Return when its token stands, at once if it does."""
+        """Return when the token stands."""
         while not self._token:
             await self._changed.wait()
 
     async def wait_hidden(self) -> None:
-        """Return when its token does not stand, for whatever reason; at once if it does not."""
+        """Return when the token does not stand."""
         while self._token:
             await self._changed.wait()
 
     async def wait_risen(self, times: int) -> None:
-        """Return when its token was seen to rise this many times: the first is its being there at all."""
+        """Return when the token has risen ``times`` times; the first counts."""
         while self._risen < times:
             await self._changed.wait()
 
     async def wait_gone(self) -> None:
-        """Return when its token was missing for the whole of ``gone_after_s`` while the own link was up."""
+        """Return when the token was missing for the whole of ``gone_after_s`` while the own link was up."""
         while True:
             changed = self._changed
             if self._token or not self._link:
@@ -75,12 +75,12 @@ class Companion:
     def _token_changed(self, _address: str, alive: bool) -> None:
         self._token = alive
         self._risen += alive
-        self._tell()
+        self._wake_waiting()
 
     def _link_changed(self, up: bool) -> None:
         self._link = up
-        self._tell()
+        self._wake_waiting()
 
-    def _tell(self) -> None:
+    def _wake_waiting(self) -> None:
         self._changed.set()
         self._changed = asyncio.Event()

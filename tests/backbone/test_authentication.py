@@ -8,10 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from backbone.bus.clock import MissionClock
-from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
-from backbone.component.launch import Launch
-from backbone.door import (
+from backbone.authentication import (
     LONGEST_SOCKET_PATH,
     SOCKET_NAME,
     NoSecret,
@@ -25,6 +22,9 @@ from backbone.door import (
     socket_endpoint,
     tcp_endpoint,
 )
+from backbone.bus.clock import MissionClock
+from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
+from backbone.component.launch import Launch
 from backbone.errors import HubUnreachable
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
@@ -87,20 +87,20 @@ def test_a_file_that_holds_no_secret_is_refused_by_its_name(tmp_path: Path, cont
         read_secret_file(tmp_path / "secret")
 
 
-async def test_a_hub_lets_in_those_who_prove_its_secret_by_both_doors(
+async def test_a_hub_admits_clients_with_its_secret_at_both_endpoints(
     short_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("backbone.bus.zenoh_bus.OPEN_TIMEOUT_MS", 300)
     secret = new_secret()
     file = keep_secret(short_path, secret)
-    doors = [socket_endpoint(short_path), tcp_endpoint("127.0.0.1", free_port())]
-    hub = ZenohBus.open("m", "backbone/hub", CLOCK, hub_config(doors, dictionary_file=str(file)))
+    endpoints = [socket_endpoint(short_path), tcp_endpoint("127.0.0.1", free_port())]
+    hub = ZenohBus.open("m", "backbone/hub", CLOCK, hub_config(endpoints, dictionary_file=str(file)))
     try:
-        for door in doors:
+        for endpoint in endpoints:
             for wrong in ("", "c0ffee", secret[:-1]):
                 with pytest.raises(HubUnreachable):
-                    ZenohBus.open("m", "ui_console/x", CLOCK, client_config(door, wrong))
-            await ZenohBus.open("m", "ui_console/x", CLOCK, client_config(door, secret)).close()
+                    ZenohBus.open("m", "ui_console/x", CLOCK, client_config(endpoint, wrong))
+            await ZenohBus.open("m", "ui_console/x", CLOCK, client_config(endpoint, secret)).close()
     finally:
         await hub.close()
     assert os.listdir(short_path) == ["secret"]

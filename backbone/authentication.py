@@ -1,9 +1,9 @@
-"""The door of a mission: the endpoints its hub listens at, and the secret that clients prove.
+"""Authentication: the endpoints of a mission's hub, and the secret with which clients authenticate.
 
 On one machine the hub listens on a unix socket in the mission's run folder, which only the mission's user can
-enter; no port is open. A mission with other machines listens on a TCP port too, and then asks every client for the
-secret in the run folder. The secret stands in that file alone: no message, argument or log holds it
-(docs/decisions/0016-the-door-of-a-mission.md).
+enter; no port is open. If a mission has other machines, its hub listens on a TCP port too and asks every client for
+the secret in the run folder. Only that file holds the secret: no message, argument or log does
+(docs/decisions/0016-endpoints-and-authentication-of-a-hub.md).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from backbone.errors import Refusal
 SOCKET_NAME, SECRET_NAME = "hub.sock", "secret"
 LONGEST_SOCKET_PATH = 107  # linux/un.h: sun_path has 108 bytes, of which the last one is 0
 USER = "scout"  # the one user of today's hubs; certificates will name hosts and people
-SECRET_BYTES = 32  # chosen: nobody guesses 256 bits
-LONGEST_SECRET_FILE = 4096  # chosen: a file longer than this holds something else
+SECRET_BYTES = 32  # chosen: 256 bits cannot be guessed
+LONGEST_SECRET_FILE = 4096  # chosen: a longer file holds no secret
 
 
 class SocketPathTooLong(Refusal):
-    """The system allows no unix socket with a path that long."""
+    """The path is longer than the system allows for a unix socket."""
 
     code = "run.socket_path"
     remedy = "Give the mission a shorter name, or set XDG_RUNTIME_DIR to a folder with a shorter path."
@@ -36,10 +36,10 @@ class NoSecret(Refusal):
 
 
 def socket_endpoint(directory: Path) -> str:
-    """Return where a hub listens whose files lie in that folder.
+    """Return the endpoint of a hub whose files lie in the folder.
 
     Raises:
-        SocketPathTooLong: No socket can have that path.
+        SocketPathTooLong: The path is too long for a socket.
     """
     path = directory.absolute() / SOCKET_NAME
     length = len(os.fsencode(path))
@@ -49,7 +49,7 @@ def socket_endpoint(directory: Path) -> str:
 
 
 def tcp_endpoint(address: str, port: int) -> str:
-    """Return where a hub listens for other machines.
+    """Return the endpoint at which a hub listens for other machines.
 
     Example:
         >>> tcp_endpoint("192.0.2.7", 7447), tcp_endpoint("2001:db8::7", 7447)
@@ -59,14 +59,14 @@ def tcp_endpoint(address: str, port: int) -> str:
 
 
 def new_secret() -> str:
-    """Return a secret that nobody has seen."""
+    """Return a new random secret."""
     return secrets.token_hex(SECRET_BYTES)
 
 
 def keep_secret(directory: Path, secret: str) -> Path:
-    """Put the secret into the folder, readable by this user alone, and return its file.
+    """Write the secret into the folder, readable by this user alone, and return its file.
 
-    The file is at the same time the dictionary of users by which the hub judges its clients.
+    The hub uses the same file as its dictionary of users.
     """
     path = directory / SECRET_NAME
     path.unlink(missing_ok=True)
@@ -76,13 +76,13 @@ def keep_secret(directory: Path, secret: str) -> Path:
 
 
 def dictionary_of(directory: str) -> str:
-    """Return the file by which a hub of this folder judges its clients; empty: everybody who can enter may speak."""
+    """Return the dictionary of users for a hub of this folder; empty: the hub authenticates no client."""
     path = Path(directory) / SECRET_NAME
     return str(path) if directory and path.exists() else ""
 
 
 def secret_of(directory: str) -> str:
-    """Return the secret kept in that folder, empty if the mission has none."""
+    """Return the secret in the folder, empty if the mission has none."""
     try:
         return read_secret((Path(directory) / SECRET_NAME).read_text("ascii")) if directory else ""
     except FileNotFoundError:
@@ -90,14 +90,14 @@ def secret_of(directory: str) -> str:
 
 
 def read_secret(text: str) -> str:
-    """Return the secret in the text of a secret file, or one that was typed.
+    """Return the secret in a typed text or the text of a secret file.
 
     Example:
         >>> read_secret("scout:c0ffee")
         'c0ffee'
 
     Raises:
-        NoSecret: There is none.
+        NoSecret: The text holds no secret.
     """
     secret = text.strip().removeprefix(f"{USER}:")
     if not secret or not secret.isascii() or not secret.isprintable() or set(" :") & set(secret):
@@ -106,10 +106,10 @@ def read_secret(text: str) -> str:
 
 
 def read_secret_file(path: Path) -> str:
-    """Return the secret in this file.
+    """Return the secret in the file.
 
     Raises:
-        NoSecret: There is none, or the file cannot be read.
+        NoSecret: The file holds no secret, or cannot be read.
     """
     try:
         with path.open(encoding="ascii") as file:

@@ -1,4 +1,4 @@
-"""What both buses do alike: number and stamp what is said, count what passes, guard what is called."""
+"""Bus base: what both buses share. It numbers and stamps messages, counts them, and calls listeners safely."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from backbone.wire import WIRE_VERSION, Envelope, Message, Refused
 T = TypeVar("T")
 
 
-class Speaker(ABC):
-    """One source of messages. Buses derive from it.
+class BusBase(ABC):
+    """Base class of both buses: the messages of one source.
 
     Args:
         mission: Mission the keys belong to.
-        source: Address that stands in every envelope.
+        source: Address of the component; every envelope carries it.
         clock: Stamps every envelope.
     """
 
     def __init__(self, mission: str, source: str, clock: Clock) -> None:
         self._mission, self._source, self._clock = mission, source, clock
         self._sequence = 0
-        # In the order in which they began, not a set's: what ends together ends in the same order in every run.
+        # A dict, not a set: it keeps the order of starts, so tasks that end together end in one order in every run.
         self._tasks: dict[asyncio.Task[Any], None] = {}
         self._open_questions: dict[asyncio.Future[Any], None] = {}
         self._closing: asyncio.Task[None] | None = None
@@ -41,20 +41,20 @@ class Speaker(ABC):
 
     @property
     def source(self) -> str:
-        """Address of the component that speaks here."""
+        """Address of the component that uses this bus."""
         return self._source
 
     @property
     def on_bug(self) -> Callable[[BaseException], None]:
-        """Who is told of an exception that is no refusal."""
+        """Callback for an exception that is no refusal."""
         return self._on_bug
 
     @on_bug.setter
-    def on_bug(self, tell: Callable[[BaseException], None]) -> None:
-        self._on_bug = tell
+    def on_bug(self, report: Callable[[BaseException], None]) -> None:
+        self._on_bug = report
 
     def statistics(self) -> BusStatistics:
-        """Return what passed since the bus was opened."""
+        """Return the counts of messages since the bus was opened."""
         return BusStatistics(self.asked, self.answered, self.published, self.heard, self.refused, self.unreadable)
 
     def envelope(self, body: Message) -> Envelope[Any]:
@@ -68,7 +68,7 @@ class Speaker(ABC):
         self.call(envelope.id, listener, envelope)
 
     def call(self, cause: str, act: Callable[..., None], *arguments: Any) -> None:
-        """Call somebody else's code because of the message with this id; its bugs go to ``on_bug``."""
+        """Call a callback with the message of this id as the current cause; its bugs go to ``on_bug``."""
         token = current_cause.set(cause)
         try:
             act(*arguments)
@@ -78,7 +78,7 @@ class Speaker(ABC):
             current_cause.reset(token)
 
     def start(self, work: Coroutine[Any, Any, T]) -> asyncio.Task[T]:
-        """Run a coroutine as a task this bus owns until it is closed."""
+        """Run a coroutine as a task that this bus owns until the bus is closed."""
         task = asyncio.get_running_loop().create_task(work)
         self._tasks[task] = None
         task.add_done_callback(self._forget)
@@ -92,7 +92,7 @@ class Speaker(ABC):
             body = await answer(question)
         except LinkError as error:
             self.refused += 1
-            body = Refused.of(OutcomeUnknown(f"{self._source} got no answer itself: {error}"))
+            body = Refused.of(OutcomeUnknown(f"{self._source} got no answer to a question of its own: {error}"))
         except Refusal as refusal:
             self.refused += 1
             body = Refused.of(refusal)
@@ -114,19 +114,19 @@ class Speaker(ABC):
         return answered
 
     def end_question(self, answered: asyncio.Future[Any]) -> None:
-        """Forget a question: it was answered or given up."""
+        """Forget a question that was answered or given up."""
         self._open_questions.pop(answered, None)
 
     def require_open(self) -> None:
-        """Raise RuntimeError if the bus is closed: declaring anything then is a bug."""
+        """Raise RuntimeError if the bus is closed, because a declaration on a closed bus is a bug."""
         if self.closed:
             raise RuntimeError(f"the bus of {self._source} is closed")
 
     async def close(self) -> None:
-        """Take back everything declared and leave; return when that is done, however often called.
+        """Withdraw all declarations and leave the network. Idempotent.
 
-        Questions asked here and still open end with ``NoResponder``, and so do, on their side, those
-        that were asked of this bus and are still being answered.
+        Open questions of this bus end with ``NoResponder``. Questions to this bus that are still being answered end
+        with ``NoResponder`` at their askers.
         """
         if self._closing is None:
             self.closed = True
@@ -139,16 +139,16 @@ class Speaker(ABC):
                 task.cancel()
             self._closing = asyncio.get_running_loop().create_task(self._finish(answering))
         elif asyncio.current_task() in self._tasks:
-            return  # an answer that closes its own bus is waited for by the first close: it must not wait for that
+            return  # the first close waits for this answer, so this answer must not wait for the first close
         await asyncio.shield(self._closing)
 
     @abstractmethod
     def take_back(self) -> None:
-        """Take back everything declared."""
+        """Withdraw all declarations."""
 
     @abstractmethod
     async def leave(self) -> None:
-        """Leave the network; nothing is declared any more and no task of this bus runs."""
+        """Leave the network. Called when no declaration is left and no task of this bus runs."""
 
     def _forget(self, task: asyncio.Task[Any]) -> None:
         self._tasks.pop(task, None)
@@ -159,7 +159,7 @@ class Speaker(ABC):
 
 
 def settle(answered: asyncio.Future[Any], answer: Any) -> None:
-    """Give the future its result unless it already has one or was given up."""
+    """Set the result of the future unless the future is done."""
     if not answered.done():
         answered.set_result(answer)
 

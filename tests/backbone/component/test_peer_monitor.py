@@ -1,4 +1,4 @@
-"""Gone is told apart from out of sight."""
+"""A peer monitor distinguishes a peer that is gone from a hidden one."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import asyncio
 from typing import Any
 
 from backbone.bus.clock import run_virtual
-from backbone.component.companion import GONE_AFTER_S, Companion
+from backbone.component.peer_monitor import GONE_AFTER_S, PeerMonitor
 
 
 class ScriptedBus:
-    """Says about tokens and links what the test tells it to say."""
+    """A bus whose tokens and link the test sets."""
 
     def __init__(self) -> None:
         self.token: Any = None
@@ -29,16 +29,16 @@ class ScriptedBus:
 
 
 async def when_gone(bus: ScriptedBus, *, until_s: float) -> float | None:
-    """Return when the companion counted as gone, or None if it did not by then."""
+    """Return when the peer counted as gone, or None if it did not by then."""
     loop = asyncio.get_running_loop()
-    companion = Companion(bus, "resource_pool/arc")  # type: ignore[arg-type]
+    monitor = PeerMonitor(bus, "resource_pool/arc")  # type: ignore[arg-type]
     try:
         async with asyncio.timeout_at(until_s):
-            await companion.wait_gone()
+            await monitor.wait_gone()
     except TimeoutError:
         return None
     finally:
-        companion.close()
+        monitor.close()
     return loop.time()
 
 
@@ -81,13 +81,13 @@ def test_the_grace_begins_when_the_link_is_back() -> None:
 def test_every_rise_of_the_token_is_noticed_also_between_two_looks() -> None:
     async def main() -> int:
         bus = ScriptedBus()
-        companion = Companion(bus, "resource_pool/arc")  # type: ignore[arg-type]
+        monitor = PeerMonitor(bus, "resource_pool/arc")  # type: ignore[arg-type]
         bus.token(True)
-        waiting = asyncio.create_task(companion.wait_risen(2))
+        waiting = asyncio.create_task(monitor.wait_risen(2))
         await asyncio.sleep(0)
         bus.token(False)
         bus.token(True)
         await waiting
-        return companion.times_risen
+        return monitor.times_risen
 
     assert run_virtual(main()) == 2

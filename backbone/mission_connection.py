@@ -1,7 +1,7 @@
-"""Get in touch with a mission that is up: by name on this machine, or at its hub's endpoint.
+"""Connection to a mission that is up: by name on this machine, or by its hub's endpoint.
 
-Only a machine that shares the mission's monotonic clock knows the mission's time by itself; everybody
-else asks the nameserver and halves the way.
+A process on the machine of the launcher computes the mission's time from the monotonic clock of that machine. On
+another machine it asks the nameserver and assumes that question and answer took equally long.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ ASKED_TIMES = 5  # chosen: the quickest of a few answers is within a millisecond
 
 
 @contextlib.asynccontextmanager
-async def visiting(
+async def connected(
     mission: str | None, endpoint: str | None, source: str, secret: str = ""
 ) -> AsyncIterator[tuple[ZenohBus, MissionClock]]:
-    """Open a bus to a mission, speaking as ``source``, and close it at the end.
+    """Open a bus to a mission and close it at the end.
 
     Args:
-        mission: Name; may be None if just one is up on this machine.
-        endpoint: Its hub elsewhere; needs the mission's name.
-        source: Address that stands in every envelope.
-        secret: What the hub at the endpoint asks its clients for; empty: nothing.
+        mission: Name; may be None if exactly one mission is up on this machine.
+        endpoint: Endpoint of a hub on another machine; needs the mission's name.
+        source: Address of this client, which every envelope carries.
+        secret: Secret of the mission; empty: the hub asks for none.
 
     Raises:
-        MissionNotUp: None of this name is up on this machine.
-        HubUnreachable: Nobody listens at the endpoint.
-        LinkError: The nameserver there did not answer.
+        MissionNotUp: No mission of this name is up on this machine.
+        HubUnreachable: No hub listens at the endpoint.
+        LinkError: The nameserver did not answer.
     """
     if endpoint is None:
         found = run_files.find(mission)
@@ -45,7 +45,7 @@ async def visiting(
             found.mission, source, clock, client_config(found.endpoint, run_files.secret(found))
         )
     else:
-        assert mission is not None  # noqa: S101  the command line has seen to that
+        assert mission is not None  # noqa: S101  the command line refuses this
         clock = await clock_elsewhere(mission, endpoint, source, secret)
         bus = await ZenohBus.open_when_up(mission, source, clock, client_config(endpoint, secret))
     try:
@@ -55,11 +55,11 @@ async def visiting(
 
 
 async def clock_elsewhere(mission: str, endpoint: str, source: str, secret: str = "") -> MissionClock:
-    """Return a clock of this machine that shows the mission's time there.
+    """Return a clock of this machine that shows the time of a mission on another machine.
 
     Raises:
-        HubUnreachable: Nobody listens at the endpoint.
-        LinkError: The nameserver there did not answer.
+        HubUnreachable: No hub listens at the endpoint.
+        LinkError: The nameserver did not answer.
     """
     config = client_config(endpoint, secret)
     bus = await ZenohBus.open_when_up(mission, source, MissionClock.started_now(), config)
@@ -73,7 +73,7 @@ async def mission_clock(bus: Bus) -> MissionClock:
     """Return a clock of this machine that shows the time of the mission at the bus's hub.
 
     Raises:
-        LinkError: The nameserver there did not answer.
+        LinkError: The nameserver did not answer.
     """
     readings = [await _reading(bus) for _ in range(ASKED_TIMES)]
     _, origin_s, rate = min(readings)
@@ -81,7 +81,7 @@ async def mission_clock(bus: Bus) -> MissionClock:
 
 
 async def _reading(bus: Bus) -> tuple[float, float, float]:
-    """Return how long an answer took, and the monotonic origin and rate that follow from it."""
+    """Return the duration of one question, and the monotonic origin and rate that follow from its answer."""
     asked_s = time.monotonic()
     answer = await bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=REPLY_TIME_S)
     took_s = time.monotonic() - asked_s
