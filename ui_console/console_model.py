@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import cast, get_args
 
 import msgspec
 
 from backbone.naming import Subsystem, component_of
+from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
 from ui_console.alarms import AlarmBook
 from ui_console.consent import Sought, Topic
@@ -31,14 +31,14 @@ from ui_console.console_events import (
     ConsoleEvent,
     GivenBack,
     Granted,
+    Heard,
     LetGoNeeded,
+    LinkHeard,
     LinkTrouble,
     Lost,
     MomentBegan,
     OwnEvent,
     PictureSeen,
-    TeamEvent,
-    WhyHeard,
 )
 from ui_console.lifting import question_line
 from ui_console.losses import UNDECIDED, WANTED, why_lost
@@ -63,7 +63,6 @@ RATE_OVER_S = 2.0  # chosen: a rate a person can read
 SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
-_TEAM_EVENTS = get_args(TeamEvent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +101,7 @@ class ConsoleModel:
         self.held: Granted | None = None
         self.lost: Lost | None = None
         self.asked: Asked | None = None
-        self.why: WhyHeard | None = None
+        self.why: Why | None = None
         self.applied: CommandApplied | None = None
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
@@ -123,10 +122,13 @@ class ConsoleModel:
     # ------------------------------------------------------------------ events in
     def apply(self, event: ConsoleEvent) -> None:
         """Take the event in; what concerns the whole mission goes to ``team``."""
-        if isinstance(event, _TEAM_EVENTS):
-            self.team.apply(cast(TeamEvent, event))
-        else:
-            self._apply_own(cast(OwnEvent, event))
+        match event:
+            case Heard(body=Why() as why):
+                self.why = why
+            case Heard() | LinkHeard():
+                self.team.apply(event)
+            case _:
+                self._apply_own(event)
 
     def look(self, now_s: float) -> None:
         """Find out what only time can tell; right before a view is taken."""
@@ -291,8 +293,8 @@ class ConsoleModel:
             there = "; ".join(self.other_screens())
             return f"watching; you hold no robot{f' here; {there}' if there else ''}"
         wanted = self.robot or "a robot"
-        if self.why is not None and self.why.why.lines:
-            why = self.why.why
+        why = self.why
+        if why is not None and why.lines:
             reason = why.lines[0].removeprefix(f"{why.name} {why.state}: ")  # which the line says in its own words
             return f"waiting for {wanted}: {self.team.people.named(reason)}"
         if self.lost is not None:
@@ -356,8 +358,6 @@ class ConsoleModel:
                 seen.append(event)
                 while at_s - seen[0].at_s > RATE_OVER_S:
                     seen.popleft()
-            case WhyHeard():
-                self.why = event
             case Attention(at_s=at_s, is_there=is_there):
                 self.team.alarms.attention(is_there, at_s)
 

@@ -15,35 +15,30 @@ from typing import assert_never
 
 import msgspec
 
-from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
+from backbone.component.messages import (
+    ComponentState,
+    LifeState,
+    LogLevel,
+    MissionTime,
+    Parameters,
+    SetParameter,
+    Statistics,
+    StoryEvent,
+)
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.mission_log import AskLog
+from backbone.health import MissionHealth
+from backbone.mission_log import AskLog, Log, PeopleKnown
+from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
+from backbone.operators import OperatorActed
 from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
-from backbone.scheduling.views import RcView, RequestView, Schedule
+from backbone.scheduling.views import RcView, RequestView, Schedule, Why
 from backbone.spoken import counted, value_text
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
-from ui_console.console_events import (
-    ActHeard,
-    ComponentGone,
-    ComponentHeard,
-    ComponentsListed,
-    HealthHeard,
-    LeasesHeard,
-    LinkHeard,
-    LoadHeard,
-    LogHeard,
-    ParametersHeard,
-    ProcessFallen,
-    RadioCounted,
-    ScheduleHeard,
-    StopHeard,
-    StoryHeard,
-    TeamEvent,
-)
+from ui_console.console_events import LinkHeard, Said, TeamEvent
 from ui_console.health_board import HealthBoard
 from ui_console.lifting import author_name, authors, is_own, lift_line
 from ui_console.log_board import LOG_KEPT, LogBoard
@@ -117,40 +112,52 @@ class TeamModel:
     # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
         """Take the event in."""
-        match event:
-            case ScheduleHeard(schedule=schedule):
-                self._take_schedule(schedule)
-            case LeasesHeard(at_s=at_s, leases=leases):
-                self._take_leases(leases, at_s)
-            case StoryHeard(story=story):
-                self._take_story(story)
-            case LogHeard(events=events, consoles=consoles):
-                self.people.remember(consoles)
-                self._log.recall(events)
-            case ActHeard(act=act, where=where):
-                self._log.add(act.event(where))
-            case ComponentHeard(at_s=at_s, component=component):
-                self._take_component(component, at_s)
-            case ComponentsListed(at_s=at_s, components=components, is_complete=is_complete):
-                self._take_list({component.address: component for component in components}, at_s, is_complete)
-            case ComponentGone(at_s=at_s, address=address):
-                self._gone(address, at_s)
-            case ProcessFallen(at_s=at_s, fell=fell):
-                self._take_fall(fell, at_s)
-            case LoadHeard(at_s=at_s, load=load):
-                self._take_load(load, at_s)
-            case StopHeard(at_s=at_s, stop=stop):
-                self._take_stop(stop, at_s)
-            case RadioCounted(at_s=at_s, radio=radio, values=values):
-                self._take_counts(radio, values, at_s)
-            case LinkHeard():
-                self._take_link(event)
-            case HealthHeard():
-                self._health.take(event)
-            case ParametersHeard():
-                self._take_parameters(event)
+        if isinstance(event, LinkHeard):
+            self._take_link(event)
+        else:
+            self._take(event.body, event.at_s, event.source)
+
+    def _take(self, said: Said, at_s: float, source: str) -> None:
+        match said:
+            case Schedule():
+                self._take_schedule(said)
+            case Leases():
+                self._take_leases(said, at_s)
+            case StoryEvent():
+                self._log.add(said)
+                self._tree.told(said)
+            case Log():
+                self._log.recall(said.events)
+            case PeopleKnown():
+                self.people.remember(said.consoles)
+            case OperatorActed():
+                self._log.add(said.event(source))
+            case ComponentState():
+                self._take_component(said, at_s)
+            case Components():
+                self._take_list(said, at_s)
+            case Disappeared():
+                self._gone(said.address, at_s)
+            case ProcessFell():
+                self._take_fall(said, at_s)
+            case HostLoad():
+                self._take_load(said, at_s)
+            case StopState():
+                self._take_stop(said, at_s)
+            case Statistics():
+                self._take_counts(component_of(source), said.values, at_s)
+            case MissionTime():
+                self._health.rate = said.rate
+            case MissionHealth():
+                self._health.take(said, at_s)
+            case Parameters():
+                self._take_parameters(said, source, at_s)
+            case SetParameter():
+                self._take_change(said, source, at_s)
+            case Why():
+                """Of one console, which keeps it."""
             case _:
-                assert_never(event)
+                assert_never(said)
 
     def look(self, now_s: float) -> None:
         """Find out what only time can tell."""
@@ -415,11 +422,11 @@ class TeamModel:
         has_no_trace = "the trace of the schedule stopped" in component.feedback
         self._so(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
 
-    def _take_list(self, listed: Mapping[str, ComponentState], at_s: float, is_complete: bool) -> None:
-        for component in listed.values():
+    def _take_list(self, listed: Components, at_s: float) -> None:
+        for component in listed.components:
             self._take_component(component, at_s)
-        if is_complete:
-            for address in self._components.keys() - listed.keys():
+        if listed.complete:  # else absence proves nothing
+            for address in self._components.keys() - {component.address for component in listed.components}:
                 self._gone(address, at_s)
 
     def _gone(self, address: str, at_s: float) -> None:
@@ -515,10 +522,6 @@ class TeamModel:
             self._link = link
         self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
-    def _take_story(self, story: StoryEvent) -> None:
-        self._log.add(story)
-        self._tree.told(story)
-
     def _take_stop(self, stop: StopState, at_s: float) -> None:
         former = self._stops.get(stop.rc)
         if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
@@ -547,19 +550,21 @@ class TeamModel:
                 remedy = "Claim with a longer period, or use another radio."
                 self.alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
 
-    def _take_parameters(self, event: ParametersHeard) -> None:
-        name = component_of(event.address)
-        for parameter, value in event.values.items():
-            key = (name, parameter)
-            shown = value_text(value)
+    def _take_change(self, change: SetParameter, address: str, at_s: float) -> None:
+        """Note who changed a parameter; its new value comes right after, at the same time."""
+        key = (component_of(address), change.name)
+        before = self._parameters[key].value if key in self._parameters else ""
+        self._parameters[key] = ParameterView(key[0], address, change.name, "", before, change.user, at_s)
+
+    def _take_parameters(self, now: Parameters, address: str, at_s: float) -> None:
+        name = component_of(address)
+        for parameter, value in now.values.items():
+            key, shown = (name, parameter), value_text(value)
             former = self._parameters.get(key)
-            if parameter == event.changed:
-                before = former.value if former is not None else ""
-                self._parameters[key] = ParameterView(
-                    name, event.address, parameter, shown, before, event.user, event.at_s
-                )
+            if former is not None and former.changed_s == at_s:
+                self._parameters[key] = msgspec.structs.replace(former, value=shown)
             elif former is None or former.value != shown:
-                self._parameters[key] = ParameterView(name, event.address, parameter, shown)
+                self._parameters[key] = ParameterView(name, address, parameter, shown)
 
     def _so(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
         """Begin or end an alarm of a condition."""

@@ -20,10 +20,11 @@ from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.operators import OperatorAction
+from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import Frame
 from ui_console.consent_answers import ConsentAnswers
-from ui_console.console_events import ConsoleEvent, ScheduleHeard
+from ui_console.console_events import ConsoleEvent, Heard
 from ui_console.console_model import ConsoleModel
 from ui_console.observer import Observer
 from ui_console.team_model import ROBOT_KIND, TeamModel
@@ -189,8 +190,8 @@ class WebHub:
 
     def _heard(self, event: ConsoleEvent) -> None:
         self._model.apply(event)
-        if isinstance(event, ScheduleHeard):
-            rcs = event.schedule.rcs
+        if isinstance(event, Heard) and isinstance(event.body, Schedule):
+            rcs = event.body.rcs
             self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
             self.watching_changed()
             for operator in self.guests:
