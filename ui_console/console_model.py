@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from backbone.component.messages import StoryEvent
 from backbone.naming import Subsystem, component_of
 from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
@@ -50,7 +51,6 @@ from ui_console.views import (
     ConsentView,
     ConsoleView,
     LinkView,
-    LogRow,
     LostView,
     OwnView,
     RobotView,
@@ -271,7 +271,7 @@ class ConsoleModel:
             links.insert(1, LinkView(f"commands to {self.applied.rc}", True, self.applied.took_s, line))
         return links
 
-    def log(self, count: int = LOG_SHOWN) -> list[LogRow]:
+    def log(self, count: int = LOG_SHOWN) -> list[StoryEvent]:
         """Return the newest that happened, oldest first."""
         return self.team.log(count)
 

@@ -13,7 +13,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import assert_never
 
-import msgspec
+from msgspec.structs import replace
 
 from backbone.component.messages import (
     ComponentState,
@@ -49,19 +49,15 @@ from ui_console.views import (
     NONE_S,
     AlarmKind,
     AlarmView,
-    ComponentRow,
     HealthView,
     HostView,
     LinkView,
-    LogRow,
     NodeView,
     ParameterView,
-    RequestRow,
     RobotView,
     Severity,
     StopView,
     TimelineView,
-    WaitingView,
 )
 
 ROBOT_KIND = "scout"
@@ -164,7 +160,7 @@ class TeamModel:
         self.alarms.look(now_s)
         self._health.look(now_s)
         owners = {request.arc: request.owner for request in self.schedule.requests} if self.schedule else {}
-        self._so(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
+        self.alarms.hold(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
             is_wanted = bool(request.blockers) and all(is_console(owners.get(arc, "")) for arc in request.blockers)
@@ -172,7 +168,7 @@ class TeamModel:
             starves = is_endless and not is_wanted and waits_s >= STARVING_S
             who = self.person(request.owner)
             line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {because(request, self.people)}"
-            self._so(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
+            self.alarms.hold(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
 
     # ------------------------------------------------------------------ views out
     def robots(self, now_s: float) -> list[RobotView]:
@@ -241,8 +237,8 @@ class TeamModel:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
         return self._tree.views(self._components.values(), self._lost, self.schedule)
 
-    def requests(self) -> list[RequestRow]:
-        """Return the requests, running ones first, then by predicted start."""
+    def requests(self) -> list[RequestView]:
+        """Return the requests by the names of people, running ones first, then by predicted start."""
         rows = [self._request_row(request) for request in (self.schedule.requests if self.schedule else [])]
         return sorted(rows, key=_request_order)
 
@@ -256,10 +252,7 @@ class TeamModel:
 
     def hosts(self, now_s: float) -> list[HostView]:
         """Return the machines, sorted by name."""
-        return [
-            HostView(host, load.cpu, load.memory, load.cores, load.components, max(0.0, now_s - at_s))
-            for host, (at_s, load) in sorted(self._hosts.items())
-        ]
+        return [HostView(load, max(0.0, now_s - at_s)) for _, (at_s, load) in sorted(self._hosts.items())]
 
     def links(self, now_s: float) -> list[LinkView]:
         """Return the link to the hub, the RC manager's renewals, and the radios."""
@@ -276,15 +269,18 @@ class TeamModel:
         """Return the parameters of the components that were asked for theirs, by component and name."""
         return [view for _, view in sorted(self._parameters.items())]
 
-    def components(self) -> list[ComponentRow]:
-        """Return the components that are there, by address."""
-        return [self._component_row(component) for _, component in sorted(self._components.items())]
+    def components(self) -> list[ComponentState]:
+        """Return the components that are there, by address, doing what they do by the names of people."""
+        there = (component for _, component in sorted(self._components.items()))
+        return [replace(component, feedback=self.people.doing(component)) for component in there]
 
     def component(self, name: str) -> ComponentState | None:
         """Return the component of this name, if it is there."""
         return next((c for at, c in self._components.items() if component_of(at) == name), None)
 
-    def log(self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()) -> list[LogRow]:
+    def log(
+        self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()
+    ) -> list[StoryEvent]:
         """Return the newest that happened, oldest first.
 
         Args:
@@ -311,7 +307,7 @@ class TeamModel:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
             is_down = rc.state == "down" and rc.rc not in self._left  # who was told to end is not missed
-            self._so(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
+            self.alarms.hold(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
         self._renewed = {
             (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
             for rc in schedule.rcs
@@ -328,12 +324,7 @@ class TeamModel:
 
     def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
         component = self._components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
-        starts_s = dict(zip(rc.next, rc.next_s, strict=False))
-        waiting = [
-            WaitingView(self.person(requests[arc].owner), arc, starts_s.get(arc, NONE_S))
-            for arc in rc.next
-            if arc in requests
-        ]
+        waiting = [self.person(requests[arc].owner) for arc in rc.next if arc in requests]
         free = RobotView(
             robot=rc.rc,
             number=number,
@@ -361,7 +352,7 @@ class TeamModel:
         renewed_s = self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
         lease_s = self._leases.lease_s if self._leases is not None else holder.lease_until_s - renewed_s
         age_s = max(0.0, now_s - renewed_s)
-        return msgspec.structs.replace(
+        return replace(
             free,
             holder=self.person(request.owner if request else holder.arc),
             arc=holder.arc,
@@ -375,21 +366,14 @@ class TeamModel:
             because=because(request, self.people) if request else "",
         )
 
-    def _request_row(self, request: RequestView) -> RequestRow:
+    def _request_row(self, request: RequestView) -> RequestView:
         named = self.people.named
-        return RequestRow(
-            request.arc,
-            self.person(request.owner),
-            is_console(request.owner),
-            str(request.state),
-            request.rcs,
-            named(request.priority),
-            request.since_s,
-            request.until_s,
-            request.expected_start_s,
-            because(request, self.people),
-            named(request.would_change),
-            request.blockers,
+        return replace(
+            request,
+            owner=self.person(request.owner),
+            priority=named(request.priority),
+            because=because(request, self.people),
+            would_change=named(request.would_change),
         )
 
     # ------------------------------------------------------------------ components
@@ -418,9 +402,11 @@ class TeamModel:
         self._lost.pop(component.address, None)
         self.alarms.end(AlarmKind.LOST, name, at_s)
         is_rc = _is_in(Subsystem.RESOURCE_POOL, component.address)
-        self._so("not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s)
+        self.alarms.hold(
+            "not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s
+        )
         has_no_trace = "the trace of the schedule stopped" in component.feedback
-        self._so(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
+        self.alarms.hold(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
 
     def _take_list(self, listed: Components, at_s: float) -> None:
         for component in listed.components:
@@ -463,20 +449,7 @@ class TeamModel:
     def _take_load(self, load: HostLoad, at_s: float) -> None:
         self._hosts[load.host] = (at_s, load)
         line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
-        self._so(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
-
-    def _component_row(self, component: ComponentState) -> ComponentRow:
-        return ComponentRow(
-            component_of(component.address),
-            component.address,
-            component.address.partition("/")[0],
-            component.type,
-            component.host,
-            component.pid,
-            str(component.state),
-            component.since_s,
-            self.people.doing(component),
-        )
+        self.alarms.hold(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
 
     # ------------------------------------------------------------------ what alarms are about
     def _explained_by(self, subject: str) -> frozenset[str]:
@@ -490,7 +463,7 @@ class TeamModel:
         elif alarm.subject in self._hosts:
             where = "machine of the mission"
         robots = self.robot_names()
-        return msgspec.structs.replace(
+        return replace(
             alarm,
             line=named(alarm.line),
             also=[named(line) for line in alarm.also],
@@ -520,7 +493,7 @@ class TeamModel:
             self._link = dataclasses.replace(link, latency_s=latency_s)
         else:
             self._link = link
-        self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
+        self.alarms.hold(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
     def _take_stop(self, stop: StopState, at_s: float) -> None:
         former = self._stops.get(stop.rc)
@@ -562,16 +535,9 @@ class TeamModel:
             key, shown = (name, parameter), value_text(value)
             former = self._parameters.get(key)
             if former is not None and former.changed_s == at_s:
-                self._parameters[key] = msgspec.structs.replace(former, value=shown)
+                self._parameters[key] = replace(former, value=shown)
             elif former is None or former.value != shown:
                 self._parameters[key] = ParameterView(name, address, parameter, shown)
-
-    def _so(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
-        """Begin or end an alarm of a condition."""
-        if is_so:
-            self.alarms.begin(kind, subject, line, at_s, remedy)
-        else:
-            self.alarms.end(kind, subject, at_s)
 
 
 def _is_older(one: ComponentState, other: ComponentState) -> bool:
@@ -586,5 +552,5 @@ def _is_in(subsystem: Subsystem, address: str) -> bool:
     return address.startswith(f"{subsystem}/")
 
 
-def _request_order(row: RequestRow) -> tuple[bool, bool, float, str]:
+def _request_order(row: RequestView) -> tuple[bool, bool, float, str]:
     return row.state != RequestState.RUNNING, row.expected_start_s < 0, row.expected_start_s, row.arc

@@ -58,7 +58,7 @@ def test_the_table_is_searched_as_the_command_searches(asked: dict[str, Any], fo
 
 def test_a_row_says_how_much_it_matters_and_who_did_it() -> None:
     [row] = model(Heard(20.0, STOPPED, CONSOLE)).log()
-    assert (row.level, row.person) == ("alarm", "ben")
+    assert (row.level, row.user) == ("alarm", "ben")
 
 
 @given(st.lists(st.integers(0, 30), unique=True), st.lists(st.integers(0, 30), unique=True), st.integers(0, 40))

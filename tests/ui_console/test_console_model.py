@@ -30,6 +30,7 @@ from backbone.nameserver.messages import Components, Disappeared
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule, Why
+from backbone.wire import plain
 from resource_pool.arc_client import StopState
 from ui_console.console_events import (
     Asked,
@@ -48,7 +49,7 @@ from ui_console.console_events import (
 )
 from ui_console.console_model import SILENT_S, STALE_S, ConsoleModel
 from ui_console.team_model import STARVING_S
-from ui_console.views import AlarmKind, ConsoleView, LogRow, NodeState, Severity, view_json
+from ui_console.views import AlarmKind, NodeState, Severity, view_json
 
 
 def alarm_lines(shown: ConsoleModel, now_s: float = 50.0) -> list[str]:
@@ -63,7 +64,7 @@ def test_the_robot_table_says_who_holds_what_since_when_until_when_and_who_waits
     assert [(row.number, row.robot) for row in (held, free)] == [(1, "scout1"), (2, "scout2")]
     assert (held.holder, held.is_console, held.is_mine, held.epoch) == ("watch1", False, False, 6)
     assert (held.priority, held.since_s, held.until_s) == ("iros2001:10/surveillance:5/watch1:3", 5.0, 10.0)
-    assert [(waiting.who, waiting.start_s) for waiting in held.waiting] == [("console-1", 12.0)]
+    assert held.waiting == ["console-1"]
     assert (free.holder, free.is_up) == ("", True)
 
 
@@ -307,7 +308,7 @@ def test_of_consoles_that_come_and_go_all_day_nothing_is_left() -> None:
             shown.apply(Heard(11.0, Disappeared(at)))
     shown.apply(Heard(12.0, SCHEDULE))
     view = shown.view(12.0)
-    assert not [row for row in view.components if row.name.startswith("console-")]
+    assert not [row for row in view.components if "/console-" in row.address]
     assert view.alarms == []
     assert len(shown.team.tree()) == 3
 
@@ -328,7 +329,7 @@ def test_a_parameter_that_was_changed_says_what_it_was_and_who_changed_it() -> N
 def test_what_operators_did_is_in_the_log_with_their_names() -> None:
     act = OperatorActed("anna", OperatorAction.SET_PARAMETER, "watch1", "t = 30", 2.0)
     shown = model(Heard(2.1, act, "ui_console/console-1"))
-    assert shown.log() == [LogRow(2.0, "watch1", "anna changes it: t = 30", "ui_console/console-1", "notice", "anna")]
+    assert shown.log() == [act.event("ui_console/console-1")]
 
 
 def test_consoles_that_share_a_team_see_the_same_mission_and_hold_robots_of_their_own() -> None:
@@ -342,10 +343,10 @@ def test_consoles_that_share_a_team_see_the_same_mission_and_hold_robots_of_thei
 # ---------------------------------------------------------------------- all of it
 def test_a_view_is_json_and_comes_back_as_it_was() -> None:
     view = held_model().view(12.0)
-    assert msgspec.json.decode(view_json(view), type=ConsoleView) == view
-    plain = json.loads(view_json(view))
-    assert plain["robots"][0]["holder"] == "console-1"
-    assert plain["own"]["is_held"] is True
+    assert msgspec.json.decode(view_json(view)) == msgspec.to_builtins(plain(view))
+    shown = json.loads(view_json(view))
+    assert shown["robots"][0]["holder"] == "console-1"
+    assert shown["own"]["is_held"] is True
 
 
 EVENTS: list[ConsoleEvent] = [
@@ -375,7 +376,7 @@ def test_whatever_is_heard_in_whatever_order_the_view_is_whole_and_consistent(
 ) -> None:
     shown = model(*events)
     view = shown.view(now_s)
-    assert msgspec.json.decode(view_json(view), type=ConsoleView) == view
+    assert msgspec.json.decode(view_json(view)) == msgspec.to_builtins(plain(view))
     assert view.own.is_held <= view.own.is_asked or GRANT in events
     assert sum(robot.is_mine for robot in view.robots) <= 1
     assert len({alarm.key for alarm in view.alarms}) == len(view.alarms)

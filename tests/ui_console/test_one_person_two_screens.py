@@ -201,7 +201,7 @@ def test_people_are_called_by_their_names_in_rows_timeline_and_reasons() -> None
     shown = model(Heard(10.0, holding), Heard(10.0, Components([held, sits("console-9", "Ben B.")], True, 0.0)))
     [robot] = shown.robots(11.0)
     assert (robot.holder, robot.priority, robot.feedback) == ("Ben B.", "Ben B.:100", "held by Ben B.")
-    assert [row.who for row in shown.team.requests()] == ["Ben B.", "watch1"]
+    assert [row.owner for row in shown.team.requests()] == ["Ben B.", "watch1"]
     assert {one.who for row in shown.team.timeline(11.0).rows for one in row.slices} >= {"Ben B."}
     assert shown.team.person("console-9") == shown.team.person("console-9-capture") == "Ben B."
     shown.apply(ASK)

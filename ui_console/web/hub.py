@@ -18,10 +18,11 @@ from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
+from backbone.log_lines import event_json
 from backbone.naming import Subsystem, address
 from backbone.operators import OperatorAction
 from backbone.scheduling.views import Schedule
-from backbone.wire import Envelope
+from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.consent_answers import ConsentAnswers
 from ui_console.console_events import ConsoleEvent, Heard
@@ -221,13 +222,13 @@ class WebHub:
         team, now_s = self.team, self.clock.now_s()
         tables: dict[str, Any] = {
             "tree": team.tree(),
-            "requests": team.requests(),
+            "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),
-            "hosts": team.hosts(now_s),
+            "hosts": plain(team.hosts(now_s)),
             "health": team.health(now_s),
             "parameters": team.parameters(),
-            "components": team.components(),
-            "log": team.log(),
+            "components": plain(team.components()),
+            "log": [event_json(event) for event in team.log()],
             "now_s": now_s,
         }
         for name, table in tables.items():
