@@ -233,22 +233,6 @@ class ConsentHeard:
     topic: Topic = Topic.TAKE
 
 
-@dataclass(frozen=True, slots=True)
-class ConsentSought:
-    """Another console asks for what this one holds, or to lift what its operator stopped."""
-
-    at_s: float
-    sought: Sought
-
-
-@dataclass(frozen=True, slots=True)
-class ConsentSettled:
-    """A question that was open here is answered."""
-
-    at_s: float
-    settled: Settled
-
-
 # ---------------------------------------------------------------------- of the whole mission
 Said = (
     Schedule
@@ -319,8 +303,8 @@ OwnEvent = (
     | Attention
     | ConsentAsked
     | ConsentHeard
-    | ConsentSought
-    | ConsentSettled
+    | Sought
+    | Settled
 )
 TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
@@ -338,8 +322,8 @@ _WORDS: dict[type[Any], str] = {
     Attention: "attention",
     ConsentAsked: "consent_asked",
     ConsentHeard: "consent_heard",
-    ConsentSought: "consent_sought",
-    ConsentSettled: "consent_settled",
+    Sought: "consent_sought",
+    Settled: "consent_settled",
     LinkHeard: "link",
     Schedule: "schedule",
     Leases: "leases",

@@ -10,8 +10,6 @@ from written_session import WrittenSession
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.consent import Consent, Settled, Sought, Topic
 from ui_console.console_events import (
-    ConsentSettled,
-    ConsentSought,
     GivenBack,
     Granted,
     Heard,
@@ -145,13 +143,13 @@ def test_a_question_whether_to_lift_a_stop_and_one_for_the_robot_are_told_apart(
     shown = held_model()
     lift = Sought("ui_console/ben", "ben", "scout1", "", 20.0, Topic.LIFT)
     take = Sought("ui_console/ben", "ben", "scout1", "mine is stuck", 20.0)
-    shown.apply(ConsentSought(12.0, lift))
-    shown.apply(ConsentSought(12.0, take))
+    shown.apply(lift)
+    shown.apply(take)
     asked = shown.own(12.0).consent
     assert asked is not None
     assert (asked.topic, asked.others) == ("lift", 1)
     assert asked.line == "ben asks whether scout1, which you stopped, may move again"
-    shown.apply(ConsentSettled(13.0, Settled(lift, Consent(True, "anna", ""))))
+    shown.apply(Settled(lift, Consent(True, "anna", "")))
     asked = shown.own(13.0).consent
     assert asked is not None
     assert (asked.topic, asked.line) == ("take", "ben asks for scout1: mine is stuck")

@@ -24,8 +24,6 @@ from ui_console.console_events import (
     Attention,
     ConsentAsked,
     ConsentHeard,
-    ConsentSettled,
-    ConsentSought,
     ConsoleEvent,
     GivenBack,
     Heard,
@@ -337,7 +335,7 @@ async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> 
 async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_keys_that_decide() -> None:
     shown = held_model()
     sought = Sought("ui_console/console-2", "ben", "scout1", "my robot is stuck", 18.0)
-    shown.apply(ConsentSought(11.0, sought))
+    shown.apply(sought)
     session = WrittenSession(shown=shown)
     screen = ConsoleApp(session)
     async with screen.run_test(size=(160, 36)) as pilot:
@@ -345,7 +343,7 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
         assert "ben asks for scout1: my robot is stuck [g: yes, n: no; 6 s]" in screen_text(screen)
         await pilot.press("g")
         assert session.wanted[-1] == ("decide", True)
-        shown.apply(ConsentSettled(12.0, Settled(sought, Consent(True, "anna", ""))))
+        shown.apply(Settled(sought, Consent(True, "anna", "")))
         screen.redraw()
         await settle(pilot)
         assert "ben asks" not in screen_text(screen)
@@ -353,7 +351,7 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
 
 async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
     shown = held_model()
-    shown.apply(ConsentSought(11.0, Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0)))
+    shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0))
     session = WrittenSession(shown=shown)
     screen = ConsoleApp(session, profile=Profile.PENDANT)
     async with screen.run_test(size=(50, 20)) as pilot:
