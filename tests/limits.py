@@ -1,8 +1,8 @@
 """What holds for every test: limits of time, failures printed when they happen, and no process without the marker.
 
-* A test that takes too long fails alone: ``pytest-timeout`` interrupts it. A test that hangs beyond that, in native code
-  or because something swallows the interruption, ends its process with the stacks of all threads; ``pytest -n`` replaces
-  the process and goes on.
+* A test that takes too long fails alone: ``pytest-timeout`` interrupts it. A test that hangs beyond that, in native
+  code or because something swallows the interruption, ends its process with the stacks of all threads; ``pytest -n``
+  replaces the process and goes on.
 * A test on virtual time is limited in virtual time, so that a busy machine fails none: its mission may last
   ``VIRTUAL_LIMIT_S``, or what the marker ``virtual_limit(seconds)`` allows.
 * A failure is printed when it happens: the names are there also if the run is killed.
