@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.large_group import LargeGroupPlanner
-from backbone.scheduling.planner import Planner, PlannerType, Slot, Turn
+from backbone.scheduling.own_planner import PlannerType
+from backbone.scheduling.planner import Planner, Slot, Turn
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.table import Table
 from backbone.scheduling.whole_group import WholeGroupPlanner

@@ -3,10 +3,23 @@
 from __future__ import annotations
 
 import importlib
-from typing import cast
+from typing import Protocol, cast
 
 from backbone.errors import Refusal
-from backbone.scheduling.planner import Planner, PlannerType
+from backbone.scheduling.planner import Planner
+from backbone.scheduling.table import Table
+
+
+class PlannerType(Protocol):
+    """The class of a planner."""
+
+    def __call__(self, table: Table, *, slack_s: float) -> Planner:
+        """Return a planner that has planned nothing yet.
+
+        Args:
+            table: What it may ask of the schedule.
+            slack_s: By how much two reservations may overlap.
+        """
 
 
 class WrongPlanner(Refusal):

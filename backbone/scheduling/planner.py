@@ -10,13 +10,10 @@ SP2 with backfilling", IEEE TPDS 12, 2001).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.priority import higher
-
-if TYPE_CHECKING:
-    from backbone.scheduling.table import Table
 
 Hold = tuple[ArcEntry, float, float]
 """Who stands in the way as one other ARC sees it, from when (minus infinity: it holds its RCs) and until when."""
@@ -99,15 +96,3 @@ class Planner(Protocol):
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return who has the start reserved that the ARC waits for, where only the first in line has one."""
-
-
-class PlannerType(Protocol):
-    """The class of a planner."""
-
-    def __call__(self, table: Table, *, slack_s: float) -> Planner:
-        """Return a planner that has planned nothing yet.
-
-        Args:
-            table: What it may ask of the schedule.
-            slack_s: By how much two reservations may overlap.
-        """

@@ -48,7 +48,8 @@ from backbone.scheduling.explain.attributes import attributes
 from backbone.scheduling.explain.explanation import Explanation
 from backbone.scheduling.invariants import broken
 from backbone.scheduling.master_schedule import EXACT_UP_TO, MasterSchedule
-from backbone.scheduling.planner import PlannerType, Turn, in_order_of_revocation
+from backbone.scheduling.own_planner import PlannerType
+from backbone.scheduling.planner import Turn, in_order_of_revocation
 from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
