@@ -1,6 +1,6 @@
-"""What the command lines share: options, the names that shells complete, and help that is told whole.
+"""Shared parts of the command lines: options, completion of names, and help with whole summaries.
 
-What a completion needs is imported inside it, so that ``--help`` stays quick.
+A completion imports its modules itself, so that ``--help`` stays quick.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 
 class WholeHelp(TyperGroup):
-    """Lists commands with all that is said of each; other lists cut it at the end of the line."""
+    """Lists commands with their whole summaries, which typer cuts at the end of the line."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a row for each command."""
@@ -35,7 +35,7 @@ ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixs
 
 
 def hub_endpoint(value: str | None) -> str | None:
-    """Refuse what names no hub; for options that take an endpoint."""
+    """Refuse a text that is no endpoint of a hub; for options that take an endpoint."""
     if value is not None and ENDPOINT.fullmatch(value) is None:
         raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
     return value
@@ -49,14 +49,14 @@ def complete_mission() -> list[str]:
 
 
 def picture_for(ctx: typer.Context) -> Any:
-    """Return how the mission is that the words typed so far are about; None if there is none."""
+    """Return the picture of the mission that the typed words name; None if it is not up."""
     from backbone.completion import picture_now
 
     return picture_now(ctx.params.get("mission"), ctx.params.get("connect"), ctx.params.get("secret_file"))
 
 
 def complete_name(ctx: typer.Context) -> list[str]:
-    """Return what can be asked about in the mission that is up."""
+    """Return the names that questions may use in the mission that is up."""
     from backbone.completion import names_of
 
     picture = picture_for(ctx)
@@ -110,7 +110,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def finite(value: float | None) -> float | None:
-    """Refuse what is no number, which no range refuses; for options with a range."""
+    """Refuse NaN, which no range refuses; for options with a range."""
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
     return value
