@@ -10,8 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import msgspec
-
 from backbone.bus.interface import Bus
 from backbone.component.messages import AskParameters, Parameters, SetParameter
 from backbone.errors import Refusal
@@ -23,6 +21,7 @@ from backbone.rc_manager.messages import AskAttributes, Done, MoveNode, SetPrior
 from backbone.scheduling.requests import PathNode, RcUse, UnknownRequest, Usage
 from backbone.scheduling.views import Attributes, RequestAttributes
 from backbone.spoken import value_text
+from backbone.wire import plain
 
 PRIORITY, PARENT = "priority", "parent"
 RUN_TIMES = ("minimum_runtime_s", "maximum_runtime_s")
@@ -163,11 +162,8 @@ async def _address(bus: Bus, name: str) -> str:
 
 
 def _plain(request: RequestAttributes) -> dict[str, Any]:
-    return msgspec.structs.asdict(request) | {
-        "state": str(request.state),
-        "uses": {rc: [msgspec.structs.asdict(usage) for usage in use.streams] for rc, use in request.uses.items()},
-        "path": [msgspec.structs.asdict(node) for node in request.path],
-    }
+    uses = {rc: plain(use.streams) for rc, use in request.uses.items()}
+    return {**plain(request), "uses": uses}
 
 
 # ---------------------------------------------------------------------- for people

@@ -6,7 +6,6 @@ quick. Exit codes are those of ``ExitCode``.
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import sys
@@ -20,13 +19,14 @@ import typer
 
 from backbone.cli_options import (
     AsJson,
+    CommandTable,
     ComponentName,
     Endpoint,
     MissionFile,
     MissionName,
     NameOrCause,
     SecretFile,
-    WholeHelp,
+    Version,
     complete_name,
     complete_person,
     complete_resource,
@@ -39,7 +39,7 @@ from backbone.errors import BackboneError
 from backbone.spoken import counted, value_text
 
 app = typer.Typer(
-    cls=WholeHelp,
+    cls=CommandTable,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -69,6 +69,8 @@ def main() -> None:
 
 def run(work: Callable[[], Awaitable[int]]) -> None:
     """Run a command's coroutine and end the process with its exit code; refusals become one line."""
+    import asyncio
+
     import uvloop
 
     async def guarded() -> int:
@@ -123,6 +125,11 @@ def read_or_exit(mission_file: Path) -> Any:
         raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
 
 
+@app.callback()
+def _before_each_command(version: Version = False) -> None:
+    """Read the options that go before a command."""
+
+
 @app.command()
 def check(
     mission_file: MissionFile,
@@ -157,8 +164,13 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
 
     from backbone.dry_run import FIRST_MINUTE_S, dry_run
     from backbone.dry_run_screen import screen
+    from backbone.scheduling.own_planner import WrongPlanner
 
-    dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
+    try:
+        dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
+    except WrongPlanner as refused:
+        say(f"{refused} (remedy: {refused.remedy})")
+        return ExitCode.MISSION_INVALID
     Console(width=_width(), markup=False, emoji=False).print(screen(dry))
     if trace is not None:
         try:

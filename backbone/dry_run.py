@@ -27,6 +27,7 @@ from backbone.placer.placement import HostView, place
 from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.rehearsal import Line, Rehearsal, Timetable
 from backbone.scheduling.requests import SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
@@ -135,6 +136,7 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
         tolerance_s=TOLERANCE_S,
         mission=description.name,
         mission_priority=description.priority,
+        planner=load_planner(rules.planner),
     )
     rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
     for rc in _rcs(description, hosts):

@@ -16,11 +16,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Any
 
-import msgspec
-
 from backbone.component.messages import Absence, ComponentState
 from backbone.ranges import MANY
-from backbone.wire import Message
+from backbone.wire import Message, plain
 
 LOOK_EVERY_S = 0.5  # chosen: an absence appears within two rounds; machine seconds
 SAY_EVERY_S = 1.0  # chosen: one small message a second from one process; machine seconds
@@ -70,7 +68,7 @@ class Health:
 
     def to_json(self) -> dict[str, Any]:
         """Return ``health`` and ``absent`` as plain data."""
-        return {"health": str(self.word), "absent": [msgspec.to_builtins(_fields(each)) for each in self.absent]}
+        return {"health": str(self.word), "absent": plain(self.absent)}
 
 
 def line(absence: Absence, now_s: float) -> str:
@@ -113,7 +111,3 @@ def _word(absent: Iterable[Absence], now_s: float, rate: float) -> HealthWord:
             return HealthWord.FAILED
         word = HealthWord.DEGRADED
     return word
-
-
-def _fields(absence: Absence) -> dict[str, Any]:
-    return {name: getattr(absence, name) for name in absence.__struct_fields__}

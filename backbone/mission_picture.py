@@ -31,6 +31,7 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
+from backbone.wire import plain
 
 LAUNCHER = "backbone/launcher"
 LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
@@ -125,15 +126,13 @@ class MissionPicture:
             }
             for _, c in sorted(self.components.items())
         ]
-        schedule = (
-            msgspec.to_builtins(_plain(self.schedule)) if self.schedule else {"rcs": [], "requests": [], "groups": []}
-        )
+        schedule = plain(self.schedule) if self.schedule else {"rcs": [], "requests": [], "groups": []}
         return {
             "mission": self.mission,
             "at_s": self.at_s,
             **self.health.to_json(),
             "stale_since_s": self.stale_since_s,
-            "stops": [{"name": name, **_plain(stop)} for name, stop in self.stops.items()],
+            "stops": [{"name": name, **plain(stop)} for name, stop in self.stops.items()],
             "components": components,
             "rcs": schedule["rcs"],
             "requests": schedule["requests"],
@@ -280,17 +279,6 @@ def stop_line(name: str, stop: StandingStop, now_s: float) -> str:
     return (
         f"{name} is STOPPED by {stop.by} for {lasts_s:.1f} s{why}{unsure}; lift the stop at a console when it may move"
     )
-
-
-def _plain(value: Any) -> Any:
-    """Return structs as dictionaries of their fields, all the way down."""
-    if isinstance(value, msgspec.Struct):
-        return {name: _plain(getattr(value, name)) for name in value.__struct_fields__}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
-    return value
 
 
 def holders_line(schedule: Schedule) -> str:

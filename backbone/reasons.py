@@ -29,7 +29,7 @@ from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.requests import RequestState, UnknownRequest
 from backbone.scheduling.views import Why
 from backbone.spoken import counted
-from backbone.wire import Message
+from backbone.wire import plain
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
 
@@ -109,10 +109,10 @@ class Reasons:
         """Return the reasons as plain data."""
         return {
             "name": self.name,
-            "why": _fields(self.why),
-            "placement": _fields(self.placement),
-            "stop": _fields(self.component.stop) if self.component else None,
-            "absent": _fields(self.absence),
+            "why": plain(self.why),
+            "placement": plain(self.placement),
+            "stop": plain(self.component.stop) if self.component else None,
+            "absent": plain(self.absence),
             "led_to": [event_json(event) for event in self.led_to],
             "remarks": list(self.remarks),
         }
@@ -279,10 +279,6 @@ def _question(address: str, asked: Asked) -> AskStory:
     if asked.message:
         return AskStory(asked.message)
     return AskStory() if component_of(address) == asked.name else AskStory(asked.name)
-
-
-def _fields(message: Message | None) -> dict[str, Any] | None:
-    return {name: getattr(message, name) for name in message.__struct_fields__} if message is not None else None
 
 
 async def _or_error(bus: Bus, address: str, question: Any, reply: type[Any]) -> Any:

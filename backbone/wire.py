@@ -16,10 +16,11 @@ A change of a struct that old readers cannot read gets a new version: ``class Dr
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import types
 import typing
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from typing import Any, Generic, TypeVar, cast
 
 import msgspec
@@ -157,6 +158,24 @@ def refuse_oversized(length: int) -> None:
     """
     if length > MAX_MESSAGE_BYTES:
         raise OversizedMessage(f"message of {length} bytes", bytes=length)
+
+
+def plain(value: Any) -> Any:
+    """Return messages, which travel as arrays, and dataclasses as dictionaries of their fields, all the way down.
+
+    Example:
+        >>> plain(Refused("link.lost", "no answer", ""))
+        {'code': 'link.lost', 'detail': 'no answer', 'remedy': '', 'facts': {}}
+    """
+    if isinstance(value, msgspec.Struct):
+        return {name: plain(getattr(value, name)) for name in value.__struct_fields__}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {field.name: plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if isinstance(value, Mapping):
+        return {str(name): plain(each) for name, each in value.items()}
+    return value
 
 
 @functools.cache

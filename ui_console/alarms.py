@@ -13,9 +13,8 @@ Rules of this file: no bus, no clock, no screen; times are arguments.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
-import msgspec
+from msgspec.structs import replace
 
 from ui_console.views import NONE_S, AlarmKind, AlarmView, Severity
 
@@ -48,22 +47,6 @@ _CAUSES = (AlarmKind.LINK, AlarmKind.ABSENT, AlarmKind.LOST, AlarmKind.RC_DOWN)
 _RANKS = len(_CAUSES) + 1
 
 
-@dataclass(slots=True)
-class _Alarm:
-    kind: AlarmKind
-    subject: str
-    line: str
-    remedy: str
-    severity: Severity
-    first_s: float
-    last_s: float
-    count: int = 1
-    is_active: bool = False
-    is_over: bool = False
-    acknowledged_by: str = ""
-    while_away: bool = False
-
-
 class AlarmBook:
     """The alarms of one console, or of all who share one model.
 
@@ -72,7 +55,8 @@ class AlarmBook:
     """
 
     def __init__(self, beside: AlarmBook | None = None) -> None:
-        self._alarms: dict[str, _Alarm] = {}
+        self._alarms: dict[str, AlarmView] = {}
+        self._over: set[str] = set()
         self._beside = beside
         self._own_away_since_s = NONE_S
         self._now_s = NONE_S
@@ -93,9 +77,31 @@ class AlarmBook:
         remedy: str = "",
         key: str = "",
         severity: Severity | None = None,
+        *,
+        lasts: bool = False,
     ) -> None:
-        """Something happened; told again it counts up."""
-        self._tell(kind, subject, line, at_s, remedy, key, severity, is_active=False)
+        """Something happened, and with ``lasts`` is so until ``end``; told again it counts up."""
+        key, severity = key or alarm_key(kind, subject), severity or SEVERITIES[kind]
+        former = self._alarms.pop(key, None)
+        first_s, count = (former.first_s, former.count + 1) if former is not None else (at_s, 1)
+        self._alarms[key] = AlarmView(
+            key,
+            kind,
+            severity,
+            subject,
+            line,
+            remedy,
+            first_s,
+            at_s,
+            count,
+            lasts,
+            "",
+            self.away_since_s >= 0,
+            keys=[key],
+        )
+        self._over.discard(key)
+        if len(self._alarms) > ALARMS_KEPT:
+            self._forget_one()
 
     def begin(
         self,
@@ -104,38 +110,49 @@ class AlarmBook:
         line: str,
         at_s: float,
         remedy: str = "",
-        key: str = "",
         severity: Severity | None = None,
     ) -> None:
         """Something is so from now on until ``end``; told again while it is so, only the words may change."""
-        alarm = self._alarms.get(key or alarm_key(kind, subject))
+        key = alarm_key(kind, subject)
+        alarm = self._alarms.get(key)
         if alarm is not None and alarm.is_active:
-            alarm.line, alarm.remedy, alarm.severity = line, remedy, severity or SEVERITIES[kind]
-            return
-        self._tell(kind, subject, line, at_s, remedy, key, severity, is_active=True)
+            self._alarms[key] = replace(alarm, line=line, remedy=remedy, severity=severity or SEVERITIES[kind])
+        else:
+            self.happened(kind, subject, line, at_s, remedy, severity=severity, lasts=True)
 
-    def end(self, kind: AlarmKind, subject: str, at_s: float, key: str = "") -> None:
+    def end(self, kind: AlarmKind, subject: str, at_s: float) -> None:
         """It is no longer so: nothing is to be done about it any more."""
-        alarm = self._alarms.get(key or alarm_key(kind, subject))
+        key = alarm_key(kind, subject)
+        alarm = self._alarms.get(key)
         if alarm is not None and alarm.is_active:
-            alarm.is_active, alarm.is_over, alarm.last_s, alarm.remedy = False, True, at_s, ""
+            self._alarms[key] = replace(alarm, is_active=False, last_s=at_s, remedy="")
+            self._over.add(key)
+
+    def hold(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
+        """Begin the alarm of a condition that is so, else end it."""
+        if is_so:
+            self.begin(kind, subject, line, at_s, remedy)
+        else:
+            self.end(kind, subject, at_s)
 
     def mended(self, kinds: Sequence[AlarmKind]) -> None:
         """What happened of these kinds matters no longer: what was wanted has come about since."""
-        for alarm in self._alarms.values():
+        for key, alarm in self._alarms.items():
             if alarm.kind in kinds and not alarm.is_active:
-                alarm.is_over, alarm.remedy = True, ""
+                self._alarms[key] = replace(alarm, remedy="")
+                self._over.add(key)
 
-    def retract(self, kind: AlarmKind, subject: str, key: str = "") -> None:
+    def retract(self, kind: AlarmKind, subject: str) -> None:
         """It was none: what explains it was heard later."""
-        self._alarms.pop(key or alarm_key(kind, subject), None)
+        self._alarms.pop(alarm_key(kind, subject), None)
+        self._over.discard(alarm_key(kind, subject))
 
     def acknowledge(self, user: str, keys: Sequence[str] = ()) -> int:
         """Note that the user has seen these alarms, or without a key all; return how many that were new to people."""
         seen = [alarm for key, alarm in self._alarms.items() if not keys or key in keys]
         seen = [alarm for alarm in seen if not alarm.acknowledged_by and self._is_shown(alarm)]
         for alarm in seen:
-            alarm.acknowledged_by, alarm.while_away = user, False
+            self._alarms[alarm.key] = replace(alarm, acknowledged_by=user, while_away=False)
         return len(seen)
 
     def attention(self, is_there: bool, at_s: float) -> None:
@@ -151,55 +168,27 @@ class AlarmBook:
 
     def views(self) -> list[AlarmView]:
         """Return what is to be known: unseen ones first, then by weight, newest first."""
-        return in_order(_view(key, alarm) for key, alarm in self._alarms.items() if self._is_shown(alarm))
+        return in_order(filter(self._is_shown, self._alarms.values()))
 
-    def _is_shown(self, alarm: _Alarm) -> bool:
+    def _is_shown(self, alarm: AlarmView) -> bool:
         if alarm.is_active or alarm.while_away:
             return True
         fades_after_s = FADES_AFTER_S.get(alarm.severity)
         is_faded = fades_after_s is not None and self._now_s - alarm.last_s > fades_after_s
-        return not (alarm.is_over or alarm.acknowledged_by or is_faded)
-
-    def _tell(
-        self,
-        kind: AlarmKind,
-        subject: str,
-        line: str,
-        at_s: float,
-        remedy: str,
-        key: str,
-        severity: Severity | None,
-        *,
-        is_active: bool,
-    ) -> None:
-        key = key or alarm_key(kind, subject)
-        former = self._alarms.pop(key, None)
-        self._alarms[key] = _Alarm(
-            kind,
-            subject,
-            line,
-            remedy,
-            severity or SEVERITIES[kind],
-            former.first_s if former else at_s,
-            at_s,
-            former.count + 1 if former else 1,
-            is_active,
-            while_away=self.away_since_s >= 0,
-        )
-        if len(self._alarms) > ALARMS_KEPT:
-            self._forget_one()
+        return not (alarm.key in self._over or alarm.acknowledged_by or is_faded)
 
     def _forget_one(self) -> None:
         """Forget the oldest of those that matter least: seen, or over before anybody looked; then what is over."""
 
         def weight(key: str) -> tuple[bool, bool]:
             alarm = self._alarms[key]
-            is_unseen = not alarm.acknowledged_by and (alarm.while_away or not alarm.is_over)
+            is_unseen = not alarm.acknowledged_by and (alarm.while_away or key not in self._over)
             return is_unseen, alarm.is_active
 
         alarm = self._alarms.pop(min(self._alarms, key=weight))  # of equals the first, which is the oldest
         if self._is_shown(alarm) and not alarm.acknowledged_by:
             self.forgotten += 1
+        self._over.discard(alarm.key)
 
 
 def alarm_key(kind: AlarmKind, subject: str) -> str:
@@ -264,28 +253,10 @@ def _rank(alarm: AlarmView) -> int:
 def _with(root: AlarmView, others: Sequence[AlarmView]) -> AlarmView:
     if not others:
         return root
-    return msgspec.structs.replace(
+    return replace(
         root,
         also=[one.line for one in others],
         keys=[root.key, *(one.key for one in others)],
         acknowledged_by=root.acknowledged_by if all(one.acknowledged_by for one in others) else "",
         while_away=root.while_away or any(one.while_away for one in others),
-    )
-
-
-def _view(key: str, alarm: _Alarm) -> AlarmView:
-    return AlarmView(
-        key,
-        alarm.kind,
-        alarm.severity,
-        alarm.subject,
-        alarm.line,
-        alarm.remedy,
-        alarm.first_s,
-        alarm.last_s,
-        alarm.count,
-        alarm.is_active,
-        alarm.acknowledged_by,
-        alarm.while_away,
-        keys=[key],
     )

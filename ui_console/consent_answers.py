@@ -9,7 +9,7 @@ from typing import Protocol
 from backbone.bus.interface import Clock
 from backbone.operators import OperatorAction
 from ui_console.consent import CONSENT_WITHIN_S, Consent, ConsentDesk, Settled, Sought, Topic
-from ui_console.console_events import ConsentSettled, ConsentSought, ConsoleEvent
+from ui_console.console_events import ConsoleEvent
 
 _ACTIONS = {
     (Topic.TAKE, True): OperatorAction.CONSENT,
@@ -61,7 +61,7 @@ class ConsentAnswers:
         sought = self._desk.open_question(Sought(asker, user, robot, why, until_s, topic))
         answer: asyncio.Future[Consent] = asyncio.get_running_loop().create_future()
         self._answers[asker, topic] = answer
-        self._show(ConsentSought(now_s, sought))
+        self._show(sought)
         try:
             async with asyncio.timeout(CONSENT_WITHIN_S):
                 return await answer
@@ -97,4 +97,4 @@ class ConsentAnswers:
             answer = self._answers.pop((one.sought.asker, one.sought.topic), None)
             if answer is not None and not answer.done():
                 answer.set_result(one.consent)
-            self._show(ConsentSettled(self._clock.now_s(), one))
+            self._show(one)

@@ -12,12 +12,22 @@ from typing import Any
 
 import msgspec
 
-from backbone.component.messages import ComponentState, StoryEvent
+from backbone.component.messages import (
+    ComponentState,
+    MissionTime,
+    Parameters,
+    SetParameter,
+    Statistics,
+    StoryEvent,
+)
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.health import MissionHealth
+from backbone.mission_log import Log, PeopleKnown
+from backbone.nameserver.messages import Components, Disappeared
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
+from backbone.wire import plain
 from resource_pool.arc_client import StopState
 from ui_console.consent import Settled, Sought, Topic
 from ui_console.losses import why_lost
@@ -171,14 +181,6 @@ class PictureSeen:
 
 
 @dataclass(frozen=True, slots=True)
-class WhyHeard:
-    """The RC manager said why this console waits."""
-
-    at_s: float
-    why: Why
-
-
-@dataclass(frozen=True, slots=True)
 class Attention:
     """The operator touched the console, or turned away from it.
 
@@ -231,150 +233,43 @@ class ConsentHeard:
     topic: Topic = Topic.TAKE
 
 
-@dataclass(frozen=True, slots=True)
-class ConsentSought:
-    """Another console asks for what this one holds, or to lift what its operator stopped."""
-
-    at_s: float
-    sought: Sought
-
-
-@dataclass(frozen=True, slots=True)
-class ConsentSettled:
-    """A question that was open here is answered."""
-
-    at_s: float
-    settled: Settled
-
-
 # ---------------------------------------------------------------------- of the whole mission
-@dataclass(frozen=True, slots=True)
-class ScheduleHeard:
-    """The RC manager's schedule changed."""
-
-    at_s: float
-    schedule: Schedule
-
-
-@dataclass(frozen=True, slots=True)
-class LeasesHeard:
-    """The RC manager renewed what is held.
-
-    Attributes:
-        at_s: When it said so.
-        leases: What is held, for how much longer, and which RCs are missing.
-    """
-
-    at_s: float
-    leases: Leases
-
-
-@dataclass(frozen=True, slots=True)
-class StoryHeard:
-    """A component told what just happened to it."""
-
-    at_s: float
-    story: StoryEvent
+Said = (
+    Schedule
+    | Leases
+    | StoryEvent
+    | Log
+    | PeopleKnown
+    | OperatorActed
+    | ComponentState
+    | Components
+    | Disappeared
+    | ProcessFell
+    | HostLoad
+    | StopState
+    | MissionTime
+    | Statistics
+    | MissionHealth
+    | Parameters
+    | SetParameter
+    | Why
+)
+"""What components publish or answer, as it came over the bus."""
 
 
 @dataclass(frozen=True, slots=True)
-class LogHeard:
-    """The launcher told what happened before this console listened.
+class Heard:
+    """A message arrived.
 
     Attributes:
         at_s: When.
-        events: Oldest first.
-        consoles: Name of each console that was ever there → the person's.
+        body: The message.
+        source: Address of the component that said it, where the message does not say of whom it speaks.
     """
 
     at_s: float
-    events: Sequence[StoryEvent]
-    consoles: Mapping[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class ActHeard:
-    """An operator did something.
-
-    Attributes:
-        at_s: When it was heard.
-        act: What it was.
-        where: Address of the console or command it was done by.
-    """
-
-    at_s: float
-    act: OperatorActed
-    where: str
-
-
-@dataclass(frozen=True, slots=True)
-class ComponentHeard:
-    """A component said how it is."""
-
-    at_s: float
-    component: ComponentState
-
-
-@dataclass(frozen=True, slots=True)
-class ComponentsListed:
-    """The nameserver said who is there.
-
-    Attributes:
-        at_s: When.
-        components: All of them.
-        is_complete: False while it cannot know yet: absence proves nothing then.
-    """
-
-    at_s: float
-    components: Sequence[ComponentState]
-    is_complete: bool
-
-
-@dataclass(frozen=True, slots=True)
-class ComponentGone:
-    """A component's liveliness token has fallen."""
-
-    at_s: float
-    address: str
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessFallen:
-    """A creator said how a component ended that nobody had ended."""
-
-    at_s: float
-    fell: ProcessFell
-
-
-@dataclass(frozen=True, slots=True)
-class LoadHeard:
-    """A host said how busy it is."""
-
-    at_s: float
-    load: HostLoad
-
-
-@dataclass(frozen=True, slots=True)
-class StopHeard:
-    """A robot was stopped by an operator, or may move again."""
-
-    at_s: float
-    stop: StopState
-
-
-@dataclass(frozen=True, slots=True)
-class RadioCounted:
-    """A radio told its counters.
-
-    Attributes:
-        at_s: When.
-        radio: Its name.
-        values: ``overruns_<arc>``, ``packets_sent`` and others.
-    """
-
-    at_s: float
-    radio: str
-    values: Mapping[str, float]
+    body: Said
+    source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,40 +289,6 @@ class LinkHeard:
     until_s: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class HealthHeard:
-    """The launcher said how the mission is.
-
-    Attributes:
-        at_s: When.
-        health: What it said; None: it is listened to from now on.
-        until_s: The launcher is silent if it said nothing more by then.
-    """
-
-    at_s: float
-    health: MissionHealth | None
-    until_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class ParametersHeard:
-    """A component told its parameters.
-
-    Attributes:
-        at_s: When.
-        address: Of the component.
-        values: All of them.
-        changed: The one that was changed just before; empty: none.
-        user: Who changed it.
-    """
-
-    at_s: float
-    address: str
-    values: Mapping[str, Any]
-    changed: str = ""
-    user: str = ""
-
-
 OwnEvent = (
     Asked
     | Granted
@@ -439,30 +300,13 @@ OwnEvent = (
     | LetGoNeeded
     | MomentBegan
     | PictureSeen
-    | WhyHeard
     | Attention
     | ConsentAsked
     | ConsentHeard
-    | ConsentSought
-    | ConsentSettled
+    | Sought
+    | Settled
 )
-TeamEvent = (
-    ScheduleHeard
-    | LeasesHeard
-    | StoryHeard
-    | LogHeard
-    | ActHeard
-    | ComponentHeard
-    | ComponentsListed
-    | ComponentGone
-    | ProcessFallen
-    | LoadHeard
-    | StopHeard
-    | RadioCounted
-    | LinkHeard
-    | HealthHeard
-    | ParametersHeard
-)
+TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
 _WORDS: dict[type[Any], str] = {
@@ -475,27 +319,30 @@ _WORDS: dict[type[Any], str] = {
     LetGoNeeded: "let_go",
     MomentBegan: "moment",
     PictureSeen: "picture",
-    WhyHeard: "why",
     Attention: "attention",
     ConsentAsked: "consent_asked",
     ConsentHeard: "consent_heard",
-    ConsentSought: "consent_sought",
-    ConsentSettled: "consent_settled",
-    ScheduleHeard: "schedule",
-    LeasesHeard: "leases",
-    StoryHeard: "story",
-    LogHeard: "log",
-    ActHeard: "operator",
-    ComponentHeard: "component",
-    ComponentsListed: "components",
-    ComponentGone: "gone",
-    ProcessFallen: "fell",
-    LoadHeard: "load",
-    StopHeard: "stop",
-    RadioCounted: "radio",
+    Sought: "consent_sought",
+    Settled: "consent_settled",
     LinkHeard: "link",
-    HealthHeard: "health",
-    ParametersHeard: "parameters",
+    Schedule: "schedule",
+    Leases: "leases",
+    StoryEvent: "story",
+    Log: "log",
+    PeopleKnown: "people",
+    OperatorActed: "operator",
+    ComponentState: "component",
+    Components: "components",
+    Disappeared: "gone",
+    ProcessFell: "fell",
+    HostLoad: "load",
+    StopState: "stop",
+    MissionTime: "time",
+    Statistics: "radio",
+    MissionHealth: "health",
+    Parameters: "parameters",
+    SetParameter: "set",
+    Why: "why",
 }
 
 
@@ -503,7 +350,7 @@ def event_word(event: ConsoleEvent) -> str:
     """Return the word of an event in JSON output: ``granted``, ``suspended``, ``resumed`` and so on."""
     if isinstance(event, Granted):
         return "resumed" if event.again else "granted"
-    return _WORDS[type(event)]
+    return _WORDS[type(event.body if isinstance(event, Heard) else event)]
 
 
 def event_json(event: ConsoleEvent) -> bytes:
@@ -513,40 +360,26 @@ def event_json(event: ConsoleEvent) -> bytes:
         >>> event_json(LinkTrouble(2.0, "scout1 did not answer"))
         b'{"event":"no_answer","at_s":2.0,"detail":"scout1 did not answer","command":""}'
     """
-    plain: dict[str, Any] = msgspec.to_builtins(_by_name(event))
-    if isinstance(event, Granted):
-        plain["after_s"] = event.after_s
-    if isinstance(event, Lost):
-        plain["why"] = why_lost(event.reason, event.by)
-    return msgspec.json.encode({"event": event_word(event), **plain})
+    word = event_word(event)
+    fields = plain(event)
+    match event:
+        case Heard(body=Disappeared(address=address)):
+            fields = {"at_s": event.at_s, "address": address}
+        case Heard():
+            where = {"where": event.source} if event.source else {}
+            fields = {"at_s": event.at_s, "act" if word == "operator" else word: fields["body"], **where}
+        case Granted():
+            fields["after_s"] = event.after_s
+        case Lost():
+            fields["why"] = why_lost(event.reason, event.by)
+    return msgspec.json.encode({"event": word, **fields})
 
 
-FOR_SCRIPTS = (
-    ScheduleHeard,
-    StoryHeard,
-    ActHeard,
-    StopHeard,
-    ComponentGone,
-    ProcessFallen,
-    LinkTrouble,
-    CommandRefused,
-)
+FOR_SCRIPTS = (Schedule, StoryEvent, OperatorActed, StopState, Disappeared, ProcessFell, LinkTrouble, CommandRefused)
 """What a program that watches a mission is told; the rest comes several times a second."""
 
 
 def for_scripts(event: ConsoleEvent) -> list[bytes]:
     """Return the event as one line of JSON if it is one for programs that watch, else none."""
-    return [event_json(event)] if isinstance(event, FOR_SCRIPTS) else []
-
-
-def _by_name(value: Any) -> Any:
-    """Return messages, which travel as arrays, as dictionaries of their fields, all the way down."""
-    if isinstance(value, msgspec.Struct):
-        return {name: _by_name(getattr(value, name)) for name in value.__struct_fields__}
-    if hasattr(value, "__dataclass_fields__"):
-        return {name: _by_name(getattr(value, name)) for name in value.__dataclass_fields__}
-    if isinstance(value, list | tuple):
-        return [_by_name(item) for item in value]
-    if isinstance(value, Mapping):
-        return {str(name): _by_name(item) for name, item in value.items()}
-    return value
+    said = event.body if isinstance(event, Heard) else event
+    return [event_json(event)] if isinstance(said, FOR_SCRIPTS) else []

@@ -10,15 +10,15 @@ operator's part: what is wanted, what is held, the pictures that arrive.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
-from typing import cast, get_args
 
 import msgspec
 
+from backbone.component.messages import StoryEvent
 from backbone.naming import Subsystem, component_of
+from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
 from ui_console.alarms import AlarmBook
-from ui_console.consent import Sought, Topic
+from ui_console.consent import Settled, Sought, Topic
 from ui_console.console_events import (
     Asked,
     Attention,
@@ -26,19 +26,17 @@ from ui_console.console_events import (
     CommandRefused,
     ConsentAsked,
     ConsentHeard,
-    ConsentSettled,
-    ConsentSought,
     ConsoleEvent,
     GivenBack,
     Granted,
+    Heard,
     LetGoNeeded,
+    LinkHeard,
     LinkTrouble,
     Lost,
     MomentBegan,
     OwnEvent,
     PictureSeen,
-    TeamEvent,
-    WhyHeard,
 )
 from ui_console.lifting import question_line
 from ui_console.losses import UNDECIDED, WANTED, why_lost
@@ -50,7 +48,6 @@ from ui_console.views import (
     ConsentView,
     ConsoleView,
     LinkView,
-    LogRow,
     LostView,
     OwnView,
     RobotView,
@@ -63,16 +60,6 @@ RATE_OVER_S = 2.0  # chosen: a rate a person can read
 SLICE_TOLD_S = 1.0  # chosen: what ends within a second is not worth a number
 ANSWER_SHOWN_S = 10.0  # chosen: long enough to be read, short enough not to be taken for news
 LOG_SHOWN = 100  # chosen: more than a screen has lines
-_TEAM_EVENTS = get_args(TeamEvent)
-
-
-@dataclass(frozen=True, slots=True)
-class _Went:
-    """A robot that went without its operator asking for it."""
-
-    at_s: float
-    robot: str
-    why: str
 
 
 class ConsoleModel:
@@ -102,7 +89,7 @@ class ConsoleModel:
         self.held: Granted | None = None
         self.lost: Lost | None = None
         self.asked: Asked | None = None
-        self.why: WhyHeard | None = None
+        self.why: Why | None = None
         self.applied: CommandApplied | None = None
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
@@ -112,7 +99,7 @@ class ConsoleModel:
         self.moment = 0
         """Grows whenever presses from before count no more."""
         self._must_let_go = False
-        self._went: _Went | None = None
+        self._went: LostView | None = None
         self._asked_whom: ConsentAsked | None = None
         self._heard: list[ConsentHeard] = []
         self._refused = ""  # why the last claim was refused, if it was
@@ -123,10 +110,13 @@ class ConsoleModel:
     # ------------------------------------------------------------------ events in
     def apply(self, event: ConsoleEvent) -> None:
         """Take the event in; what concerns the whole mission goes to ``team``."""
-        if isinstance(event, _TEAM_EVENTS):
-            self.team.apply(cast(TeamEvent, event))
-        else:
-            self._apply_own(cast(OwnEvent, event))
+        match event:
+            case Heard(body=Why() as why):
+                self.why = why
+            case Heard() | LinkHeard():
+                self.team.apply(event)
+            case _:
+                self._apply_own(event)
 
     def look(self, now_s: float) -> None:
         """Find out what only time can tell; right before a view is taken."""
@@ -269,7 +259,7 @@ class ConsoleModel:
             links.insert(1, LinkView(f"commands to {self.applied.rc}", True, self.applied.took_s, line))
         return links
 
-    def log(self, count: int = LOG_SHOWN) -> list[LogRow]:
+    def log(self, count: int = LOG_SHOWN) -> list[StoryEvent]:
         """Return the newest that happened, oldest first."""
         return self.team.log(count)
 
@@ -291,8 +281,8 @@ class ConsoleModel:
             there = "; ".join(self.other_screens())
             return f"watching; you hold no robot{f' here; {there}' if there else ''}"
         wanted = self.robot or "a robot"
-        if self.why is not None and self.why.why.lines:
-            why = self.why.why
+        why = self.why
+        if why is not None and why.lines:
             reason = why.lines[0].removeprefix(f"{why.name} {why.state}: ")  # which the line says in its own words
             return f"waiting for {wanted}: {self.team.people.named(reason)}"
         if self.lost is not None:
@@ -307,10 +297,10 @@ class ConsoleModel:
                 self._asked_whom, self._heard = event, []
             case ConsentHeard():
                 self._heard.append(event)
-            case ConsentSought(sought=sought):
-                self._sought[sought.asker, sought.topic] = sought
-            case ConsentSettled(settled=settled):
-                self._sought.pop((settled.sought.asker, settled.sought.topic), None)
+            case Sought(asker=asker, topic=topic):
+                self._sought[asker, topic] = event
+            case Settled(sought=sought):
+                self._sought.pop((sought.asker, sought.topic), None)
             case LetGoNeeded(is_needed=is_needed):
                 self._must_let_go = is_needed
             case MomentBegan():
@@ -327,7 +317,7 @@ class ConsoleModel:
             case Lost(at_s=at_s):
                 self.held, self.lost = None, event
                 if event.reason in UNDECIDED:
-                    self._went = _Went(at_s, self.robot, "the link to it was away for too long")
+                    self._went = LostView(self.robot, "the link to it was away for too long", at_s, False)
                 self._pictures.clear()
                 if event.reason != WANTED:
                     line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
@@ -345,7 +335,7 @@ class ConsoleModel:
             case LinkTrouble(at_s=at_s, detail=detail):
                 alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
             case GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
-                self._went = None if wanted else _Went(at_s, self.robot, reason)
+                self._went = None if wanted else LostView(self.robot, reason, at_s, False)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:
@@ -356,8 +346,6 @@ class ConsoleModel:
                 seen.append(event)
                 while at_s - seen[0].at_s > RATE_OVER_S:
                     seen.popleft()
-            case WhyHeard():
-                self.why = event
             case Attention(at_s=at_s, is_there=is_there):
                 self.team.alarms.attention(is_there, at_s)
 
@@ -380,7 +368,7 @@ class ConsoleModel:
         if went is None:
             return None
         is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots(now_s))
-        return LostView(went.robot, went.why, went.at_s, is_up and self.asked is None)
+        return msgspec.structs.replace(went, may_retake=is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:
         """Return what is wrong with the pictures of the robot that is held; empty if nothing is."""

@@ -11,6 +11,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterable
+from types import TracebackType
 from typing import Any
 
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -30,19 +31,12 @@ from backbone.component.messages import (
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
-from backbone.health import SILENT_AFTER_S, MissionHealth
+from backbone.health import MissionHealth
 from backbone.keys import Conversation
 from backbone.mission_log import AskLog, AskPeople, Log, PeopleKnown
 from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import (
-    Appeared,
-    Components,
-    Disappeared,
-    ListComponents,
-    Resolve,
-    Resolved,
-)
+from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents, Resolve, Resolved
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorActed
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
@@ -51,26 +45,7 @@ from backbone.reasons import reasons_for
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
-from ui_console.console_events import (
-    ActHeard,
-    CommandRefused,
-    ComponentGone,
-    ComponentHeard,
-    ComponentsListed,
-    HealthHeard,
-    LeasesHeard,
-    LinkHeard,
-    LinkTrouble,
-    LoadHeard,
-    LogHeard,
-    ParametersHeard,
-    ProcessFallen,
-    RadioCounted,
-    ScheduleHeard,
-    StopHeard,
-    StoryHeard,
-    TeamEvent,
-)
+from ui_console.console_events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
 from ui_console.log_board import LOG_KEPT
 from ui_console.team_model import ROBOT_KIND
 
@@ -83,7 +58,7 @@ PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and asking costs not
 
 LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link; machine seconds
 
-FeedEvent = TeamEvent | LinkTrouble | CommandRefused
+FeedEvent = Heard | LinkHeard | LinkTrouble | CommandRefused
 
 
 class LogAway(Refusal):
@@ -116,15 +91,14 @@ class ConsoleFeed:
     def listen(self) -> None:
         """Begin to listen; once, before ``run``."""
         bus = self._bus
-        bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard_schedule, latest=True)
-        bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases, latest=True)
-        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_story)
-        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
-        bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard_status, latest=True)
-        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_life)
-        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
-        self._show_health(None)
-        watch_stops(bus, lambda stop: self._show(StopHeard(self._clock.now_s(), stop)))
+        bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard, latest=True)
+        bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard, latest=True)
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
+        bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard, latest=True)
+        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard)
+        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard, latest=True)
+        watch_stops(bus, self._hear)
         bus.watch_link(self._heard_link)
 
     async def run(self) -> None:
@@ -148,48 +122,26 @@ class ConsoleFeed:
 
     async def find_robots(self) -> frozenset[str]:
         """Return every robot of the mission, also those not heard of yet."""
-        try:
-            question = ListComponents(subsystem=str(Subsystem.RESOURCE_POOL), type=ROBOT_KIND)
-            listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            self._trouble(error)
-            return self.robots
-        return self.robots | {component_of(component.address) for component in listing.components}
+        return self.robots | set(map(component_of, await self._list_of(Subsystem.RESOURCE_POOL, ROBOT_KIND)))
 
     async def ask_stop(self, robot: str) -> StopState | None:
         """Return whether an operator's stop keeps the robot from moving; None: its RC did not say."""
-        try:
+        with self._told():
             stop = await ask_stop(self._bus, robot)
-        except Refusal as refusal:
-            self._refused(refusal)
-            return None
-        except LinkError as error:
-            self._trouble(error)
-            return None
-        self._show(StopHeard(self._clock.now_s(), stop))
-        return stop
+            self._hear(stop)
+            return stop
+        return None
 
     async def consoles(self) -> list[str]:
         """Return the addresses of all consoles of the mission; none if the nameserver did not answer."""
-        try:
-            question = ListComponents(subsystem=str(Subsystem.UI_CONSOLE))
-            listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            self._trouble(error)
-            return []
-        return [component.address for component in listing.components]
+        return await self._list_of(Subsystem.UI_CONSOLE)
 
     async def lift(self, stop: StopState, user: str = "") -> bool:
         """Let a robot move again; return whether it may."""
-        try:
-            self._show(StopHeard(self._clock.now_s(), await lift_stop(self._bus, stop, user)))
-        except Refusal as refusal:
-            self._refused(refusal)
-            return False
-        except LinkError as error:
-            self._trouble(error)
-            return False
-        return True
+        with self._told():
+            self._hear(await lift_stop(self._bus, stop, user))
+            return True
+        return False
 
     async def why(self, name: str) -> list[str]:
         """Return for people why this robot, ARC, behavior, console or component is as it is."""
@@ -214,48 +166,55 @@ class ConsoleFeed:
 
     async def ask_parameters(self, name: str) -> bool:
         """Have a component tell its parameters; return whether it did."""
-        try:
+        with self._told():
             address = await self._resolve(name)
-            answer = await self._bus.ask(address, AskParameters(), Parameters, within_s=REPLY_TIME_S)
-        except Refusal as refusal:
-            self._refused(refusal)
-            return False
-        except LinkError as error:
-            self._trouble(error)
-            return False
-        self._show(ParametersHeard(self._clock.now_s(), address, answer.values))
-        return True
+            self._hear(await self._bus.ask(address, AskParameters(), Parameters, within_s=REPLY_TIME_S), address)
+            return True
+        return False
 
     async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
         """Have a component run with another value; return whether it does."""
-        try:
+        with self._told():
             address = await self._resolve(name)
-            change = SetParameter(parameter, value, user)
-            answer = await self._bus.ask(address, change, Parameters, within_s=REPLY_TIME_S)
-        except Refusal as refusal:
-            self._refused(refusal)
-            return False
-        except LinkError as error:
-            self._trouble(error)
-            return False
-        self._show(ParametersHeard(self._clock.now_s(), address, answer.values, parameter, user or self._bus.source))
-        return True
+            change = SetParameter(parameter, value, user or self._bus.source)
+            answer, now_s = await self._bus.ask(address, change, Parameters, within_s=REPLY_TIME_S), self._clock.now_s()
+            self._show(Heard(now_s, change, address))
+            self._show(Heard(now_s, answer, address))
+            return True
+        return False
 
     # ------------------------------------------------------------------ within
+    def _told(self) -> _Answered:
+        """Have the console told of a refusal or a silence, which ends what stands in here."""
+        return _Answered(self._failed)
+
+    def _failed(self, error: Refusal | LinkError) -> None:
+        now_s = self._clock.now_s()
+        if isinstance(error, Refusal):
+            self._show(CommandRefused(now_s, error.code, error.detail, error.remedy))
+        else:
+            self._show(LinkTrouble(now_s, str(error)))
+
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
-        try:
-            self._show(StopHeard(self._clock.now_s(), await stop_robot(self._bus, robot, reason, user)))
-        except Refusal as refusal:
-            self._refused(refusal)
-            return False
-        except LinkError as error:
-            self._show(LinkTrouble(self._clock.now_s(), f"{robot} did not confirm the stop: {error}"))
-            return False
-        return True
+        with self._told():
+            try:
+                self._hear(await stop_robot(self._bus, robot, reason, user))
+            except LinkError as error:
+                raise LinkError(f"{robot} did not confirm the stop: {error}") from error
+            return True
+        return False
 
     async def _resolve(self, name: str) -> str:
         resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)
         return resolved.component.address
+
+    async def _list_of(self, subsystem: Subsystem, kind: str = "") -> list[str]:
+        """Return the addresses of these components; none if the nameserver did not answer."""
+        with self._told():
+            question = ListComponents(subsystem=str(subsystem), type=kind)
+            listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
+            return [component.address for component in listing.components]
+        return []
 
     async def _list_when_due(self) -> None:
         self._listing.set()
@@ -266,59 +225,40 @@ class ConsoleFeed:
             self.listed.set()
 
     async def _list(self) -> None:
-        try:
+        with self._told():
             listing = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            self._trouble(error)
-            return
-        for component in listing.components:
-            self._meet(component)
-        self._show(ComponentsListed(self._clock.now_s(), listing.components, listing.complete))
-        behaviors = [at for c in listing.components if (at := c.address).startswith(f"{Subsystem.MISSION_CONTROL}/")]
-        robots = [component_of(c.address) for c in listing.components if c.type == ROBOT_KIND]
-        await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
+            self._hear(listing)
+            at = [component.address for component in listing.components]
+            behaviors = [one for one in at if one.startswith(f"{Subsystem.MISSION_CONTROL}/")]
+            robots = [component_of(one.address) for one in listing.components if one.type == ROBOT_KIND]
+            await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
 
     async def _ask_schedule(self) -> None:
-        try:
-            schedule = await self._bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            self._trouble(error)
-        else:
-            self._take_schedule(schedule)
+        with self._told():
+            self._hear(await self._bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
 
     async def _ask_how_it_went(self, behavior: str) -> None:
         """Hear of what a behavior finished before this console listened."""
-        try:
+        with _quietly(behavior, "did not tell its story"):
             story = await self._bus.ask(behavior, AskStory(), Story, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            log.info("%s did not tell its story: %s", behavior, error)
-            return
-        for event in story.events:
-            if event.what.startswith("finished: "):
-                self._show(StoryHeard(self._clock.now_s(), event))
+            for event in story.events:
+                if event.what.startswith("finished: "):
+                    self._hear(event)
 
     async def _ask_log(self) -> None:
         """Hear of what happened before this console listened, or while its link was away."""
-        try:
-            known = await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S)
-            told = await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S)
-        except (Refusal, LinkError) as error:
-            log.info("the launcher did not tell what happened: %s", error)
-        else:
-            self._show(LogHeard(self._clock.now_s(), told.events, known.consoles))
+        with _quietly("the launcher", "did not tell what happened"):
+            self._hear(await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S))
+            self._hear(await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S))
 
     async def _ask_stop(self, robot: str) -> None:
-        try:
-            stop = await ask_stop(self._bus, robot)
-        except (Refusal, LinkError) as error:  # a robot of another make may know no such stop
-            log.info("%s did not say whether it is stopped: %s", robot, error)
-        else:
-            self._show(StopHeard(self._clock.now_s(), stop))
+        with _quietly(robot, "did not say whether it is stopped"):  # a robot of another make may know no such stop
+            self._hear(await ask_stop(self._bus, robot))
 
     async def _feel_link(self) -> None:
         while True:
-            await self._clock.sleep_s(LINK_EVERY_S * self._clock.rate)
             await self._measure_link()
+            await self._clock.sleep_s(LINK_EVERY_S * self._clock.rate)
 
     async def _feel_pulse(self) -> None:
         while True:
@@ -328,11 +268,12 @@ class ConsoleFeed:
     async def _measure_link(self) -> None:
         asked_s = time.perf_counter()
         try:
-            await self._bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=LINK_FRESH_S)
+            answer = await self._bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=LINK_FRESH_S)
         except LinkError as error:
             log.info("the hub did not answer: %s", error)
             self._show(LinkHeard(self._clock.now_s(), False))
         else:
+            self._hear(answer)
             self._show_link(time.perf_counter() - asked_s)
 
     def _show_link(self, latency_s: float = -1.0) -> None:
@@ -341,65 +282,43 @@ class ConsoleFeed:
 
     async def _count(self, radio: str) -> None:
         address = f"{Subsystem.RESOURCE_POOL}/{radio}"
-        try:
-            counted = await self._bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S)
-        except LinkError as error:
-            log.info("%s did not tell its counters: %s", radio, error)
-        else:
-            self._show(RadioCounted(self._clock.now_s(), radio, counted.values))
+        with _quietly(radio, "did not tell its counters"):
+            self._hear(await self._bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S), address)
+
+    def _heard(self, envelope: Envelope[Any]) -> None:
+        match envelope.body:
+            case Appeared(component=component):
+                self._hear(component)
+            case Leases():  # they count from when they were said
+                self._show(Heard(envelope.stamp_s, envelope.body))
+            case OperatorActed():
+                self._hear(envelope.body, envelope.source)
+            case _:
+                self._hear(envelope.body)
+
+    def _hear(self, said: Said, source: str = "") -> None:
+        """Take in of whom more can be heard, and show what was said."""
+        match said:
+            case ComponentState():
+                self._meet(said)
+            case Components():
+                for component in said.components:
+                    self._meet(component)
+            case Schedule():
+                self._radios = {rc.rc for rc in said.rcs if rc.sharable and rc.state != "down"}
+                self._robots |= {rc.rc for rc in said.rcs if rc.kind == ROBOT_KIND}
+        self._show(Heard(self._clock.now_s(), said, source))
 
     def _meet(self, component: ComponentState) -> None:
         """Listen to creators, which tell of their hosts and of what fell."""
         address = component.address
         if component.type == CREATOR and address not in self._hosts:
             self._hosts[address] = [
-                self._bus.subscribe(address, Conversation.TELEMETRY, HostLoad, self._heard_load, latest=True),
-                self._bus.subscribe(address, Conversation.EVENTS, ProcessFell, self._heard_fall),
+                self._bus.subscribe(address, Conversation.TELEMETRY, HostLoad, self._heard, latest=True),
+                self._bus.subscribe(address, Conversation.EVENTS, ProcessFell, self._heard),
             ]
         if component.type == ROBOT_KIND:
             self._robots.add(component_of(address))
-
-    def _take_schedule(self, schedule: Schedule) -> None:
-        self._radios = {rc.rc for rc in schedule.rcs if rc.sharable and rc.state != "down"}
-        self._robots |= {rc.rc for rc in schedule.rcs if rc.kind == ROBOT_KIND}
-        self._show(ScheduleHeard(self._clock.now_s(), schedule))
-
-    def _heard_schedule(self, envelope: Envelope[Any]) -> None:
-        self._take_schedule(envelope.body)
-
-    def _heard_leases(self, envelope: Envelope[Any]) -> None:
-        self._show(LeasesHeard(envelope.stamp_s, envelope.body))
-
-    def _heard_story(self, envelope: Envelope[Any]) -> None:
-        self._show(StoryHeard(self._clock.now_s(), envelope.body))
-
-    def _heard_act(self, envelope: Envelope[Any]) -> None:
-        self._show(ActHeard(self._clock.now_s(), envelope.body, envelope.source))
-
-    def _heard_status(self, envelope: Envelope[Any]) -> None:
-        self._meet(envelope.body)
-        self._show(ComponentHeard(self._clock.now_s(), envelope.body))
-
-    def _heard_life(self, envelope: Envelope[Any]) -> None:
-        match envelope.body:
-            case Appeared(component=component):
-                self._meet(component)
-                self._show(ComponentHeard(self._clock.now_s(), component))
-            case Disappeared(address=address):
-                self._show(ComponentGone(self._clock.now_s(), address))
-
-    def _heard_load(self, envelope: Envelope[Any]) -> None:
-        self._show(LoadHeard(self._clock.now_s(), envelope.body))
-
-    def _heard_fall(self, envelope: Envelope[Any]) -> None:
-        self._show(ProcessFallen(self._clock.now_s(), envelope.body))
-
-    def _heard_health(self, envelope: Envelope[Any]) -> None:
-        self._show_health(envelope.body)
-
-    def _show_health(self, health: MissionHealth | None) -> None:
-        now_s = self._clock.now_s()
-        self._show(HealthHeard(now_s, health, now_s + SILENT_AFTER_S * self._clock.rate))
 
     def _heard_link(self, is_up: bool) -> None:
         came_back, self._is_up = is_up and not self._is_up, is_up
@@ -407,8 +326,30 @@ class ConsoleFeed:
         if came_back:
             self._listing.set()
 
-    def _refused(self, refusal: Refusal) -> None:
-        self._show(CommandRefused(self._clock.now_s(), refusal.code, refusal.detail, refusal.remedy))
 
-    def _trouble(self, error: LinkError) -> None:
-        self._show(LinkTrouble(self._clock.now_s(), str(error)))
+class _Answered:
+    """Ends what stands in it at a refusal or a silence.
+
+    Args:
+        failed: Called with that.
+    """
+
+    def __init__(self, failed: Callable[[Refusal | LinkError], None]) -> None:
+        self._failed = failed
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, error: BaseException | None, _at: TracebackType | None
+    ) -> bool:
+        """Swallow what ``failed`` was called with, and nothing else."""
+        if isinstance(error, Refusal | LinkError):
+            self._failed(error)
+            return True
+        return False
+
+
+def _quietly(name: str, what: str) -> _Answered:
+    """Log a refusal or a silence, which ends what stands in here, and go on without the answer."""
+    return _Answered(lambda error: log.info("%s %s: %s", name, what, error))

@@ -7,9 +7,8 @@ is; a word that is too old counts no longer: then the mission is at best degrade
 from __future__ import annotations
 
 from backbone.component.messages import Absence
-from backbone.health import Health, HealthWord
+from backbone.health import SILENT_AFTER_S, Health, HealthWord, MissionHealth
 from ui_console.alarms import AlarmBook
-from ui_console.console_events import HealthHeard
 from ui_console.views import AlarmKind, HealthView, Severity
 
 LAUNCHER_NAME = "launcher"
@@ -25,44 +24,39 @@ class HealthBoard:
 
     def __init__(self, alarms: AlarmBook) -> None:
         self._alarms = alarms
-        self._heard: HealthHeard | None = None
+        self.rate = 1.0
+        """Mission seconds per second of the machine."""
+        self._said: MissionHealth | None = None
+        self._said_s: float | None = None  # or since when it is waited for
         self._absent: frozenset[str] = frozenset()
 
-    def take(self, heard: HealthHeard) -> None:
-        """Take the launcher's word in, or that it is listened to from now on."""
-        if heard.health is None and self._heard is not None:
-            return
-        self._heard = heard
-        self._tell(list(heard.health.absent) if heard.health is not None else [], heard.at_s)
+    def take(self, said: MissionHealth, at_s: float) -> None:
+        """Take the launcher's word in."""
+        self._said, self._said_s = said, at_s
+        self._tell(said.absent, at_s)
 
     def look(self, now_s: float) -> None:
-        """Find out whether the launcher is silent."""
+        """Find out whether the launcher is silent; its first word is waited for from the first look on."""
+        if self._said_s is None:
+            self._said_s = now_s
         silence = self._silence(now_s)
         if silence is not None and LAUNCHER_NAME not in self._absent:
-            said = self._heard.health if self._heard is not None else None
-            self._tell([*(said.absent if said is not None else []), silence], now_s)
+            self._tell([*(self._said.absent if self._said is not None else []), silence], now_s)
 
     def view(self, now_s: float) -> HealthView | None:
         """Return the word and one line for each absence; None: the launcher had no time yet to say anything."""
-        heard = self._heard
-        if heard is None:
-            return None
-        said = heard.health
-        silence = self._silence(now_s)
-        if silence is not None:
-            word = HealthWord.FAILED if said is not None and said.word is HealthWord.FAILED else HealthWord.DEGRADED
-            lines = [f"the launcher is silent for {max(0.0, now_s - silence.since_s):.0f} s: what is shown may be old"]
-            lines += Health(word, tuple(said.absent)).lines(now_s) if said is not None else []
-            return HealthView(str(word), lines)
-        if said is None:
-            return None
-        return HealthView(str(said.word), Health(said.word, tuple(said.absent)).lines(now_s))
+        said, silence = self._said, self._silence(now_s)
+        lines = Health(said.word, tuple(said.absent)).lines(now_s) if said is not None else []
+        if silence is None:
+            return HealthView(str(said.word), lines) if said is not None else None
+        word = HealthWord.FAILED if said is not None and said.word is HealthWord.FAILED else HealthWord.DEGRADED
+        silent_s = max(0.0, now_s - silence.since_s)
+        return HealthView(str(word), [f"the launcher is silent for {silent_s:.0f} s: what is shown may be old", *lines])
 
     def _silence(self, now_s: float) -> Absence | None:
-        heard = self._heard
-        if heard is None or now_s <= heard.until_s:
+        if self._said_s is None or now_s <= self._said_s + SILENT_AFTER_S * self.rate:
             return None
-        return Absence(LAUNCHER_NAME, heard.at_s, "it is silent", "", REMEDY, vital=True)
+        return Absence(LAUNCHER_NAME, self._said_s, "it is silent", "", REMEDY, vital=True)
 
     def _tell(self, absent: list[Absence], at_s: float) -> None:
         """Begin an alarm for each absence, and end those of what is back."""

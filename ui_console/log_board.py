@@ -13,7 +13,6 @@ from itertools import islice
 from backbone.component.messages import StoryEvent
 from backbone.mission_log import AskLog, chosen
 from backbone.people import People
-from ui_console.views import LogRow
 
 LOG_KEPT = 500  # chosen: some minutes of a busy mission; the launcher keeps more
 
@@ -39,7 +38,7 @@ class LogBoard:
         own = [event for event in self._events if (event.at_s, event.where) not in told]
         self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=LOG_KEPT)
 
-    def rows(self, count: int, asked: AskLog | None, found: Sequence[StoryEvent] = ()) -> list[LogRow]:
+    def rows(self, count: int, asked: AskLog | None, found: Sequence[StoryEvent] = ()) -> list[StoryEvent]:
         """Return the newest, oldest first.
 
         Args:
@@ -49,14 +48,10 @@ class LogBoard:
         """
         if asked is None:
             newest = list(islice(reversed(self._events), count))
-            return [_row(self._people.named_event(event)) for event in reversed(newest)]
+            return [self._people.named_event(event) for event in reversed(newest)]
         known = found[-count:] if count else []
         told = {(event.at_s, event.where) for event in known}
         since_s = known[-1].at_s if known else 0.0
         heard = chosen(map(self._people.named_event, self._events), asked)
         news = [event for event in heard if event.at_s >= since_s and (event.at_s, event.where) not in told]
-        return [_row(event) for event in [*known, *news][-count:]] if count else []
-
-
-def _row(event: StoryEvent) -> LogRow:
-    return LogRow(event.at_s, event.subject, event.what, event.where, str(event.level), event.user)
+        return [*known, *news][-count:] if count else []

@@ -15,11 +15,12 @@ from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
+from backbone.scheduling.views import Schedule
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message
 from ui_console.consent import Consent, Topic, require_console
 from ui_console.consent_answers import ConsentAnswers
-from ui_console.console_events import ConsoleEvent, LinkHeard, ScheduleHeard
+from ui_console.console_events import ConsoleEvent, Heard, LinkHeard
 from ui_console.feed import ConsoleFeed, FeedEvent
 from ui_console.lift_talk import LiftTalk
 from ui_console.lifting import AskLift
@@ -185,7 +186,7 @@ class Observer(Component[P], Generic[P]):
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)
         match event:
-            case ScheduleHeard():
+            case Heard(body=Schedule()):
                 self.schedule_heard()
             case LinkHeard(is_up=False):
                 self.link_lost()

@@ -9,18 +9,18 @@ from collections.abc import Callable
 
 from backbone.errors import Refusal, code_of
 from backbone.rc_manager.messages import StaleEpoch
-from resource_pool.arc_client import SwappedOut
+from resource_pool.arc_client import StopState, SwappedOut
 from ui_console.console_events import (
     Asked,
     CommandApplied,
     CommandRefused,
     ConsoleEvent,
     Granted,
+    Heard,
     LinkTrouble,
     Lost,
     MomentBegan,
     PictureSeen,
-    StopHeard,
     event_json,
 )
 from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
@@ -62,8 +62,9 @@ class ScriptDriver:
             return
         if isinstance(event, Lost) and event.reason in UNDECIDED:
             self._player.require_let_go()
-        if isinstance(event, StopHeard) and (event.stop.is_stopped or self._stopped):
-            self._stopped = event.stop.is_stopped
+        stop = event.body if isinstance(event, Heard) else None
+        if isinstance(stop, StopState) and (stop.is_stopped or self._stopped):
+            self._stopped = stop.is_stopped
             self._player.require_let_go()
         if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True

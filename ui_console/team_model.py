@@ -13,37 +13,32 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import assert_never
 
-import msgspec
+from msgspec.structs import replace
 
-from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
+from backbone.component.messages import (
+    ComponentState,
+    LifeState,
+    LogLevel,
+    MissionTime,
+    Parameters,
+    SetParameter,
+    Statistics,
+    StoryEvent,
+)
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.mission_log import AskLog
+from backbone.health import MissionHealth
+from backbone.mission_log import AskLog, Log, PeopleKnown
+from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
+from backbone.operators import OperatorActed
 from backbone.people import People, is_console, screens_of
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
-from backbone.scheduling.views import RcView, RequestView, Schedule
+from backbone.scheduling.views import RcView, RequestView, Schedule, Why
 from backbone.spoken import counted, value_text
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.alarms import AlarmBook, one_line_for_one_cause
-from ui_console.console_events import (
-    ActHeard,
-    ComponentGone,
-    ComponentHeard,
-    ComponentsListed,
-    HealthHeard,
-    LeasesHeard,
-    LinkHeard,
-    LoadHeard,
-    LogHeard,
-    ParametersHeard,
-    ProcessFallen,
-    RadioCounted,
-    ScheduleHeard,
-    StopHeard,
-    StoryHeard,
-    TeamEvent,
-)
+from ui_console.console_events import LinkHeard, Said, TeamEvent
 from ui_console.health_board import HealthBoard
 from ui_console.lifting import author_name, authors, is_own, lift_line
 from ui_console.log_board import LOG_KEPT, LogBoard
@@ -54,19 +49,15 @@ from ui_console.views import (
     NONE_S,
     AlarmKind,
     AlarmView,
-    ComponentRow,
     HealthView,
     HostView,
     LinkView,
-    LogRow,
     NodeView,
     ParameterView,
-    RequestRow,
     RobotView,
     Severity,
     StopView,
     TimelineView,
-    WaitingView,
 )
 
 ROBOT_KIND = "scout"
@@ -117,47 +108,59 @@ class TeamModel:
     # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
         """Take the event in."""
-        match event:
-            case ScheduleHeard(schedule=schedule):
-                self._take_schedule(schedule)
-            case LeasesHeard(at_s=at_s, leases=leases):
-                self._take_leases(leases, at_s)
-            case StoryHeard(story=story):
-                self._take_story(story)
-            case LogHeard(events=events, consoles=consoles):
-                self.people.remember(consoles)
-                self._log.recall(events)
-            case ActHeard(act=act, where=where):
-                self._log.add(act.event(where))
-            case ComponentHeard(at_s=at_s, component=component):
-                self._take_component(component, at_s)
-            case ComponentsListed(at_s=at_s, components=components, is_complete=is_complete):
-                self._take_list({component.address: component for component in components}, at_s, is_complete)
-            case ComponentGone(at_s=at_s, address=address):
-                self._gone(address, at_s)
-            case ProcessFallen(at_s=at_s, fell=fell):
-                self._take_fall(fell, at_s)
-            case LoadHeard(at_s=at_s, load=load):
-                self._take_load(load, at_s)
-            case StopHeard(at_s=at_s, stop=stop):
-                self._take_stop(stop, at_s)
-            case RadioCounted(at_s=at_s, radio=radio, values=values):
-                self._take_counts(radio, values, at_s)
-            case LinkHeard():
-                self._take_link(event)
-            case HealthHeard():
-                self._health.take(event)
-            case ParametersHeard():
-                self._take_parameters(event)
+        if isinstance(event, LinkHeard):
+            self._take_link(event)
+        else:
+            self._take(event.body, event.at_s, event.source)
+
+    def _take(self, said: Said, at_s: float, source: str) -> None:
+        match said:
+            case Schedule():
+                self._take_schedule(said)
+            case Leases():
+                self._take_leases(said, at_s)
+            case StoryEvent():
+                self._log.add(said)
+                self._tree.told(said)
+            case Log():
+                self._log.recall(said.events)
+            case PeopleKnown():
+                self.people.remember(said.consoles)
+            case OperatorActed():
+                self._log.add(said.event(source))
+            case ComponentState():
+                self._take_component(said, at_s)
+            case Components():
+                self._take_list(said, at_s)
+            case Disappeared():
+                self._gone(said.address, at_s)
+            case ProcessFell():
+                self._take_fall(said, at_s)
+            case HostLoad():
+                self._take_load(said, at_s)
+            case StopState():
+                self._take_stop(said, at_s)
+            case Statistics():
+                self._take_counts(component_of(source), said.values, at_s)
+            case MissionTime():
+                self._health.rate = said.rate
+            case MissionHealth():
+                self._health.take(said, at_s)
+            case Parameters():
+                self._take_parameters(said, source, at_s)
+            case SetParameter():
+                self._take_change(said, source, at_s)
+            case Why():
+                """Of one console, which keeps it."""
             case _:
-                assert_never(event)
+                assert_never(said)
 
     def look(self, now_s: float) -> None:
         """Find out what only time can tell."""
         self.alarms.look(now_s)
         self._health.look(now_s)
         owners = {request.arc: request.owner for request in self.schedule.requests} if self.schedule else {}
-        self._so(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
+        self.alarms.hold(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
             is_wanted = bool(request.blockers) and all(is_console(owners.get(arc, "")) for arc in request.blockers)
@@ -165,7 +168,7 @@ class TeamModel:
             starves = is_endless and not is_wanted and waits_s >= STARVING_S
             who = self.person(request.owner)
             line = f"{who} waits for {waits_s:.0f} s and no end is in sight: {because(request, self.people)}"
-            self._so(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
+            self.alarms.hold(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
 
     # ------------------------------------------------------------------ views out
     def robots(self, now_s: float) -> list[RobotView]:
@@ -234,8 +237,8 @@ class TeamModel:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
         return self._tree.views(self._components.values(), self._lost, self.schedule)
 
-    def requests(self) -> list[RequestRow]:
-        """Return the requests, running ones first, then by predicted start."""
+    def requests(self) -> list[RequestView]:
+        """Return the requests by the names of people, running ones first, then by predicted start."""
         rows = [self._request_row(request) for request in (self.schedule.requests if self.schedule else [])]
         return sorted(rows, key=_request_order)
 
@@ -249,10 +252,7 @@ class TeamModel:
 
     def hosts(self, now_s: float) -> list[HostView]:
         """Return the machines, sorted by name."""
-        return [
-            HostView(host, load.cpu, load.memory, load.cores, load.components, max(0.0, now_s - at_s))
-            for host, (at_s, load) in sorted(self._hosts.items())
-        ]
+        return [HostView(load, max(0.0, now_s - at_s)) for _, (at_s, load) in sorted(self._hosts.items())]
 
     def links(self, now_s: float) -> list[LinkView]:
         """Return the link to the hub, the RC manager's renewals, and the radios."""
@@ -269,15 +269,18 @@ class TeamModel:
         """Return the parameters of the components that were asked for theirs, by component and name."""
         return [view for _, view in sorted(self._parameters.items())]
 
-    def components(self) -> list[ComponentRow]:
-        """Return the components that are there, by address."""
-        return [self._component_row(component) for _, component in sorted(self._components.items())]
+    def components(self) -> list[ComponentState]:
+        """Return the components that are there, by address, doing what they do by the names of people."""
+        there = (component for _, component in sorted(self._components.items()))
+        return [replace(component, feedback=self.people.doing(component)) for component in there]
 
     def component(self, name: str) -> ComponentState | None:
         """Return the component of this name, if it is there."""
         return next((c for at, c in self._components.items() if component_of(at) == name), None)
 
-    def log(self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()) -> list[LogRow]:
+    def log(
+        self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()
+    ) -> list[StoryEvent]:
         """Return the newest that happened, oldest first.
 
         Args:
@@ -304,7 +307,7 @@ class TeamModel:
             self.alarms.end(AlarmKind.STARVING, arc, schedule.at_s)
         for rc in schedule.rcs:
             is_down = rc.state == "down" and rc.rc not in self._left  # who was told to end is not missed
-            self._so(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
+            self.alarms.hold(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
         self._renewed = {
             (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
             for rc in schedule.rcs
@@ -321,12 +324,7 @@ class TeamModel:
 
     def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
         component = self._components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
-        starts_s = dict(zip(rc.next, rc.next_s, strict=False))
-        waiting = [
-            WaitingView(self.person(requests[arc].owner), arc, starts_s.get(arc, NONE_S))
-            for arc in rc.next
-            if arc in requests
-        ]
+        waiting = [self.person(requests[arc].owner) for arc in rc.next if arc in requests]
         free = RobotView(
             robot=rc.rc,
             number=number,
@@ -354,7 +352,7 @@ class TeamModel:
         renewed_s = self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
         lease_s = self._leases.lease_s if self._leases is not None else holder.lease_until_s - renewed_s
         age_s = max(0.0, now_s - renewed_s)
-        return msgspec.structs.replace(
+        return replace(
             free,
             holder=self.person(request.owner if request else holder.arc),
             arc=holder.arc,
@@ -368,21 +366,14 @@ class TeamModel:
             because=because(request, self.people) if request else "",
         )
 
-    def _request_row(self, request: RequestView) -> RequestRow:
+    def _request_row(self, request: RequestView) -> RequestView:
         named = self.people.named
-        return RequestRow(
-            request.arc,
-            self.person(request.owner),
-            is_console(request.owner),
-            str(request.state),
-            request.rcs,
-            named(request.priority),
-            request.since_s,
-            request.until_s,
-            request.expected_start_s,
-            because(request, self.people),
-            named(request.would_change),
-            request.blockers,
+        return replace(
+            request,
+            owner=self.person(request.owner),
+            priority=named(request.priority),
+            because=because(request, self.people),
+            would_change=named(request.would_change),
         )
 
     # ------------------------------------------------------------------ components
@@ -411,15 +402,17 @@ class TeamModel:
         self._lost.pop(component.address, None)
         self.alarms.end(AlarmKind.LOST, name, at_s)
         is_rc = _is_in(Subsystem.RESOURCE_POOL, component.address)
-        self._so("not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s)
+        self.alarms.hold(
+            "not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s
+        )
         has_no_trace = "the trace of the schedule stopped" in component.feedback
-        self._so(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
+        self.alarms.hold(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
 
-    def _take_list(self, listed: Mapping[str, ComponentState], at_s: float, is_complete: bool) -> None:
-        for component in listed.values():
+    def _take_list(self, listed: Components, at_s: float) -> None:
+        for component in listed.components:
             self._take_component(component, at_s)
-        if is_complete:
-            for address in self._components.keys() - listed.keys():
+        if listed.complete:  # else absence proves nothing
+            for address in self._components.keys() - {component.address for component in listed.components}:
                 self._gone(address, at_s)
 
     def _gone(self, address: str, at_s: float) -> None:
@@ -456,20 +449,7 @@ class TeamModel:
     def _take_load(self, load: HostLoad, at_s: float) -> None:
         self._hosts[load.host] = (at_s, load)
         line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
-        self._so(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
-
-    def _component_row(self, component: ComponentState) -> ComponentRow:
-        return ComponentRow(
-            component_of(component.address),
-            component.address,
-            component.address.partition("/")[0],
-            component.type,
-            component.host,
-            component.pid,
-            str(component.state),
-            component.since_s,
-            self.people.doing(component),
-        )
+        self.alarms.hold(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
 
     # ------------------------------------------------------------------ what alarms are about
     def _explained_by(self, subject: str) -> frozenset[str]:
@@ -483,7 +463,7 @@ class TeamModel:
         elif alarm.subject in self._hosts:
             where = "machine of the mission"
         robots = self.robot_names()
-        return msgspec.structs.replace(
+        return replace(
             alarm,
             line=named(alarm.line),
             also=[named(line) for line in alarm.also],
@@ -513,11 +493,7 @@ class TeamModel:
             self._link = dataclasses.replace(link, latency_s=latency_s)
         else:
             self._link = link
-        self._so(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
-
-    def _take_story(self, story: StoryEvent) -> None:
-        self._log.add(story)
-        self._tree.told(story)
+        self.alarms.hold(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
 
     def _take_stop(self, stop: StopState, at_s: float) -> None:
         former = self._stops.get(stop.rc)
@@ -547,26 +523,21 @@ class TeamModel:
                 remedy = "Claim with a longer period, or use another radio."
                 self.alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
 
-    def _take_parameters(self, event: ParametersHeard) -> None:
-        name = component_of(event.address)
-        for parameter, value in event.values.items():
-            key = (name, parameter)
-            shown = value_text(value)
-            former = self._parameters.get(key)
-            if parameter == event.changed:
-                before = former.value if former is not None else ""
-                self._parameters[key] = ParameterView(
-                    name, event.address, parameter, shown, before, event.user, event.at_s
-                )
-            elif former is None or former.value != shown:
-                self._parameters[key] = ParameterView(name, event.address, parameter, shown)
+    def _take_change(self, change: SetParameter, address: str, at_s: float) -> None:
+        """Note who changed a parameter; its new value comes right after, at the same time."""
+        key = (component_of(address), change.name)
+        before = self._parameters[key].value if key in self._parameters else ""
+        self._parameters[key] = ParameterView(key[0], address, change.name, "", before, change.user, at_s)
 
-    def _so(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
-        """Begin or end an alarm of a condition."""
-        if is_so:
-            self.alarms.begin(kind, subject, line, at_s, remedy)
-        else:
-            self.alarms.end(kind, subject, at_s)
+    def _take_parameters(self, now: Parameters, address: str, at_s: float) -> None:
+        name = component_of(address)
+        for parameter, value in now.values.items():
+            key, shown = (name, parameter), value_text(value)
+            former = self._parameters.get(key)
+            if former is not None and former.changed_s == at_s:
+                self._parameters[key] = replace(former, value=shown)
+            elif former is None or former.value != shown:
+                self._parameters[key] = ParameterView(name, address, parameter, shown)
 
 
 def _is_older(one: ComponentState, other: ComponentState) -> bool:
@@ -581,5 +552,5 @@ def _is_in(subsystem: Subsystem, address: str) -> bool:
     return address.startswith(f"{subsystem}/")
 
 
-def _request_order(row: RequestRow) -> tuple[bool, bool, float, str]:
+def _request_order(row: RequestView) -> tuple[bool, bool, float, str]:
     return row.state != RequestState.RUNNING, row.expected_start_s < 0, row.expected_start_s, row.arc

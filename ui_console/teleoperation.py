@@ -47,10 +47,9 @@ from ui_console.console_events import (
     ConsoleEvent,
     GivenBack,
     Granted,
+    Heard,
     Lost,
     PictureSeen,
-    StopHeard,
-    WhyHeard,
 )
 from ui_console.controls import Controls
 from ui_console.driving import Command, Drive, Halt, Jump
@@ -420,7 +419,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._arc is not None and self._arc.heard_stop(state):
             self.require_let_go()
         if not self._watches and state.number > 0:  # 0: it never was stopped
-            self.show(StopHeard(self.clock.now_s(), state))
+            self.show(Heard(self.clock.now_s(), state))
 
     def _claim_parameters(self) -> dict[str, Any]:
         wished = self.parameters
@@ -466,7 +465,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             log.info("why: %s", error)
         else:
             if not self.is_held:
-                self.show(WhyHeard(self.clock.now_s(), why))
+                self.show(Heard(self.clock.now_s(), why))
                 await self._settle_with_other_screens()
         finally:
             self._asking_why = None

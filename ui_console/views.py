@@ -1,14 +1,20 @@
-"""What screens show, as plain values: one struct for each kind of row, JSON-able as it is.
+"""What screens show, as plain values: messages by the names of people, and a struct for each other kind of row.
 
 Times ending in ``_s`` are mission seconds; ages, and what is left, are seconds counted from the view's ``now_s``. A
-negative time, age or rest means that there is none. ``view_json`` turns any of them into bytes for a browser.
+negative time, age or rest means that there is none.
 """
 
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import Any
 
 import msgspec
+
+from backbone.component.messages import ComponentState, StoryEvent
+from backbone.creator.messages import HostLoad
+from backbone.scheduling.views import RequestView
+from backbone.wire import plain
 
 NONE_S = -1.0
 """In place of a time, an age or a rest: there is none."""
@@ -40,20 +46,6 @@ class AlarmKind(StrEnum):
     NO_ANSWER = "no_answer"  # somebody did not answer this console
     NOT_RECORDED = "not_recorded"  # the trace of the schedule cannot be written any more
     VISITOR = "visitor"  # somebody who was not let in, or misbehaves, at the web console
-
-
-class WaitingView(msgspec.Struct, frozen=True):
-    """Somebody who wants a resource.
-
-    Attributes:
-        who: Decision process.
-        arc: Its ARC.
-        start_s: Predicted grant.
-    """
-
-    who: str
-    arc: str
-    start_s: float
 
 
 class StopView(msgspec.Struct, frozen=True):
@@ -140,7 +132,7 @@ class RobotView(msgspec.Struct, frozen=True):
     lease_left_s: float
     lease_age_s: float
     because: str
-    waiting: list[WaitingView]
+    waiting: list[str]
     stop: StopView | None
     video: VideoView | None
     feedback: str
@@ -184,38 +176,6 @@ class NodeView(msgspec.Struct, frozen=True):
     feedback: str
     arc: str
     because: str
-
-
-class RequestRow(msgspec.Struct, frozen=True):
-    """One request in the schedule, running ones first.
-
-    Attributes:
-        arc: The ARC.
-        who: Its decision process.
-        is_console: True if that is a console.
-        state: ``running``, ``waiting``, ``idle``, ``connecting`` or ``revoking``.
-        rcs: Its RCs.
-        priority: Its priority path.
-        since_s: Since when it is in that state.
-        until_s: End of its slice.
-        expected_start_s: Predicted grant.
-        because: Why.
-        would_change: What would end this.
-        blockers: ARCs directly in its way.
-    """
-
-    arc: str
-    who: str
-    is_console: bool
-    state: str
-    rcs: list[str]
-    priority: str
-    since_s: float
-    until_s: float
-    expected_start_s: float
-    because: str
-    would_change: str
-    blockers: list[str]
 
 
 class Certainty(StrEnum):
@@ -307,22 +267,9 @@ class AlarmView(msgspec.Struct, frozen=True):
 
 
 class HostView(msgspec.Struct, frozen=True):
-    """One machine of the mission.
+    """One machine of the mission: what its creator said, so many seconds ago."""
 
-    Attributes:
-        host: Its name.
-        cpu: Busy share of its cores, 0 to 1.
-        memory: Used share, 0 to 1.
-        cores: How many.
-        components: How many run there.
-        age_s: Since it told so.
-    """
-
-    host: str
-    cpu: float
-    memory: float
-    cores: int
-    components: int
+    load: HostLoad
     age_s: float
 
 
@@ -362,40 +309,6 @@ class ParameterView(msgspec.Struct, frozen=True):
     before: str = ""
     changed_by: str = ""
     changed_s: float = NONE_S
-
-
-class ComponentRow(msgspec.Struct, frozen=True):
-    """One component."""
-
-    name: str
-    address: str
-    subsystem: str
-    type: str
-    host: str
-    pid: int
-    state: str
-    since_s: float
-    feedback: str
-
-
-class LogRow(msgspec.Struct, frozen=True):
-    """One thing that happened.
-
-    Attributes:
-        at_s: When.
-        subject: The name it is about.
-        what: Past tense, one line.
-        where: Address of the component that told it.
-        level: How much it matters: ``alarm``, ``warning``, ``notice``, ``info``.
-        person: Who did it; empty: nobody in person.
-    """
-
-    at_s: float
-    subject: str
-    what: str
-    where: str
-    level: str = "info"
-    person: str = ""
 
 
 class ConsentView(msgspec.Struct, frozen=True):
@@ -502,21 +415,18 @@ class ConsoleView(msgspec.Struct, frozen=True):
     own: OwnView
     robots: list[RobotView]
     tree: list[NodeView]
-    requests: list[RequestRow]
+    requests: list[RequestView]
     timeline: TimelineView
     alarms: list[AlarmView]
     hosts: list[HostView]
     links: list[LinkView]
     videos: list[VideoView]
     parameters: list[ParameterView]
-    components: list[ComponentRow]
-    log: list[LogRow]
+    components: list[ComponentState]
+    log: list[StoryEvent]
     health: HealthView | None = None
 
 
-_encoder = msgspec.json.Encoder()
-
-
-def view_json(view: msgspec.Struct) -> bytes:
-    """Return any view as JSON, fields by their names."""
-    return _encoder.encode(view)
+def view_json(view: Any) -> bytes:
+    """Return any view as JSON, messages in it too with their fields by name."""
+    return msgspec.json.encode(plain(view))

@@ -15,10 +15,15 @@ from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name, offer_name
 from backbone.mission.behavior_checks import check_behaviors
 from backbone.mission.class_facts import ClassFacts, shipped_classes
-from backbone.mission.class_paths import CLASS_PATH, class_path_fault
+from backbone.mission.class_paths import CLASS_PATH
 from backbone.mission.declaration.elements import is_loopback
 from backbone.mission.document import Element
-from backbone.mission.parameter_checks import check_class_parameters, check_service_parameters, check_type_class
+from backbone.mission.parameter_checks import (
+    check_class_parameters,
+    check_class_path,
+    check_service_parameters,
+    check_type_class,
+)
 from backbone.mission.process_checks import check_processes
 from backbone.mission.report import Place, Report, listed, quoted
 from backbone.mission.tables import (
@@ -144,8 +149,9 @@ def _check_types(tables: Tables, report: Report) -> None:
         _check_needs(component_type, tables, report)
         _check_type_tags(component_type, tables, report)
         class_path = component_type.text("class")
-        if only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path):
-            _check_class(component_type, class_path, tables.classes.get(class_path), report)
+        is_own = only_here and class_path not in shipped_classes() and CLASS_PATH.fullmatch(class_path)
+        if is_own and check_class_path(component_type, "class", report):
+            check_type_class(component_type, tables.classes.get(class_path), report)
 
 
 def _check_core_type(component_type: Element, report: Report) -> None:
@@ -210,20 +216,6 @@ def _check_type_tags(component_type: Element, tables: Tables, report: Report) ->
             f"no host can run type {component_type.text('name')}: {reasons}",
             "Give a host these tags, or remove them here",
         )
-
-
-def _check_class(component_type: Element, class_path: str, facts: ClassFacts | None, report: Report) -> None:
-    wrong = class_path_fault(class_path)
-    if wrong is None:
-        check_type_class(component_type, facts, report)
-        return
-    message, there = wrong
-    name = message.rpartition(" ")[2] if message.startswith("no module") else class_path.rpartition(":")[2]
-    report.fault(
-        component_type.place_of("class"),
-        f"{class_path}: {message}{report.hint(name.rpartition('.')[2], there)}",
-        "Write the class as package.module:Class, importable on this machine",
-    )
 
 
 # ---------------------------------------------------------------------- resources

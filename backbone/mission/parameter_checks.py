@@ -10,6 +10,7 @@ import re
 from collections.abc import Collection, Sequence
 
 from backbone.mission.class_facts import ClassFacts, ParameterFacts, Question, parameters_of
+from backbone.mission.class_paths import CLASS_PATH, class_path_fault
 from backbone.mission.document import Element
 from backbone.mission.report import Report, listed, quoted
 from backbone.mission.tables import (
@@ -24,6 +25,7 @@ from backbone.mission.tables import (
 from backbone.scheduling.rules import SchedulingRules
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")  # other names are the schema's to refuse
+PLANNER = "planner"
 SERVICE_PARAMETERS = {"rc_manager": parameters_of(SchedulingRules)}
 """Core service → what the file may set of its parameters."""
 
@@ -36,6 +38,9 @@ def check_service_parameters(service: Element, report: Report) -> None:
     check_unique(service.all("parameter"), "name", "parameter", report)
     known = SERVICE_PARAMETERS.get(kind, ())
     _check_given(service, kind, known, (), report, "Remove it; only the rc_manager's rules can be set")
+    for parameter in service.all("parameter"):
+        if parameter.text("name") == PLANNER and CLASS_PATH.fullmatch(parameter.text("value")):
+            check_class_path(parameter, "value", report)
 
 
 def check_class_parameters(element: Element, reserved: Collection[str], tables: Tables, report: Report) -> None:
@@ -98,6 +103,22 @@ def report_refusal(element: Element, refusal: str, tables: Tables, report: Repor
         f"{element.text('type')} {element.text('name')} refuses its parameters: {refusal}",
         f"{name}: {meanings[name]}" if name in meanings else "Write what its class can start with",
     )
+
+
+def check_class_path(element: Element, attribute: str, report: Report) -> bool:
+    """Return whether the class path in this attribute leads to a class on this machine; report it if not."""
+    class_path = element.text(attribute)
+    wrong = class_path_fault(class_path)
+    if wrong is None:
+        return True
+    message, there = wrong
+    name = message.rpartition(" ")[2] if message.startswith("no module") else class_path.rpartition(":")[2]
+    report.fault(
+        element.place_of(attribute),
+        f"{class_path}: {message}{report.hint(name.rpartition('.')[2], there)}",
+        "Write the class as package.module:Class, importable on this machine",
+    )
+    return False
 
 
 def check_type_class(component_type: Element, facts: ClassFacts | None, report: Report) -> None:

@@ -85,6 +85,7 @@ from backbone.scheduling.events import (
     Wanted,
     Woken,
 )
+from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
@@ -128,6 +129,7 @@ class RcManager(Component[RcManagerParameters]):
             mission=given.mission,
             mission_priority=given.mission_priority,
             goes_on=bool(given.trace) and _has_lines(Path(given.trace)),
+            planner=load_planner(given.planner),
         )
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}

@@ -65,7 +65,6 @@ class LargeGroupPlanner:
     def due(self, now_s: float) -> Turn | None:
         """Return a candidate whose time is now; the others are candidates no more."""
         table = self._table
-        self._reserved.clear()  # nothing changes while they are looked at
         while self._candidates:
             arc, _ = self._candidates.popitem()
             holders = self._state.holders(arc)
@@ -84,18 +83,20 @@ class LargeGroupPlanner:
 
     def _takes_from_others(self, arc: ArcEntry, now_s: float) -> bool:
         """Say whether, if it started now, it would take time from a higher one or from the first in line at an RC."""
-        end_s = self._must_be_done_s(arc, now_s)
-        crowd = [holder for holder in self._crowd(arc) if self._table.fits(arc, [holder])]
+        table, end_s = self._table, self._must_be_done_s(arc, now_s)
+        self._reserved.clear()  # what it held was worked out for another one that asked
+        crowd = [holder for holder in self._crowd(arc) if table.fits(arc, [holder])]
 
         def from_one(other: ArcEntry) -> bool:
-            competes = other is not arc and not self._table.fits(arc, [other, *crowd]) and self._table.usable(other)
+            competes = other is not arc and not table.fits(arc, [other, *crowd]) and table.usable(other)
             return competes and self._reserved_s(other, now_s, (arc,)) < end_s
 
-        firsts = [first for first in dict.fromkeys(self._first_at(rc) for rc in arc.uses) if first is not None]
-        firsts.sort(key=self._reserved.__contains__, reverse=True)  # one that is known may tell enough
-        if any(from_one(first) for first in firsts):
-            return True
-        return any(from_one(one) for one in self._state.beside(arc) if one.goes_before(arc) and one.queued)
+        higher_ones = [one for one in self._state.beside(arc) if one.goes_before(arc) and one.queued]
+        at = {rc: self._first_at(rc) for rc in arc.uses}
+        # Equality is not transitive: two ARCs can each be first where both want to be. A lower one then waits.
+        ahead = set() if any(map(table.usable, higher_ones)) else {rc for rc, first in at.items() if first is arc}
+        firsts = [first for first in dict.fromkeys(at.values()) if first and ahead.isdisjoint(first.uses)]
+        return any(from_one(other) for other in dict.fromkeys((*firsts, *higher_ones)))
 
     def _must_be_done_s(self, arc: ArcEntry, start_s: float) -> float:
         """Return from when on others may need the RCs of an ARC that starts then: hand-overs may eat the slack."""

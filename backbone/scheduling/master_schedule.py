@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from backbone.scheduling.entries import ArcEntry
 from backbone.scheduling.large_group import LargeGroupPlanner
+from backbone.scheduling.own_planner import PlannerType
 from backbone.scheduling.planner import Planner, Slot, Turn
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.table import Table
@@ -27,7 +28,15 @@ class MasterSchedule:
         whole: Plans groups whole; also groups that are only supposed.
     """
 
-    def __init__(self, state: ScheduleState, *, strict: bool, tolerance_s: float, exact_up_to: int) -> None:
+    def __init__(
+        self,
+        state: ScheduleState,
+        *,
+        strict: bool,
+        tolerance_s: float,
+        exact_up_to: int,
+        planner: PlannerType | None = None,
+    ) -> None:
         """Plan for this state.
 
         Args:
@@ -35,16 +44,20 @@ class MasterSchedule:
             strict: No ARC starts while a higher usable one of its group waits.
             tolerance_s: By how much two reservations may overlap.
             exact_up_to: Groups of at most this size are planned whole.
+            planner: Plans all groups instead; None: these two do.
         """
         self.state = state
         self.table = Table(state, strict=strict)
         self.whole = WholeGroupPlanner(self.table, slack_s=tolerance_s)
-        self._large = LargeGroupPlanner(self.table, slack_s=tolerance_s)
+        self._small: Planner = self.whole
+        self._large: Planner = LargeGroupPlanner(self.table, slack_s=tolerance_s)
+        if planner is not None:
+            self._small = self._large = planner(self.table, slack_s=tolerance_s)
         self._exact_up_to = exact_up_to
 
     def planner_of(self, arc: ArcEntry) -> Planner:
         """Return what plans the group of an active ARC."""
-        return self.whole if len(self.state.groups.of(arc)) <= self._exact_up_to else self._large
+        return self._small if len(self.state.groups.of(arc)) <= self._exact_up_to else self._large
 
     def due(self, now_s: float) -> Turn | None:
         """Return an ARC whose time is now, and who must go for it; None if there is none.
@@ -52,14 +65,16 @@ class MasterSchedule:
         Looks where something changed since there was none; asked again after the turn was carried out.
         """
         self._look_where_it_changed()
-        return self.whole.due(now_s) or self._large.due(now_s)
+        return self._small.due(now_s) or self._large.due(now_s)
 
     def _look_where_it_changed(self) -> None:
         changed = [rc for rc in self.state.take_changed() if self.state.users(rc)]
         planners = [self.planner_of(next(iter(self.state.users(rc)))) for rc in changed]
         for rc, planner in zip(changed, planners, strict=True):
             planner.look_near(rc)
-        if self.table.strict and self._large in planners:  # the change may have held back any ARC of a large group
+        if (
+            self.table.strict and not self._large.is_exact and self._large in planners
+        ):  # the change may have held back any ARC of a large group
             for rc in self.state.rcs.keys() - {*changed}:
                 self._large.look_near(rc)
 

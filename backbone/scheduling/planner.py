@@ -1,9 +1,10 @@
 """Planner: works out whose turn it is in a group of ARCs, and when the others' will be (rule 3).
 
 A planner reads the schedule and changes nothing. There are two: one plans a group whole, the other looks at each RC's
-first in line. What both do is known as backfilling with reservations: *conservative* backfilling reserves a start for
-every job that waits, the EASY kind for the first in line only (Mu'alem and Feitelson, "Utilization, predictability,
-workloads, and user runtime estimates in scheduling the IBM SP2 with backfilling", IEEE TPDS 12, 2001).
+first in line; a mission file can name another class (``own_planner``). What both do is known as backfilling with
+reservations: *conservative* backfilling reserves a start for every job that waits, the EASY kind for the first in line
+only (Mu'alem and Feitelson, "Utilization, predictability, workloads, and user runtime estimates in scheduling the IBM
+SP2 with backfilling", IEEE TPDS 12, 2001).
 """
 
 from __future__ import annotations

@@ -55,6 +55,13 @@ class SchedulingRules(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         float,
         Meta(ge=0, le=LONGEST_S, description="seconds a decision process has to stop cleanly at the end of a slice"),
     ] = 0.2
+    planner: Annotated[
+        str,
+        Meta(
+            pattern=r"^([A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*)?$",
+            description="class path of a planner of your own, as package.module:Class; empty: those of the RC manager",
+        ),
+    ] = ""
 
     def slice_end_s(self, granted_s: float, minimum_s: float) -> float:
         """Return when a slice that is granted at this time ends, unless it is ended or extended.

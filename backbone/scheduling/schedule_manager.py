@@ -48,6 +48,7 @@ from backbone.scheduling.explain.attributes import attributes
 from backbone.scheduling.explain.explanation import Explanation
 from backbone.scheduling.invariants import broken
 from backbone.scheduling.master_schedule import EXACT_UP_TO, MasterSchedule
+from backbone.scheduling.own_planner import PlannerType
 from backbone.scheduling.planner import Turn, in_order_of_revocation
 from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
@@ -83,6 +84,7 @@ class ScheduleManager:
         mission: str,
         mission_priority: int,
         goes_on: bool = False,
+        planner: PlannerType | None = None,
     ) -> None:
         """Begin with no RCs and no ARCs.
 
@@ -93,12 +95,17 @@ class ScheduleManager:
             mission: Name of the mission's own node, root of the behavior tree.
             mission_priority: Its number among the consoles.
             goes_on: True if the trace goes on after that of an earlier RC manager.
+            planner: Plans all groups; None: those of this package do.
         """
         self._state = ScheduleState(
             discipline=rules.discipline, admission=rules.admission, tolerance_s=tolerance_s, exact_up_to=exact_up_to
         )
         self._schedule = MasterSchedule(
-            self._state, strict=rules.policy == "strict", tolerance_s=tolerance_s, exact_up_to=exact_up_to
+            self._state,
+            strict=rules.policy == "strict",
+            tolerance_s=tolerance_s,
+            exact_up_to=exact_up_to,
+            planner=planner,
         )
         self._tree = PriorityTree(mission, mission_priority)
         self._transitions = Transitions(self._schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)

@@ -116,7 +116,7 @@ class WholeGroupPlanner:
             self._planned = self._state.version
         plans = self._plans.get(group)
         if plans is None:
-            order = self._queued_in_order(group.arcs)
+            order = self.order(group.arcs)
             plans = self._plans[group] = _Plans(self._table, order, group.arcs, now_s, slack_s=self._slack_s)
         return plans
 
@@ -190,7 +190,7 @@ class WholeGroupPlanner:
         """
         arcs = [*group]
         slack_s = self._slack_s if slack_s is None else slack_s
-        order = self._queued_in_order(arcs)
+        order = self.order(arcs)
         return Plan(self._table, order, arcs, now_s, slack_s=slack_s, handed_over=handed_over).slots()
 
     def slots(self, group: Sequence[ArcEntry], now_s: float) -> list[Slot]:
@@ -207,7 +207,7 @@ class WholeGroupPlanner:
 
     def before(self, arc: ArcEntry) -> list[ArcEntry]:
         """Return the queued ARCs of its group that come before a queued one, in order."""
-        order = self._queued_in_order(self._state.group_of(arc))
+        order = self.order(self._state.group_of(arc))
         return order[: order.index(arc)]
 
     def firsts_before(self, arc: ArcEntry) -> list[ArcEntry]:
@@ -215,7 +215,8 @@ class WholeGroupPlanner:
         del arc
         return []
 
-    def _queued_in_order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
+    def order(self, arcs: Iterable[ArcEntry]) -> list[ArcEntry]:
+        """Return the queued ones among ARCs of one group, the first in line first (rule 2)."""
         return self._table.in_order([arc for arc in arcs if arc.queued])
 
 

@@ -11,7 +11,8 @@ from running_mission import RunningMission, mission_up
 from backbone.component.messages import AskStory, Story
 from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
-from ui_console.console_events import ConsentHeard, ConsentSought, GivenBack, Granted, Lost
+from ui_console.consent import Sought
+from ui_console.console_events import ConsentHeard, GivenBack, Granted, Lost
 from ui_console.driving import Drive
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
@@ -39,8 +40,8 @@ async def test_who_holds_a_robot_lets_an_equal_who_asks_have_it_before_the_slice
             mark = len(ben.events)
             ben.component.take()
             ben.component.begin_ask_consent("mine is stuck")
-            sought = await anna.hears(0, ConsentSought)
-            assert (sought.sought.user, sought.sought.why) == ("ben", "mine is stuck")
+            sought = await anna.hears(0, Sought)
+            assert (sought.user, sought.why) == ("ben", "mine is stuck")
             anna.component.decide(False, "nearly done")
             refused = await ben.hears(mark, ConsentHeard)
             assert (refused.is_given, refused.user, refused.reason) == (False, "anna", "nearly done")
@@ -48,7 +49,7 @@ async def test_who_holds_a_robot_lets_an_equal_who_asks_have_it_before_the_slice
 
             mark, anna_mark = len(ben.events), len(anna.events)
             ben.component.begin_ask_consent()
-            await anna.hears(anna_mark, ConsentSought)
+            await anna.hears(anna_mark, Sought)
             decided_s = anna.clock.now_s()
             anna.component.decide(True)
             granted = await ben.hears(mark, Granted)

@@ -15,7 +15,8 @@ from running_mission import BIN, RunningMission, mission_up
 from backbone.bus.interface import Bus
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
 from resource_pool.messages import AskPose, Pose
-from ui_console.console_events import ConsentSought, Granted
+from ui_console.consent import Sought
+from ui_console.console_events import Granted
 from ui_console.driving import KEYS_LET_GO_S, Drive
 from ui_console.teleoperation import Teleoperation
 
@@ -96,8 +97,8 @@ async def test_who_stopped_a_robot_is_asked_by_who_wants_it_to_move_and_not_once
             assert await component(anna).stop_robot("scout3")
             number = (await ask_stop(bus, "scout3")).number
             lifting = asyncio.create_task(component(ben).lift_stop("scout3", number))
-            sought = await anna.hears(0, ConsentSought)
-            assert (sought.sought.user, sought.sought.topic) == ("ben", "lift")
+            sought = await anna.hears(0, Sought)
+            assert (sought.user, sought.topic) == ("ben", "lift")
             component(anna).decide(False)
             assert not await lifting
             assert (await ask_stop(bus, "scout3")).is_stopped

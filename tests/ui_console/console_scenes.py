@@ -2,26 +2,14 @@
 
 from __future__ import annotations
 
-from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.component.messages import ComponentState, LifeState, Parameters, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad
+from backbone.nameserver.messages import Components
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import Holder, Lease, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from resource_pool.arc_client import StopState
-from ui_console.console_events import (
-    Asked,
-    ComponentsListed,
-    ConsoleEvent,
-    Granted,
-    LeasesHeard,
-    LinkHeard,
-    LoadHeard,
-    ParametersHeard,
-    PictureSeen,
-    RadioCounted,
-    ScheduleHeard,
-    StoryHeard,
-)
+from ui_console.console_events import Asked, ConsoleEvent, Granted, Heard, LinkHeard, PictureSeen
 from ui_console.console_model import ConsoleModel
 
 GRANT = Granted(10.0, {"scout": "scout1", "command_radio": "radio"}, {"scout1": 7, "radio": 3}, 15.0, 9.95, False)
@@ -108,14 +96,14 @@ COMPONENTS = [
     ),
 ]
 TEAM_EVENTS: list[ConsoleEvent] = [
-    ComponentsListed(7.0, COMPONENTS, True),
-    ScheduleHeard(8.0, SCHEDULE),
-    LeasesHeard(8.1, LEASES),
-    LoadHeard(8.2, HostLoad("base", [], 0.42, 0.31, 2, 9)),
+    Heard(7.0, Components(COMPONENTS, True, 0.0)),
+    Heard(8.0, SCHEDULE),
+    Heard(8.1, LEASES),
+    Heard(8.2, HostLoad("base", [], 0.42, 0.31, 2, 9)),
     LinkHeard(8.2, True, 0.0012),
-    RadioCounted(8.3, "radio", {"packets_sent": 120.0, "overruns": 0.0, "worst_packet_s": 0.0021}),
-    StoryHeard(8.4, StoryEvent(8.4, "mission_control/watch1", "saw motion", "scout1", "")),
-    ParametersHeard(8.5, "mission_control/watch1", {"threshold": 20, "weight": 0.1}),
+    Heard(8.3, Statistics({"packets_sent": 120.0, "overruns": 0.0, "worst_packet_s": 0.0021}), "resource_pool/radio"),
+    Heard(8.4, StoryEvent(8.4, "mission_control/watch1", "saw motion", "scout1", "")),
+    Heard(8.5, Parameters({"threshold": 20, "weight": 0.1}), "mission_control/watch1"),
 ]
 STOP = StopState("scout1", True, 1, "anna", "child in the room", 11.0)
 
@@ -151,4 +139,4 @@ def held_model() -> ConsoleModel:
         [],
     )
     pictures = [PictureSeen(10.5 + 0.1 * n, 10.45 + 0.1 * n, "scout1") for n in range(15)]
-    return model(*TEAM_EVENTS, ASK, GRANT, ScheduleHeard(10.0, holding), *pictures)
+    return model(*TEAM_EVENTS, ASK, GRANT, Heard(10.0, holding), *pictures)

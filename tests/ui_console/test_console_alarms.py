@@ -11,23 +11,11 @@ from hypothesis import strategies as st
 from backbone.component.messages import Absence
 from backbone.creator.messages import ProcessFell
 from backbone.health import HealthWord, MissionHealth
+from backbone.nameserver.messages import Disappeared
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule
 from ui_console.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause
-from ui_console.console_events import (
-    CommandRefused,
-    ComponentGone,
-    ComponentHeard,
-    ConsoleEvent,
-    GivenBack,
-    Granted,
-    HealthHeard,
-    LinkTrouble,
-    Lost,
-    ProcessFallen,
-    ScheduleHeard,
-    StopHeard,
-)
+from ui_console.console_events import CommandRefused, ConsoleEvent, GivenBack, Granted, Heard, LinkTrouble, Lost
 from ui_console.views import AlarmKind, AlarmView, Severity
 
 KIND = AlarmKind.LOST
@@ -239,33 +227,33 @@ def test_five_minutes_of_ordinary_use_are_few_alarms_and_in_the_end_none() -> No
     ben = msgspec.structs.replace(component("ui_console/console-2", "console", pid=9), user="ben")
     lifted = msgspec.structs.replace(STOP, is_stopped=False)
     steps: dict[float, list[ConsoleEvent]] = {
-        20.0: [ASK, GRANT, ScheduleHeard(20.0, held)],
-        30.0: [StopHeard(30.0, STOP)],
-        35.0: [StopHeard(35.0, lifted)],
+        20.0: [ASK, GRANT, Heard(20.0, held)],
+        30.0: [Heard(30.0, STOP)],
+        35.0: [Heard(35.0, lifted)],
         60.0: [
-            ProcessFallen(60.0, fell),
-            ComponentGone(60.0, "resource_pool/scout1"),
-            HealthHeard(60.0, gone, 62.0),
-            ScheduleHeard(60.0, down),
+            Heard(60.0, fell),
+            Heard(60.0, Disappeared("resource_pool/scout1")),
+            Heard(60.0, gone),
+            Heard(60.0, down),
             Lost(60.0, "rc", "scout1", -1.0),
             CommandRefused(60.1, "arc.swapped_out", "holds nothing", "wait"),
             LinkTrouble(60.2, "nobody answers"),
         ],
         61.0: [
-            ComponentHeard(61.0, component("resource_pool/scout1", "scout", since_s=61.0, pid=77)),
-            HealthHeard(61.0, fine, 1e9),
-            ScheduleHeard(61.0, held),
+            Heard(61.0, fine),
+            Heard(61.0, component("resource_pool/scout1", "scout", since_s=61.0, pid=77)),
+            Heard(61.0, held),
             Granted(61.0, GRANT.rcs, GRANT.epochs, 300.0, 60.0, True),
         ],
-        90.0: [ComponentHeard(90.0, ben)],
-        150.0: [ComponentGone(150.0, ben.address)],
+        90.0: [Heard(90.0, ben)],
+        150.0: [Heard(150.0, Disappeared(ben.address))],
         200.0: [Lost(200.0, "self", "", -1.0), GivenBack(200.0, "released", True)],
     }
     shown = model(*TEAM_EVENTS)
     shown.sees = False
     most = {}
     for second in range(20, 321):
-        for event in steps.get(float(second), []):
+        for event in steps.get(float(second), [Heard(float(second), fine)]):
             shown.apply(event)
         lines = [alarm.line for alarm in shown.view(float(second)).alarms]
         most[second] = len(lines)

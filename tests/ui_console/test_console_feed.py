@@ -189,7 +189,7 @@ def test_hosts_and_what_fell_there_are_heard_from_their_creators(stage: Callable
             fell = ProcessFell("scout1", "signal 9", -1.0, [])
             creator.bus.publish(creator.address, Conversation.EVENTS, fell)
             await on.until(lambda: {"load", "fell"} <= on.words())
-            assert on.model.team.hosts(0.0)[0].host == "local"
+            assert on.model.team.hosts(0.0)[0].load.host == "local"
             assert "given up" in on.model.alarm_views()[0].line
 
     stage(scene)

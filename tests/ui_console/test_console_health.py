@@ -9,7 +9,7 @@ import pytest
 from backbone.component.messages import Absence
 from backbone.health import HealthWord, MissionHealth
 from backbone.printable import printable_all
-from ui_console.console_events import HealthHeard, event_json
+from ui_console.console_events import Heard, event_json
 from ui_console.console_model import ConsoleModel
 from ui_console.profile import Profile
 from ui_console.terminal.head import head
@@ -19,13 +19,13 @@ GRABBER = Absence("grabber", 4.0, "killed by SIGKILL", "starts again in 0.1 s")
 PLACER = Absence("placer", 1.0, "no answer", "the launcher restarts it", "Nothing.", vital=True)
 
 
-def heard(at_s: float, word: HealthWord = HealthWord.OK, *absent: Absence) -> HealthHeard:
-    return HealthHeard(at_s, MissionHealth(word, list(absent)), at_s + 2.0)
+def heard(at_s: float, word: HealthWord = HealthWord.OK, *absent: Absence) -> Heard:
+    return Heard(at_s, MissionHealth(word, list(absent)))
 
 
-def model(*events: HealthHeard) -> ConsoleModel:
+def model(*events: Heard) -> ConsoleModel:
     made = ConsoleModel("console-1")
-    made.apply(HealthHeard(0.0, None, 2.0))
+    made.look(0.0)
     for event in events:
         made.apply(event)
     return made
@@ -64,7 +64,7 @@ def test_what_is_absent_is_an_alarm_until_it_is_back() -> None:
 
 
 @pytest.mark.parametrize("last", [[], [heard(5.0)]], ids=["never heard", "silent since"])
-def test_a_launcher_that_is_silent_makes_the_mission_degraded(last: list[HealthHeard]) -> None:
+def test_a_launcher_that_is_silent_makes_the_mission_degraded(last: list[Heard]) -> None:
     shown, since_s = model(*last), last[0].at_s if last else 0.0
     view = shown.view(since_s + 2.1)
     assert view.health is not None

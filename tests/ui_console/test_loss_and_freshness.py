@@ -10,16 +10,13 @@ from written_session import WrittenSession
 from resource_pool.arc_client import Stopper, StopState
 from ui_console.consent import Consent, Settled, Sought, Topic
 from ui_console.console_events import (
-    ConsentSettled,
-    ConsentSought,
     GivenBack,
     Granted,
+    Heard,
     LetGoNeeded,
     LinkHeard,
     Lost,
     MomentBegan,
-    ScheduleHeard,
-    StopHeard,
 )
 from ui_console.feed import LINK_FRESH_S
 from ui_console.profile import Profile
@@ -32,7 +29,7 @@ AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
 
 # ---------------------------------------------------------------------- a robot that was lost
 def test_a_robot_given_back_unasked_is_said_to_be_lost_with_when_and_why_and_can_be_taken_again() -> None:
-    shown = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT, AWAY)
+    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, AWAY)
     assert shown.own(21.0).lost == LostView("scout1", "anna is away", 20.0, may_retake=True)
     assert shown.own(90.0).lost is not None, "until somebody has seen it"
     shown.dismiss_lost()
@@ -40,7 +37,7 @@ def test_a_robot_given_back_unasked_is_said_to_be_lost_with_when_and_why_and_can
 
 
 def test_taking_a_robot_again_ends_the_word_that_it_was_lost() -> None:
-    shown = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT, AWAY, ASK)
+    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, AWAY, ASK)
     assert shown.own(21.0).lost is None
 
 
@@ -49,7 +46,7 @@ def test_a_robot_given_back_on_purpose_is_not_lost() -> None:
 
 
 def test_a_robot_lost_with_its_link_is_said_to_be_lost_while_the_console_asks_for_it_again() -> None:
-    shown = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT, Lost(12.0, "lease", "", -1.0))
+    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, Lost(12.0, "lease", "", -1.0))
     lost = shown.own(12.0).lost
     assert lost is not None
     assert (lost.robot, lost.at_s, lost.may_retake) == ("scout1", 12.0, False)
@@ -128,7 +125,7 @@ def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_ta
     both = StopState(
         "scout2", True, 3, "ben", "", 11.5, console="ui_console/ben", also=[Stopper("cleo", "ui_console/c")]
     )
-    rows = model(ScheduleHeard(8.0, SCHEDULE), StopHeard(11.0, STOP), StopHeard(11.5, both)).robots(12.0)
+    rows = model(Heard(8.0, SCHEDULE), Heard(11.0, STOP), Heard(11.5, both)).robots(12.0)
     mine, theirs = rows[0].stop, rows[1].stop
     assert mine is not None
     assert theirs is not None
@@ -138,7 +135,7 @@ def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_ta
 
 
 def test_the_alarm_of_a_stop_goes_when_the_stop_is_lifted() -> None:
-    shown = model(StopHeard(11.0, STOP), StopHeard(12.0, StopState("scout1", False, 1, "ben", "", 12.0)))
+    shown = model(Heard(11.0, STOP), Heard(12.0, StopState("scout1", False, 1, "ben", "", 12.0)))
     assert shown.team.alarms.views() == []
 
 
@@ -146,13 +143,13 @@ def test_a_question_whether_to_lift_a_stop_and_one_for_the_robot_are_told_apart(
     shown = held_model()
     lift = Sought("ui_console/ben", "ben", "scout1", "", 20.0, Topic.LIFT)
     take = Sought("ui_console/ben", "ben", "scout1", "mine is stuck", 20.0)
-    shown.apply(ConsentSought(12.0, lift))
-    shown.apply(ConsentSought(12.0, take))
+    shown.apply(lift)
+    shown.apply(take)
     asked = shown.own(12.0).consent
     assert asked is not None
     assert (asked.topic, asked.others) == ("lift", 1)
     assert asked.line == "ben asks whether scout1, which you stopped, may move again"
-    shown.apply(ConsentSettled(13.0, Settled(lift, Consent(True, "anna", ""))))
+    shown.apply(Settled(lift, Consent(True, "anna", "")))
     asked = shown.own(13.0).consent
     assert asked is not None
     assert (asked.topic, asked.line) == ("take", "ben asks for scout1: mine is stuck")

@@ -15,13 +15,14 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import ComponentState
+from backbone.nameserver.messages import Components
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope, Message
-from ui_console.console_events import ComponentsListed, Lost, ScheduleHeard
+from ui_console.console_events import Heard, Lost
 from ui_console.console_model import ConsoleModel
 from ui_console.hand_over import AskHandOver, Outcome, decide
 from ui_console.teleoperation import Teleoperation
@@ -176,12 +177,14 @@ def sits(name: str, user: str, feedback: str = "") -> ComponentState:
 
 
 def test_a_person_who_is_there_twice_is_told_where() -> None:
-    shown = model(ComponentsListed(1.0, [sits("console-1", "anna"), sits("tablet-7", "anna", "drives scout1")], True))
+    shown = model(
+        Heard(1.0, Components([sits("console-1", "anna"), sits("tablet-7", "anna", "drives scout1")], True, 0.0))
+    )
     assert shown.own(2.0).other_screens == ["your other screen on lab drives scout1"]
     assert shown.status_line(2.0) == "watching; you hold no robot here; your other screen on lab drives scout1"
-    only_looks = model(ComponentsListed(1.0, [sits("console-1", "anna"), sits("tablet-7", "anna")], True))
+    only_looks = model(Heard(1.0, Components([sits("console-1", "anna"), sits("tablet-7", "anna")], True, 0.0)))
     assert only_looks.own(2.0).other_screens == ["your other screen on lab watches"]
-    assert model(ComponentsListed(1.0, [DESK, sits("ben-7", "ben")], True)).own(2.0).other_screens == []
+    assert model(Heard(1.0, Components([DESK, sits("ben-7", "ben")], True, 0.0))).own(2.0).other_screens == []
 
 
 def test_people_are_called_by_their_names_in_rows_timeline_and_reasons() -> None:
@@ -195,10 +198,10 @@ def test_people_are_called_by_their_names_in_rows_timeline_and_reasons() -> None
         [],
     )
     held = component("resource_pool/scout1", "scout", feedback="held by console-9-capture")
-    shown = model(ScheduleHeard(10.0, holding), ComponentsListed(10.0, [held, sits("console-9", "Ben B.")], True))
+    shown = model(Heard(10.0, holding), Heard(10.0, Components([held, sits("console-9", "Ben B.")], True, 0.0)))
     [robot] = shown.robots(11.0)
     assert (robot.holder, robot.priority, robot.feedback) == ("Ben B.", "Ben B.:100", "held by Ben B.")
-    assert [row.who for row in shown.team.requests()] == ["Ben B.", "watch1"]
+    assert [row.owner for row in shown.team.requests()] == ["Ben B.", "watch1"]
     assert {one.who for row in shown.team.timeline(11.0).rows for one in row.slices} >= {"Ben B."}
     assert shown.team.person("console-9") == shown.team.person("console-9-capture") == "Ben B."
     shown.apply(ASK)
@@ -210,7 +213,7 @@ def test_people_are_called_by_their_names_in_rows_timeline_and_reasons() -> None
 
 
 def test_what_one_gave_away_is_no_alarm_and_nobody_else_hears_of_ones_own() -> None:
-    one = model(ScheduleHeard(8.0, SCHEDULE), ASK, GRANT)
+    one = model(Heard(8.0, SCHEDULE), ASK, GRANT)
     two = ConsoleModel("console-2", "ben", one.team)
     one.apply(Lost(12.0, "self", "", -1.0))
     assert one.alarm_views() == []

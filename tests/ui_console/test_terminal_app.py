@@ -24,16 +24,12 @@ from ui_console.console_events import (
     Attention,
     ConsentAsked,
     ConsentHeard,
-    ConsentSettled,
-    ConsentSought,
     ConsoleEvent,
     GivenBack,
+    Heard,
     LinkHeard,
     LinkTrouble,
     Lost,
-    ScheduleHeard,
-    StopHeard,
-    StoryHeard,
 )
 from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.feed import LogAway
@@ -84,7 +80,7 @@ KEYS: list[tuple[str, list[Any]]] = [
 
 
 async def test_every_key_does_what_it_says() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), LinkTrouble(9.0, "nobody"))
+    session = WrittenSession(Heard(8.0, SCHEDULE), LinkTrouble(9.0, "nobody"))
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:
         for number, (key, wanted) in enumerate(KEYS, 1):
             session.wanted.clear()
@@ -178,7 +174,7 @@ async def test_leaving_the_window_stops_the_wheels_and_coming_back_is_noticed() 
 
 # ---------------------------------------------------------------------- emergency stop
 async def test_without_a_robot_of_ones_own_the_stop_is_for_the_row_the_cursor_is_on() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(Heard(8.0, SCHEDULE))
     async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
         await pilot.press("x")
         await settle(pilot)
@@ -200,7 +196,7 @@ async def test_with_a_robot_of_ones_own_the_stop_is_for_that_one_wherever_the_cu
 
 @pytest.mark.parametrize(("key", "said"), [("x", "scout1 did not confirm"), ("X", "not confirmed: scout2")])
 async def test_a_stop_nobody_confirmed_is_said_aloud(key: str, said: str) -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(Heard(8.0, SCHEDULE))
     session.is_sure = False
     async with ConsoleApp(session).run_test(size=SIZE, notifications=True) as pilot:
         await pilot.press(key)
@@ -211,7 +207,7 @@ async def test_a_stop_nobody_confirmed_is_said_aloud(key: str, said: str) -> Non
 
 # ---------------------------------------------------------------------- robots, tables, dialogs
 async def test_the_picker_takes_the_robot_chosen_and_escape_takes_none() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(Heard(8.0, SCHEDULE))
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:
         await pilot.press("p", "escape")
         await settle(pilot)
@@ -250,7 +246,7 @@ async def test_the_log_of_the_whole_mission_is_searched_and_followed() -> None:
         assert "tells of long ago" in told
         assert "saw motion" not in told
         for heard in (event(9.0, "tells again"), event(11.0, "tells news"), event(11.5, "is silent")):
-            session.model.apply(StoryHeard(12.0, heard))
+            session.model.apply(Heard(12.0, heard))
         app.redraw()
         told = screen_text(app)
         assert told.count("tells again") == 1, "told and heard"
@@ -284,7 +280,7 @@ async def test_a_search_that_fails_says_why_and_leaves_the_log_as_it_was(
 
 
 async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(Heard(8.0, SCHEDULE))
     screen = ConsoleApp(session)
     async with screen.run_test(size=SIZE) as pilot:
         await pilot.press("right_square_bracket", "right_square_bracket")
@@ -298,7 +294,7 @@ async def test_the_cursor_stays_on_its_row_while_rows_come_and_go() -> None:
 
 
 async def test_why_is_shown_and_closed_and_drives_nothing_meanwhile() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(Heard(8.0, SCHEDULE))
     async with ConsoleApp(session).run_test(size=SIZE) as pilot:
         await pilot.press("y")
         await settle(pilot)
@@ -310,7 +306,7 @@ async def test_why_is_shown_and_closed_and_drives_nothing_meanwhile() -> None:
 
 
 async def test_why_of_an_alarm_says_where_to_look_too() -> None:
-    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, StopHeard(11.0, STOP)))
+    app = ConsoleApp(WrittenSession(*TEAM_EVENTS, Heard(11.0, STOP)))
     async with app.run_test(size=SIZE) as pilot:
         while app.chosen is not PanelName.ALARMS:
             await pilot.press("tab")
@@ -339,7 +335,7 @@ async def test_a_parameter_is_changed_by_typing_another_value(is_sure: bool) -> 
 async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_keys_that_decide() -> None:
     shown = held_model()
     sought = Sought("ui_console/console-2", "ben", "scout1", "my robot is stuck", 18.0)
-    shown.apply(ConsentSought(11.0, sought))
+    shown.apply(sought)
     session = WrittenSession(shown=shown)
     screen = ConsoleApp(session)
     async with screen.run_test(size=(160, 36)) as pilot:
@@ -347,7 +343,7 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
         assert "ben asks for scout1: my robot is stuck [g: yes, n: no; 6 s]" in screen_text(screen)
         await pilot.press("g")
         assert session.wanted[-1] == ("decide", True)
-        shown.apply(ConsentSettled(12.0, Settled(sought, Consent(True, "anna", ""))))
+        shown.apply(Settled(sought, Consent(True, "anna", "")))
         screen.redraw()
         await settle(pilot)
         assert "ben asks" not in screen_text(screen)
@@ -355,7 +351,7 @@ async def test_who_asks_for_the_robot_and_why_is_on_the_status_line_with_the_key
 
 async def test_a_pendants_holder_is_asked_in_the_same_words_and_answers_by_the_same_keys() -> None:
     shown = held_model()
-    shown.apply(ConsentSought(11.0, Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0)))
+    shown.apply(Sought("ui_console/console-2", "ben", "scout1", "stuck", 18.0))
     session = WrittenSession(shown=shown)
     screen = ConsoleApp(session, profile=Profile.PENDANT)
     async with screen.run_test(size=(50, 20)) as pilot:
@@ -458,7 +454,7 @@ async def test_a_monitor_has_no_keys_that_drive() -> None:
 
 
 async def test_a_pendant_drives_with_six_keys_and_stops_with_two_more() -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(Heard(8.0, SCHEDULE))
     async with ConsoleApp(session, profile=Profile.PENDANT).run_test(size=(50, 20)) as pilot:
         await pilot.press("up", "down", "left", "right", "space", "enter")
         await pilot.press("j", "t", "r", "y", "1", "p", "v", "k")
@@ -573,7 +569,7 @@ ALARMING: list[ConsoleEvent] = [
     Attention(8.0, False),
     LinkTrouble(9.0, "nobody answers at resource_pool/scout2"),
     Attention(9.5, True),
-    StopHeard(11.0, STOP),
+    Heard(11.0, STOP),
 ]
 
 
@@ -610,7 +606,7 @@ async def test_every_screen_looks_as_it_did(
 ) -> None:
     session = WrittenSession(shown=held_model())
     if name == "dialog-lift":
-        session.model.apply(StopHeard(11.0, msgspec.structs.replace(STOP, by="ben")))
+        session.model.apply(Heard(11.0, msgspec.structs.replace(STOP, by="ben")))
     session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
     screen = ConsoleApp(session, profile=profile)
     async with screen.run_test(size=size) as pilot:

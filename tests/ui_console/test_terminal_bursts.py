@@ -14,7 +14,7 @@ from textual.app import App
 from textual.pilot import Pilot
 from written_session import WrittenSession, settle
 
-from ui_console.console_events import StopHeard
+from ui_console.console_events import Heard
 from ui_console.profile import Profile
 from ui_console.terminal import display
 from ui_console.terminal.app import ConsoleApp
@@ -39,7 +39,7 @@ QUIET_S = 3.0
 
 def console(profile: Profile = Profile.TERMINAL) -> ConsoleApp:
     shown = held_model()
-    shown.apply(StopHeard(11.0, STOP))
+    shown.apply(Heard(11.0, STOP))
     session = WrittenSession(shown=shown)
     session.shown = np.tile(np.arange(0, 240, 6, dtype=np.uint8), (30, 1))
     return ConsoleApp(session, profile=profile)

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 
-from ui_console.console_events import LinkTrouble, ScheduleHeard, StopHeard
+from ui_console.console_events import Heard, LinkTrouble
 from ui_console.profile import Profile
 from ui_console.terminal.head import Head, head
 from ui_console.terminal.keys import has, hints, key_lines, keys_help
@@ -105,7 +105,7 @@ def test_what_is_held_down_and_moves_nothing_is_explained() -> None:
 
 
 def test_robots_that_others_stopped_are_on_the_first_line_of_every_console() -> None:
-    shown = model(*TEAM_EVENTS, StopHeard(11.0, STOP))
+    shown = model(*TEAM_EVENTS, Heard(11.0, STOP))
     for profile in Profile:
         assert "STOPPED: scout1" in shown_at(shown.view(NOW_S), 80, profile).status.plain
 
@@ -115,7 +115,7 @@ def test_robots_that_others_stopped_are_on_the_first_line_of_every_console() -> 
 @pytest.mark.parametrize("columns", WIDTHS)
 def test_the_last_line_fits_and_always_names_the_keys_that_stop(profile: Profile, columns: int) -> None:
     shown = held_model()
-    shown.apply(StopHeard(11.0, STOP))
+    shown.apply(Heard(11.0, STOP))
     lines = key_lines(hints(shown.view(NOW_S), profile, "scout1"), columns, 2).plain.split("\n")
     assert all(len(line) <= columns for line in lines)
     told = " ".join(lines)
@@ -126,8 +126,8 @@ def test_the_last_line_fits_and_always_names_the_keys_that_stop(profile: Profile
 
 @pytest.mark.parametrize("profile", list(Profile))
 def test_at_80_columns_the_last_line_names_help_and_quit_in_every_state(profile: Profile) -> None:
-    held, watching = held_model(), model(ScheduleHeard(8.0, SCHEDULE))
-    held.apply(StopHeard(11.0, STOP))
+    held, watching = held_model(), model(Heard(8.0, SCHEDULE))
+    held.apply(Heard(11.0, STOP))
     for view in (held.view(NOW_S), watching.view(NOW_S), own(busy(), is_held=False)):
         told = key_lines(hints(view, profile, "scout1"), 80, 1).plain
         assert "? " in told

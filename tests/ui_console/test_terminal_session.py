@@ -15,7 +15,7 @@ from textual.pilot import Pilot
 from backbone.bus.clock import MissionClock
 from backbone.component.messages import LifeState
 from backbone.endings import ExitCode
-from ui_console.console_events import StopHeard
+from ui_console.console_events import Heard
 from ui_console.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
 from ui_console.observer import Observer
 from ui_console.terminal.dialogs import LiftQuestion
@@ -123,7 +123,7 @@ async def test_a_gamepads_buttons_stop_one_robot_and_all_with_a_dialog_in_front(
 
 def test_the_remedy_of_a_stop_names_the_keys_of_a_terminal() -> None:
     session = TerminalSession("console-1")
-    session.show(StopHeard(1.0, STOP))
+    session.show(Heard(1.0, STOP))
     [alarm] = session.model.view(2.0).alarms
     assert alarm.remedy == "When the robot may move, press c, then l."
     keys = [binding for binding in KEYS if isinstance(binding, Binding)]

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
-from ui_console.console_events import ScheduleHeard, StopHeard
+from ui_console.console_events import Heard
 from ui_console.console_model import ConsoleModel
 from ui_console.profile import Profile
 from ui_console.terminal.app import ConsoleApp
@@ -40,7 +40,7 @@ NO_ROBOTS = {"links": 5, "parameters": 6, "log": 8}
 def stopped_model() -> ConsoleModel:
     """Return one that holds scout1, which anna has stopped."""
     shown = held_model()
-    shown.apply(StopHeard(11.0, STOP))
+    shown.apply(Heard(11.0, STOP))
     return shown
 
 
@@ -82,7 +82,7 @@ async def test_a_stop_passes_the_keys_that_wait(key: str, wanted: object) -> Non
 
 @pytest.mark.parametrize("profile", list(Profile))
 async def test_every_profile_stops_one_robot_and_all(profile: Profile) -> None:
-    session = WrittenSession(ScheduleHeard(8.0, SCHEDULE), shown=held_model())
+    session = WrittenSession(Heard(8.0, SCHEDULE), shown=held_model())
     async with ConsoleApp(session, profile=profile).run_test(size=SIZE) as pilot:
         await pilot.press("x", "X")
         await settle(pilot)
@@ -146,7 +146,7 @@ async def test_a_stop_set_anew_while_the_question_is_open_is_shown_and_not_lifte
         await pilot.press("c")
         await settle(pilot)
         again = msgspec.structs.replace(STOP, number=STOP.number + 1, by="ben", reason="smoke", at_s=11.5)
-        session.model.apply(StopHeard(11.5, again))
+        session.model.apply(Heard(11.5, again))
         app.redraw()
         await pilot.press("l")
         await settle(pilot)
@@ -166,7 +166,7 @@ async def test_the_question_closes_when_somebody_else_lifts_the_stop() -> None:
     async with app.run_test(size=SIZE) as pilot:
         await pilot.press("c")
         await settle(pilot)
-        session.model.apply(StopHeard(11.5, msgspec.structs.replace(STOP, is_stopped=False, by="ben")))
+        session.model.apply(Heard(11.5, msgspec.structs.replace(STOP, is_stopped=False, by="ben")))
         app.redraw()
         await settle(pilot)
         assert len(app.screen_stack) == 1
@@ -197,7 +197,7 @@ async def test_where_no_robot_is_stopped_lifting_says_so() -> None:
 
 @pytest.mark.parametrize("name", [*NO_ROBOTS, "keys"])
 async def test_a_robot_that_the_cursor_was_moved_to_is_meant_in_every_table_and_dialog(name: str) -> None:
-    session = WrittenSession(*TEAM_EVENTS, ScheduleHeard(8.0, SCHEDULE))
+    session = WrittenSession(*TEAM_EVENTS, Heard(8.0, SCHEDULE))
     async with ConsoleApp(session, profile=Profile.MONITOR).run_test(size=SIZE) as pilot:
         await pilot.press(*["shift+tab"] * 3, "right_square_bracket")
         await pilot.press(*["tab"] * NO_ROBOTS.get(name, 0), *DIALOGS.get(name, []))

@@ -17,13 +17,14 @@ from backbone.moments import Now
 from ui_console.console_events import ConsoleEvent
 from ui_console.console_model import ConsoleModel
 from ui_console.driving import Drive
+from ui_console.terminal.verbs import Session
 
 
-class WrittenSession:
+class WrittenSession(Session):
     """Writes down what keys want."""
 
     def __init__(self, *events: ConsoleEvent, shown: ConsoleModel | None = None) -> None:
-        self.model = shown or model(*events)
+        super().__init__(shown or model(*events))
         self.wanted: list[Any] = []
         self.touched = 0
         self.must_let_go = 0

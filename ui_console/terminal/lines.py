@@ -13,18 +13,18 @@ from dataclasses import dataclass, field
 from rich.console import Console
 from rich.text import Text
 
+from backbone.component.messages import ComponentState, StoryEvent
+from backbone.naming import component_of
+from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
 from ui_console.views import (
     AlarmView,
     Certainty,
-    ComponentRow,
     HostView,
     LinkView,
-    LogRow,
     NodeState,
     NodeView,
     ParameterView,
-    RequestRow,
     RobotView,
     Severity,
     SliceView,
@@ -125,7 +125,7 @@ def tree_rows(nodes: list[NodeView], now_s: float) -> list[Row]:
     return [Row(f"node:{node.name}", node.name, _node(node, now_s)) for node in nodes]
 
 
-def request_rows(requests: list[RequestRow], now_s: float) -> list[Row]:
+def request_rows(requests: list[RequestView], now_s: float) -> list[Row]:
     """Return one line for each request: who runs until when, who waits why."""
     return [Row(f"request:{request.arc}", request.arc, _request(request, now_s)) for request in requests]
 
@@ -138,7 +138,7 @@ def alarm_rows(alarms: list[AlarmView], now_s: float) -> list[Row]:
 def link_rows(links: list[LinkView], hosts: list[HostView]) -> list[Row]:
     """Return one line for each link and each host."""
     rows = [Row(f"link:{link.name}", "", _link(link)) for link in links]
-    return rows + [Row(f"host:{host.host}", "", _host(host)) for host in hosts]
+    return rows + [Row(f"host:{host.load.host}", "", _host(host)) for host in hosts]
 
 
 def parameter_rows(parameters: list[ParameterView]) -> list[Row]:
@@ -149,12 +149,15 @@ def parameter_rows(parameters: list[ParameterView]) -> list[Row]:
     ]
 
 
-def component_rows(components: list[ComponentRow]) -> list[Row]:
+def component_rows(components: list[ComponentState]) -> list[Row]:
     """Return one line for each component."""
-    return [Row(f"component:{component.address}", component.name, _component(component)) for component in components]
+    return [
+        Row(f"component:{component.address}", component_of(component.address), _component(component))
+        for component in components
+    ]
 
 
-def log_rows(log: list[LogRow]) -> list[Row]:
+def log_rows(log: list[StoryEvent]) -> list[Row]:
     """Return one line for each thing that happened, newest first."""
     return [
         Row(
@@ -212,7 +215,7 @@ def _robot_facts(robot: RobotView, now_s: float) -> Iterator[str]:
     if robot.holder and robot.until_s >= 0:
         yield from _slice_end(robot.until_s, now_s)
     if robot.waiting:
-        yield "then " + ", ".join(waiting.who for waiting in robot.waiting)
+        yield "then " + ", ".join(robot.waiting)
     if robot.holder:
         yield f"for {max(0.0, now_s - robot.since_s):.0f} s"
         yield robot.priority.rpartition("/")[2]
@@ -237,7 +240,7 @@ def _node(node: NodeView, now_s: float) -> Text:
     return lines
 
 
-def _request(request: RequestRow, now_s: float) -> Text:
+def _request(request: RequestView, now_s: float) -> Text:
     if request.state == "running":
         when = next(_slice_end(request.until_s, now_s), "running") if request.until_s >= 0 else "running"
     elif request.expected_start_s > now_s:
@@ -245,7 +248,7 @@ def _request(request: RequestRow, now_s: float) -> Text:
     else:
         when = request.state
     style = "green" if request.state == "running" else "yellow" if request.state == "waiting" else "dim"
-    return Text.assemble((f"{request.who}: ", "bold"), (when, style), f"; {request.because}")
+    return Text.assemble((f"{request.owner}: ", "bold"), (when, style), f"; {request.because}")
 
 
 def _alarm(alarm: AlarmView, now_s: float) -> Text:
@@ -268,12 +271,13 @@ def _link(link: LinkView) -> Text:
 
 
 def _host(host: HostView) -> Text:
-    style = "yellow" if host.cpu >= BUSY_CPU else ""
+    load = host.load
+    style = "yellow" if load.cpu >= BUSY_CPU else ""
     return Text.assemble(
         "host ",
-        (host.host, "bold"),
-        (f" {host.cpu:.0%} of {counted(host.cores, 'core')}", style),
-        f", memory {host.memory:.0%}, {counted(host.components, 'component')}",
+        (load.host, "bold"),
+        (f" {load.cpu:.0%} of {counted(load.cores, 'core')}", style),
+        f", memory {load.memory:.0%}, {counted(load.components, 'component')}",
         (f"  {host.age_s:.0f} s ago", "dim"),
     )
 
@@ -296,11 +300,11 @@ def _said(value: str) -> str:
         return value
 
 
-def _component(component: ComponentRow) -> Text:
+def _component(component: ComponentState) -> Text:
     is_ready = component.state == "ready"
     return Text.assemble(
         ("● " if is_ready else "○ ", "green" if is_ready else "yellow"),
-        (f"{component.name:22.22s} ", "bold"),
+        (f"{component_of(component.address):22.22s} ", "bold"),
         (f"{component.host} {component.pid} ", "dim"),
         component.feedback or component.type,
     )

@@ -6,22 +6,14 @@ import asyncio
 import os
 import sys
 from collections.abc import Callable, Coroutine, Mapping
-from datetime import datetime
 from typing import Any, assert_never
 
-import numpy as np
-from numpy.typing import NDArray
 from textual import pilot as textual_pilot
 
-from backbone.component.messages import LifeState
 from backbone.endings import ExitCode
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
-from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.console_events import ConsoleEvent
 from ui_console.console_model import ConsoleModel
-from ui_console.driving import Drive
 from ui_console.gamepad import Gamepad, PadWish, Stick, play_gamepad
 from ui_console.observer import Observer
 from ui_console.profile import Profile
@@ -30,12 +22,13 @@ from ui_console.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
 from ui_console.terminal.pixels import can_show_pixels
+from ui_console.terminal.verbs import Session
 
 LIFT_REMEDY = "When the robot may move, press c, then l."
 Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
 
 
-class TerminalSession:
+class TerminalSession(Session):
     """Hands what a component hears to the model, and what keys want to the component.
 
     Args:
@@ -59,11 +52,8 @@ class TerminalSession:
         sees: bool = True,
         gamepad: tuple[Gamepad, Mapping[int, tuple[int, int]]] | None = None,
     ) -> None:
-        self.model = ConsoleModel(name, user, TeamModel(mission, LIFT_REMEDY), sees=sees)
+        super().__init__(ConsoleModel(name, user, TeamModel(mission, LIFT_REMEDY), sees=sees))
         self._profile, self._is_bare, self._gamepad = profile, is_bare, gamepad
-        self._console: Observer[Any] | None = None
-        self._frame: Frame | None = None
-        self._picture: NDArray[np.uint8] | None = None
 
     def show(self, event: ConsoleEvent) -> None:
         """Take an event into the model; the screen reads it at its next redraw."""
@@ -160,115 +150,3 @@ class TerminalSession:
         finally:
             watch.close()
             screening.cancel()
-
-    # ------------------------------------------------------------------ what the screen asks for
-    def picture(self) -> NDArray[np.uint8] | None:
-        """Return the newest picture; see ``Session``."""
-        frame, self._frame = self._frame, None
-        if frame is not None:
-            self._picture = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
-        return self._picture
-
-    def now_s(self) -> float:
-        """Return the mission time."""
-        return self._console.clock.now_s() if self._console is not None else 0.0
-
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
-        """A drive key is down."""
-        self._with_robot(lambda console: console.hold(drive, lasts_s))
-
-    def stop(self) -> None:
-        """Stop the wheels now."""
-        self._with_robot(Teleoperation.stop)
-
-    def jump(self) -> None:
-        """Jump once."""
-        self._with_robot(Teleoperation.jump)
-
-    def take(self) -> None:
-        """Ask for the robot."""
-        self._with_robot(Teleoperation.take)
-
-    def release(self) -> None:
-        """Give the robot back."""
-        self._with_robot(Teleoperation.begin_release)
-
-    def ask_consent(self, why: str = "") -> None:
-        """Ask the operator who holds the robot for it."""
-        self._with_robot(lambda console: console.begin_ask_consent(why))
-
-    def decide(self, is_given: bool) -> None:
-        """Answer the operator who asks for the robot, or to lift a stop."""
-        if self._console is not None and self._console.state is LifeState.READY:
-            self._console.decide(is_given)
-
-    def require_let_go(self) -> None:
-        """What is held moves nothing until it was let go and pressed anew."""
-        self._with_robot(Teleoperation.require_let_go)
-
-    def dismiss_lost(self) -> None:
-        """The operator knows that a robot was lost."""
-        self.model.dismiss_lost()
-
-    async def switch(self, robot: str) -> None:
-        """Give the robot back and ask for this one."""
-        if isinstance(self._console, Teleoperation) and self._console.is_ready:
-            await self._console.switch(robot)
-
-    def touch(self) -> None:
-        """Somebody is there."""
-        self._with_robot(Teleoperation.touch)
-
-    def leave(self) -> None:
-        """Nobody is."""
-        self._with_robot(Teleoperation.leave)
-
-    def closed(self) -> None:
-        """The screen has gone; the component gives the robot back, and ends."""
-        if self._console is not None:
-            self._console.end("the screen was closed")
-
-    def acknowledge(self, key: str) -> None:
-        """One alarm was seen, or all."""
-        seen = self.model.acknowledge(key)
-        if self._console is not None and self._console.state is LifeState.READY:
-            self._console.acknowledged(seen, key)
-
-    async def stop_robot(self, robot: str) -> bool:
-        """Emergency stop of one robot."""
-        return await self._ready_console().stop_robot(robot)
-
-    async def stop_all(self) -> list[str]:
-        """Emergency stop of all robots."""
-        return await self._ready_console().stop_all()
-
-    async def lift_stop(self, robot: str, number: int) -> bool:
-        """Let the robot move again if those who stopped it let it; the number is that of the stop that was seen."""
-        return await self._ready_console().lift_stop(robot, number)
-
-    async def why(self, name: str) -> list[str]:
-        """Return why it is as it is."""
-        return await self._ready_console().why(name)
-
-    async def search_log(self, question: LogQuestion) -> tuple[AskLog, Log]:
-        """Return what the mission's log has of this; see ``Session``."""
-        console = self._ready_console()
-        asked = question.asked(Now(self.now_s(), datetime.now(), console.clock.rate))
-        return asked, await console.feed.search_log(asked)
-
-    async def ask_parameters(self, name: str) -> bool:
-        """Have its parameters told."""
-        return await self._ready_console().feed.ask_parameters(name)
-
-    async def set_parameter(self, name: str, parameter: str, value: object) -> bool:
-        """Change one."""
-        return await self._ready_console().set_parameter(name, parameter, value)
-
-    def _with_robot(self, act: Callable[[Teleoperation], None]) -> None:
-        if isinstance(self._console, Teleoperation) and self._console.is_ready:
-            act(self._console)
-
-    def _ready_console(self) -> Observer[Any]:
-        if self._console is None:
-            raise RuntimeError("the session does not run")
-        return self._console

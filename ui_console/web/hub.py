@@ -18,12 +18,14 @@ from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
+from backbone.log_lines import event_json
 from backbone.naming import Subsystem, address
 from backbone.operators import OperatorAction
-from backbone.wire import Envelope
+from backbone.scheduling.views import Schedule
+from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.consent_answers import ConsentAnswers
-from ui_console.console_events import ConsoleEvent, ScheduleHeard
+from ui_console.console_events import ConsoleEvent, Heard
 from ui_console.console_model import ConsoleModel
 from ui_console.observer import Observer
 from ui_console.team_model import ROBOT_KIND, TeamModel
@@ -189,8 +191,8 @@ class WebHub:
 
     def _heard(self, event: ConsoleEvent) -> None:
         self._model.apply(event)
-        if isinstance(event, ScheduleHeard):
-            rcs = event.schedule.rcs
+        if isinstance(event, Heard) and isinstance(event.body, Schedule):
+            rcs = event.body.rcs
             self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
             self.watching_changed()
             for operator in self.guests:
@@ -220,13 +222,13 @@ class WebHub:
         team, now_s = self.team, self.clock.now_s()
         tables: dict[str, Any] = {
             "tree": team.tree(),
-            "requests": team.requests(),
+            "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),
-            "hosts": team.hosts(now_s),
+            "hosts": plain(team.hosts(now_s)),
             "health": team.health(now_s),
             "parameters": team.parameters(),
-            "components": team.components(),
-            "log": team.log(),
+            "components": plain(team.components()),
+            "log": [event_json(event) for event in team.log()],
             "now_s": now_s,
         }
         for name, table in tables.items():

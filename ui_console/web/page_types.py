@@ -8,21 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import msgspec
+from msgspec import inspect
 
+from backbone.component.messages import ComponentState
+from backbone.scheduling.views import RequestView
 from ui_console.views import (
     AlarmView,
-    ComponentRow,
     HealthView,
     HostView,
     LinkView,
-    LogRow,
     NodeView,
     OwnView,
     ParameterView,
-    RequestRow,
     RobotView,
     TimelineView,
 )
@@ -30,6 +30,13 @@ from ui_console.web.door import Beat, Hello
 from ui_console.web.protocol import Intent
 
 FILE = Path(__file__).parent / "page" / "messages.d.ts"
+_PLAIN: dict[type[inspect.Type], str] = {
+    inspect.IntType: "number",
+    inspect.FloatType: "number",
+    inspect.StrType: "string",
+    inspect.BoolType: "boolean",
+    inspect.NoneType: "null",
+}
 HEAD = "// What the page and its server send each other. Written by ui_console/web/page_types.py; change the structs.\n"
 
 
@@ -39,27 +46,6 @@ class Welcomed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     user: str
     priority: int
     mission: str
-
-
-class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """All sections of the view; a message has those that changed."""
-
-    welcome: Welcomed
-    own: OwnView
-    robots: list[RobotView]
-    links: list[LinkView]
-    alarms: list[AlarmView]
-    drawn: dict[str, float]
-    tree: list[NodeView]
-    requests: list[RequestRow]
-    timeline: TimelineView
-    hosts: list[HostView]
-    health: HealthView | None
-    parameters: list[ParameterView]
-    components: list[ComponentRow]
-    log: list[LogRow]
-    now_s: float
-    beat: int | None = None
 
 
 class LoggedEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -72,7 +58,33 @@ class LoggedEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     person: str
     where: str
     cause: str
+
+
+class FoundEvent(LoggedEvent, frozen=True):
+    """One that a search found, with its time of day."""
+
     time: str
+
+
+class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All sections of the view; a message has those that changed."""
+
+    welcome: Welcomed
+    own: OwnView
+    robots: list[RobotView]
+    links: list[LinkView]
+    alarms: list[AlarmView]
+    drawn: dict[str, float]
+    tree: list[NodeView]
+    requests: list[RequestView]
+    timeline: TimelineView
+    hosts: list[HostView]
+    health: HealthView | None
+    parameters: list[ParameterView]
+    components: list[ComponentState]
+    log: list[LoggedEvent]
+    now_s: float
+    beat: int | None = None
 
 
 class LogFound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -80,7 +92,7 @@ class LogFound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     number: int
     first: int
-    events: list[LoggedEvent]
+    events: list[FoundEvent]
     total: int
     left_out: int
     since_s: float
@@ -148,46 +160,50 @@ def _interfaces(kinds: Iterable[type[msgspec.Struct]], *, is_sent_whole: bool) -
         kinds: The structs.
         is_sent_whole: True: fields with a default are always there, because the server writes them.
     """
-    _schemas, components = msgspec.json.schema_components(kinds)
-    return [_declaration(name, schema, is_sent_whole) for name, schema in sorted(components.items())]
+    declared: dict[str, str] = {}
+    for kind in kinds:
+        _type(inspect.type_info(kind), declared, is_sent_whole)
+    return [text for _, text in sorted(declared.items())]
 
 
-def _declaration(name: str, schema: dict[str, Any], is_sent_whole: bool) -> str:
-    if "enum" in schema:
-        values = "".join(f"\n  | {msgspec.json.encode(value).decode()}" for value in schema["enum"])
-        return f"export type {name} ={values};\n"
-    required = schema["properties"] if is_sent_whole else schema.get("required", [])
-    fields = [
-        f"  {field}{'' if field in required else '?'}: {_type(of)};\n" for field, of in schema["properties"].items()
-    ]
-    return f"export interface {name} {{\n{''.join(fields)}}}\n"
-
-
-def _type(schema: dict[str, Any]) -> str:
-    """Return the TypeScript type of a JSON schema.
+def _type(kind: inspect.Type, declared: dict[str, str], is_sent_whole: bool) -> str:
+    """Return the TypeScript type; what it is made of is declared afterwards.
 
     Example:
-        >>> _type({"anyOf": [{"type": "array", "items": {"type": "number"}}, {"type": "null"}]})
+        >>> _type(inspect.type_info(list[float] | None), {}, True)
         'number[] | null'
     """
-    match schema:
-        case {"$ref": str(ref)}:
-            return ref.rpartition("/")[2]
-        case {"enum": list(values)}:
-            return " | ".join(msgspec.json.encode(value).decode() for value in values)
-        case {"anyOf": list(kinds)}:
-            return " | ".join(map(_type, kinds))
-        case {"type": "array", "items": dict(items)}:
-            of = _type(items)
+    match kind:
+        case inspect.StructType(cls=cls, fields=fields):
+            if cls.__name__ not in declared:
+                declared[cls.__name__] = ""  # it may be made of itself
+                lines = _tag(kind) + [
+                    f"  {field.encode_name}{'' if is_sent_whole or field.required else '?'}: "
+                    f"{_type(field.type, declared, is_sent_whole)};\n"
+                    for field in fields
+                ]
+                declared[cls.__name__] = f"export interface {cls.__name__} {{\n{''.join(lines)}}}\n"
+            return cls.__name__
+        case inspect.EnumType(cls=cls):
+            values = "".join(
+                f"\n  | {msgspec.json.encode(value).decode()}" for value in sorted(one.value for one in cls)
+            )
+            declared[cls.__name__] = f"export type {cls.__name__} ={values};\n"
+            return cls.__name__
+        case inspect.UnionType(types=types):
+            return " | ".join(_type(one, declared, is_sent_whole) for one in types)
+        case inspect.ListType(item_type=item):
+            of = _type(item, declared, is_sent_whole)
             return f"({of})[]" if " " in of else f"{of}[]"
-        case {"type": "object", "additionalProperties": dict(values)}:
-            return f"Record<string, {_type(values)}>"
-        case {"type": "integer" | "number"}:
-            return "number"
-        case {"type": "string" | "boolean" | "null" as plain}:
-            return str(plain)
-        case _:
-            return "unknown"
+        case inspect.DictType(value_type=value):
+            return f"Record<string, {_type(value, declared, is_sent_whole)}>"
+    return _PLAIN.get(type(kind), "unknown")
+
+
+def _tag(kind: inspect.StructType) -> list[str]:
+    """Return the field that says which message it is; messages of the bus go to the page without it."""
+    is_tagged = kind.tag is not None and not kind.array_like
+    return [f"  {kind.tag_field}: {msgspec.json.encode(kind.tag).decode()};\n"] if is_tagged else []
 
 
 if __name__ == "__main__":

@@ -6,13 +6,16 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from typer.testing import CliRunner
 
+from backbone.cli import app
 from backbone.component.launch import Launch
 from backbone.core_launches import UpOptions, core_launches
 from backbone.dry_run import dry_run
+from backbone.endings import ExitCode
 from backbone.mission.class_facts import parameters_of
 from backbone.mission.model import MissionDescription
-from backbone.mission.reader import read_mission
+from backbone.mission.reader import MissionInvalid, read_mission
 from backbone.naming import Subsystem
 from backbone.rc_manager.service import RcManagerParameters
 from backbone.scheduling.rules import SchedulingRules, values_of
@@ -81,4 +84,28 @@ def test_the_reference_tells_every_rule_with_its_default_and_meaning() -> None:
     for rule in msgspec.structs.fields(SchedulingRules):
         assert meanings[rule.name]
         default = f"{rule.default:g}" if isinstance(rule.default, float) else rule.default
-        assert f"| `{rule.name}` | `{default}` | {meanings[rule.name]}; " in told
+        shown = f"`{default}`" if default else "–"
+        assert f"| `{rule.name}` | {shown} | {meanings[rule.name]}; " in told
+
+
+@pytest.mark.parametrize(
+    ("planner", "message"),
+    [
+        ("nonsense", "planner='nonsense' is illegal"),
+        ("no.module:Planner", "no.module:Planner: no module no"),
+        ("backbone.scheduling.whole_group:WholePlanner", "(did you mean 'WholeGroupPlanner'?)"),
+    ],
+)
+def test_a_planner_that_is_not_there_is_a_fault_with_its_place(tmp_path: Path, planner: str, message: str) -> None:
+    with pytest.raises(MissionInvalid) as invalid:
+        with_rules(tmp_path, planner=planner)
+    (fault,) = invalid.value.faults
+    assert message in str(fault)
+    assert fault.line == 12
+
+
+def test_a_dry_run_with_a_class_that_is_no_planner_says_so(tmp_path: Path) -> None:
+    with_rules(tmp_path, planner="backbone.scheduling.rules:SchedulingRules")
+    done = CliRunner().invoke(app, ["check", "--dry-run", str(tmp_path / "m.xml")])
+    assert done.exit_code == ExitCode.MISSION_INVALID
+    assert "is no planner: it lacks before, due" in done.output

@@ -185,8 +185,14 @@ FAULTS = [
     Planted(
         "the first in line of a large group is overtaken",
         "large_group.py",
-        "        if any(from_one(first) for first in firsts):\n            return True\n",
-        "",
+        "dict.fromkeys((*firsts, *higher_ones))",
+        "higher_ones",
+    ),
+    Planted(
+        "two equals of a large group, each first where both want to be, wait for each other",
+        "large_group.py",
+        "ahead.isdisjoint(first.uses)",
+        "True",
     ),
     Planted(
         "a slice ends although it is awaited by none",

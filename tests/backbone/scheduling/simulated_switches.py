@@ -28,6 +28,7 @@ from backbone.scheduling.events import (
     Woken,
 )
 from backbone.scheduling.master_schedule import EXACT_UP_TO
+from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
@@ -83,12 +84,14 @@ def ask(
 def manager(
     *, grace_s: float = 0.0, tolerance_s: float = TOLERANCE_S, exact_up_to: int = EXACT_UP_TO, **rules: Any
 ) -> ScheduleManager:
+    chosen = SchedulingRules(grace_s=grace_s, **rules)
     return ScheduleManager(
-        SchedulingRules(grace_s=grace_s, **rules),
+        chosen,
         tolerance_s=tolerance_s,
         exact_up_to=exact_up_to,
         mission=MISSION,
         mission_priority=0,
+        planner=load_planner(chosen.planner),
     )
 
 

@@ -116,6 +116,17 @@ def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardwar
     assert [one for one in found if one.code in SAFETY] == []
 
 
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(550, id="two equals that are each first at an RC of the other's wait for each other for ever"),
+        pytest.param(187, id="an estimate made for one ARC is believed for another"),
+    ],
+)
+def test_in_a_big_group_no_arc_waits_for_rcs_that_are_free_or_served(seed):
+    assert violations(play(*random_mission(Random(seed), exact_up_to=0))) == []
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_in_a_big_group_on_crowded_radios_nobody_is_started_to_be_cut_again_and_again(seed):
     rng = Random(seed)

@@ -29,12 +29,14 @@ KILLED = (signal.SIGKILL, signal.SIGSEGV)
 @contextmanager
 def server(file: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Serve the designer of this file; yields the process and the page's address."""
+    ignored = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # these tests may run under nohup
     process = subprocess.Popen(
         [str(BIN / "scout-console"), "serve", "--design", str(file), "--port", "0"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
+    signal.signal(signal.SIGHUP, ignored)
     with process:
         try:
             assert process.stdout is not None

@@ -190,7 +190,7 @@ class Card {
     const isStopped = robot.stop !== null;
     const whose = robot.is_mine ? "yours" : robot.holder ? "held" : "free";
     set(this.state, !robot.is_up ? "down" : isStopped ? "STOPPED" : whose);
-    const next = robot.waiting.length ? `; next: ${robot.waiting[0].who}` : "";
+    const next = robot.waiting.length ? `; next: ${robot.waiting[0]}` : "";
     const who = robot.is_mine ? "you" : robot.holder;
     set(this.holder, who ? `${who}: ${robot.feedback || robot.because}${next}` : robot.feedback + next);
     const isWanted = own.is_asked && own.robot === this.name;

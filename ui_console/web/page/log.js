@@ -4,7 +4,7 @@ import { find, makeButton } from "./dom.js";
 import { paragraph, span, table } from "./table.js";
 import { seconds, set } from "./text.js";
 
-/** @import { LogFound, LoggedEvent, LogRefused, LogRow, SearchLog, View } from "./messages.d.ts" */
+/** @import { FoundEvent, LogFound, LoggedEvent, LogRefused, SearchLog, View } from "./messages.d.ts" */
 /** @import { Say } from "./types.d.ts" */
 
 const SHOWN = 100; // chosen: as the server hands it out; more at a touch
@@ -20,7 +20,7 @@ export class Found {
   /** @param {number} number */
   constructor(number) {
     this.number = number;
-    /** @type {LoggedEvent[]} */
+    /** @type {FoundEvent[]} */
     this.events = [];
     this.total = this.leftOut = this.since = this.asked = 0;
   }
@@ -182,7 +182,7 @@ export class Log {
   /**
    * Returns what to show: what was found, else the newest.
    *
-   * @param {LogRow[]} newest
+   * @param {LoggedEvent[]} newest
    */
   draw(newest) {
     const rows = this.found === null ? [...newest].reverse() : this.found.events.slice(0, this.shown);
@@ -199,7 +199,7 @@ export class Log {
   }
 }
 
-/** @param {LogRow & { time?: string }} row */
+/** @param {LoggedEvent & { time?: string }} row */
 function cells(row) {
   const time = row.time ? `${row.time.slice(11, 19)} ` : "";
   return [`${time}${seconds(row.at_s)}`, span(row.level, row.level), row.subject, row.what, row.person, row.where];

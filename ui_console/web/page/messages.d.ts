@@ -1,5 +1,14 @@
 // What the page and its server send each other. Written by ui_console/web/page_types.py; change the structs.
 
+export interface Absence {
+  name: string;
+  since_s: number;
+  cause: string;
+  doing: string;
+  remedy: string;
+  vital: boolean;
+}
+
 export type AlarmKind =
   | "absent"
   | "deadline"
@@ -41,16 +50,18 @@ export type Certainty =
   | "now"
   | "past";
 
-export interface ComponentRow {
-  name: string;
+export interface ComponentState {
   address: string;
-  subsystem: string;
   type: string;
   host: string;
   pid: number;
-  state: string;
+  state: LifeState;
   since_s: number;
   feedback: string;
+  requester: string;
+  absent: Absence[];
+  stop: StandingStop | null;
+  user: string;
 }
 
 export interface ConsentView {
@@ -63,19 +74,42 @@ export interface ConsentView {
   line: string;
 }
 
+export interface FoundEvent {
+  at_s: number;
+  level: string;
+  subject: string;
+  what: string;
+  person: string;
+  where: string;
+  cause: string;
+  time: string;
+}
+
 export interface HealthView {
   word: string;
   lines: string[];
 }
 
-export interface HostView {
+export interface HostLoad {
   host: string;
+  tags: string[];
   cpu: number;
   memory: number;
   cores: number;
   components: number;
+}
+
+export interface HostView {
+  load: HostLoad;
   age_s: number;
 }
+
+export type LifeState =
+  | "connecting"
+  | "draining"
+  | "failed"
+  | "ready"
+  | "stopped";
 
 export interface LinkView {
   name: string;
@@ -87,7 +121,7 @@ export interface LinkView {
 export interface LogFound {
   number: number;
   first: number;
-  events: LoggedEvent[];
+  events: FoundEvent[];
   total: number;
   left_out: number;
   since_s: number;
@@ -101,15 +135,6 @@ export interface LogRefused {
   remedy: string;
 }
 
-export interface LogRow {
-  at_s: number;
-  subject: string;
-  what: string;
-  where: string;
-  level: string;
-  person: string;
-}
-
 export interface LoggedEvent {
   at_s: number;
   level: string;
@@ -118,7 +143,6 @@ export interface LoggedEvent {
   person: string;
   where: string;
   cause: string;
-  time: string;
 }
 
 export interface LostView {
@@ -191,19 +215,29 @@ export interface RefusedAnswer {
   refused: string;
 }
 
-export interface RequestRow {
+export type RequestState =
+  | "connecting"
+  | "idle"
+  | "revoking"
+  | "running"
+  | "waiting";
+
+export interface RequestView {
   arc: string;
-  who: string;
-  is_console: boolean;
-  state: string;
+  owner: string;
+  state: RequestState;
   rcs: string[];
-  priority: string;
   since_s: number;
   until_s: number;
   expected_start_s: number;
   because: string;
-  would_change: string;
   blockers: string[];
+  minimum_runtime_s: number;
+  priority: string;
+  turns: number;
+  rule: string;
+  would_change: string;
+  raised: number;
 }
 
 export interface RobotView {
@@ -221,7 +255,7 @@ export interface RobotView {
   lease_left_s: number;
   lease_age_s: number;
   because: string;
-  waiting: WaitingView[];
+  waiting: string[];
   stop: StopView | null;
   video: VideoView | null;
   feedback: string;
@@ -246,6 +280,14 @@ export interface SliceView {
   to_s: number;
   certainty: Certainty;
   is_console: boolean;
+}
+
+export interface StandingStop {
+  number: number;
+  by: string;
+  reason: string;
+  since_s: number;
+  is_confirmed: boolean;
 }
 
 export interface StopView {
@@ -291,21 +333,15 @@ export interface View {
   alarms: AlarmView[];
   drawn: Record<string, number>;
   tree: NodeView[];
-  requests: RequestRow[];
+  requests: RequestView[];
   timeline: TimelineView;
   hosts: HostView[];
   health: HealthView | null;
   parameters: ParameterView[];
-  components: ComponentRow[];
-  log: LogRow[];
+  components: ComponentState[];
+  log: LoggedEvent[];
   now_s: number;
   beat: number | null;
-}
-
-export interface WaitingView {
-  who: string;
-  arc: string;
-  start_s: number;
 }
 
 export interface Welcomed {

@@ -4,8 +4,8 @@ import { paragraph, span, table } from "./table.js";
 import { seconds, set } from "./text.js";
 import { timeline } from "./timeline.js";
 
-/** @import { AlarmView, ComponentRow, LinkView, NodeView, ParameterView } from "./messages.d.ts" */
-/** @import { RequestRow, RobotView, View } from "./messages.d.ts" */
+/** @import { AlarmView, ComponentState, LinkView, NodeView, ParameterView } from "./messages.d.ts" */
+/** @import { RequestView, RobotView, View } from "./messages.d.ts" */
 /** @import { Log } from "./log.js" */
 /** @import { Act } from "./types.d.ts" */
 
@@ -170,7 +170,7 @@ export class Tables {
         seconds(row.until_s),
         seconds(row.lease_left_s),
         row.because,
-        row.waiting.map((one) => one.who).join(", "),
+        row.waiting.join(", "),
       ]),
     );
   }
@@ -190,12 +190,12 @@ export class Tables {
     );
   }
 
-  /** @param {RequestRow[]} rows */
+  /** @param {RequestView[]} rows */
   requests(rows) {
     return table(
       ["who", "state", "resources", "priority", "since", "until", "expected", "because", "ask"],
       rows.map((row) => [
-        row.who,
+        row.owner,
         span(row.state, row.state),
         row.rcs.join(" "),
         row.priority,
@@ -246,11 +246,14 @@ export class Tables {
     );
   }
 
-  /** @param {ComponentRow[]} rows */
+  /** @param {ComponentState[]} rows */
   components(rows) {
     return table(
       ["component", "type", "host", "pid", "state", "does", "ask"],
-      rows.map((row) => [row.name, row.type, row.host, String(row.pid), row.state, row.feedback, this.more(row.name)]),
+      rows.map((row) => {
+        const name = row.address.slice(row.address.indexOf("/") + 1);
+        return [name, row.type, row.host, String(row.pid), row.state, row.feedback, this.more(name)];
+      }),
     );
   }
 

@@ -1,0 +1,48 @@
+"""A planner of one's own, named by its class path in the mission file."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Protocol, cast
+
+from backbone.errors import Refusal
+from backbone.scheduling.planner import Planner
+from backbone.scheduling.table import Table
+
+
+class PlannerType(Protocol):
+    """The class of a planner."""
+
+    def __call__(self, table: Table, *, slack_s: float) -> Planner:
+        """Return a planner that has planned nothing yet.
+
+        Args:
+            table: What it may ask of the schedule.
+            slack_s: By how much two reservations may overlap.
+        """
+
+
+class WrongPlanner(Refusal):
+    """A class path does not lead to a planner."""
+
+    code = "scheduler.planner"
+    remedy = "Write the planner as package.module:Class, a class with all of backbone.scheduling.planner:Planner."
+
+
+def load_planner(class_path: str) -> PlannerType | None:
+    """Return the planner class at ``package.module:Class``; None for an empty path.
+
+    Raises:
+        WrongPlanner: There is none, or it lacks a method of a planner.
+    """
+    if not class_path:
+        return None
+    module, _, name = class_path.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise WrongPlanner(f"{class_path}: {error}", class_path=class_path) from error
+    lacking = sorted(one for one in vars(Planner) if not one.startswith("_") and not hasattr(found, one))
+    if lacking or not isinstance(found, type):
+        raise WrongPlanner(f"{class_path} is no planner: it lacks {', '.join(lacking)}", class_path=class_path)
+    return cast(PlannerType, found)
