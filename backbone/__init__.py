@@ -1,1 +1,1 @@
-"""Core services and everything components need to talk: bus, clock, life cycle, mission file, recording."""
+"""Core services, and what all components use: bus, clock, life cycle, mission file."""

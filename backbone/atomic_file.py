@@ -1,7 +1,7 @@
-"""Replacing a file in one step: every reader finds all of the old content or all of the new, also after a power cut.
+"""Atomic replacement of a file: a reader finds the whole old or the whole new content, also after a power cut.
 
-The new content is first written beside the file, under one fixed hidden name that its writer holds locked. A writer
-that is killed there leaves that one file, unlocked; the next writer uses it up, ``remove_leftover`` removes it.
+A writer first writes the new content beside the file, under a fixed hidden name that it holds locked. A killed writer
+leaves this hidden file unlocked; the next writer reuses it, ``remove_leftover`` removes it.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ _NO_FOLDER_SYNC = (errno.EINVAL, errno.ENOTSUP)
 
 
 def replace_file(target: Path, content: bytes, *, is_lasting: bool = True) -> None:
-    """Have a file hold this content; its mode stays, a new file gets the usual one.
+    """Replace the content of a file; the file keeps its mode, a new file gets the usual one.
 
     Args:
         target: The file; its folder exists.
-        content: All of it.
-        is_lasting: True: it outlives a power cut from now on. False: for files that mean nothing after one.
+        content: The whole new content.
+        is_lasting: True: the new content survives a power cut. False: for files that are useless after one.
 
     Raises:
-        OSError: The system refused, or another process writes the file just now; its content is as it was.
+        OSError: The system refused, or another process is writing the file; its content is unchanged.
     """
     beside = _beside(target)
     descriptor = _claim(beside, os.O_CREAT)
@@ -49,15 +49,15 @@ def replace_file(target: Path, content: bytes, *, is_lasting: bool = True) -> No
 
 
 def remove_leftover(target: Path) -> bool:
-    """Remove the leftover of a writer of this file that was killed; return whether there was one.
+    """Remove the hidden file of a killed writer; return whether there was one.
 
     Raises:
-        OSError: It is there and cannot be removed.
+        OSError: The hidden file cannot be removed.
     """
     beside = _beside(target)
     try:
         descriptor = _claim(beside, 0)
-    except (FileNotFoundError, BlockingIOError):  # none, or its writer lives
+    except (FileNotFoundError, BlockingIOError):  # no hidden file, or its writer lives
         return False
     try:
         os.unlink(beside)
@@ -67,10 +67,10 @@ def remove_leftover(target: Path) -> bool:
 
 
 def write_all(descriptor: int, content: bytes) -> None:
-    """Write all of the content, which one call to the system need not do.
+    """Write all of the content; one system call may write only a part.
 
     Raises:
-        OSError: The system refused; a part may be written.
+        OSError: The system refused; a part may have been written.
     """
     rest = memoryview(content)
     while rest:
@@ -82,7 +82,7 @@ def _beside(target: Path) -> Path:
 
 
 def _claim(path: Path, flags: int) -> int:
-    """Return a descriptor of the file at this path, held by this writer alone.
+    """Open the file with an exclusive lock and return its descriptor.
 
     Raises:
         BlockingIOError: Another writer holds it.
@@ -96,11 +96,11 @@ def _claim(path: Path, flags: int) -> int:
         except BaseException:
             os.close(descriptor)
             raise
-        os.close(descriptor)  # its writer was done with it before we held it: the name is free again
+        os.close(descriptor)  # its writer had finished before this one held it: the name is free again
 
 
 def is_at(descriptor: int, path: Path) -> bool:
-    """Say whether the open file is the one at this path."""
+    """Return whether the open file is the one at this path."""
     try:
         there = os.stat(path, follow_symlinks=False)
     except FileNotFoundError:

@@ -1,7 +1,7 @@
-"""What can be seen and changed of a mission that is up: priorities, places in the tree, run times, parameters.
+"""Attributes of a mission that is up: priorities, places in the behavior tree, run times, parameters.
 
-Each change goes to whoever keeps the truth of it: priority and place to the RC manager, run times to
-the ARC, which asks by them, everything else to the component itself.
+Each change goes to the owner of the value: priority and place to the RC manager, run times to the ARC, which puts them
+into its requests, parameters to the component.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ from backbone.wire import plain
 PRIORITY, PARENT = "priority", "parent"
 RUN_TIMES = ("minimum_runtime_s", "maximum_runtime_s")
 
-REPLY_TIME_S = 2.0  # chosen: a person waits this long
+REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
 
 
 class WrongAttribute(Refusal):
-    """There is no such attribute to be changed, or the value does not fit it; nothing changed."""
+    """The attribute does not exist, or the value does not fit it; nothing is changed."""
 
     code = "attribute.wrong"
-    remedy = "See 'scout-backbone set NAME' for what there is; a priority is a whole number, a parent a node's name."
+    remedy = "See 'scout-backbone set NAME' for its attributes; a priority is a whole number, a parent a node's name."
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What there is to see of one name; at least one of both.
+    """Attributes of one name: requests, parameters, or both.
 
     Attributes:
-        name: What was asked about.
-        requests: What it, or all at and below it, ask for.
-        parameters: Of the component of this name; None: there is none.
+        name: The name.
+        requests: Requests of this ARC, or of all ARCs at and below this node.
+        parameters: Parameters of the component of this name; None: no component has it.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Shown:
     parameters: Mapping[str, Any] | None
 
     def lines(self) -> list[str]:
-        """Return all of it for people."""
+        """Return all attributes as lines for people."""
         lines = [line for request in self.requests for line in _request_lines(request)]
         if self.parameters is not None:
             lines.append(f"{self.name}: parameters")
@@ -61,10 +61,10 @@ class Shown:
         return lines
 
     def of(self, attribute: str) -> list[str]:
-        """Return one attribute for people: of the component, or of each of its requests.
+        """Return one attribute of the component, or of each request, as lines for people.
 
         Raises:
-            WrongAttribute: There is none of this name.
+            WrongAttribute: No attribute has this name.
         """
         if self.parameters is not None and attribute in self.parameters:
             return [f"{self.name}: {attribute} is {value_text(self.parameters[attribute])}"]
@@ -78,15 +78,15 @@ class Shown:
         return lines
 
     def to_json(self) -> dict[str, Any]:
-        """Return all of it as plain data."""
+        """Return all attributes as plain data."""
         return {"name": self.name, "requests": [*map(_plain, self.requests)], "parameters": self.parameters}
 
 
 async def attributes_of(bus: Bus, name: str) -> Shown:
-    """Return what there is to see of a component, an ARC's request, or a node of the behavior tree.
+    """Return the attributes of a component, an ARC's request, or a node of the behavior tree.
 
     Raises:
-        UnknownName: Nothing has this name; the nameserver tells the likeliest that was meant.
+        UnknownName: Nothing has this name; the detail suggests the nearest name.
         LinkError: Nameserver, RC manager or component did not answer.
     """
     values, requests, unknown = None, list[RequestAttributes](), None
@@ -104,21 +104,21 @@ async def attributes_of(bus: Bus, name: str) -> Shown:
 
 
 async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> list[str]:
-    """Change one attribute of what runs; everybody plans by the new value from then on.
+    """Change one attribute; the next decision of RC manager, ARC or component uses the new value.
 
     Args:
-        bus: To the mission.
-        name: Of a component, an ARC, a console, or a node of the behavior tree.
+        bus: Bus to the mission.
+        name: Name of a component, an ARC, a console, or a node of the behavior tree.
         attribute: ``priority``, ``parent``, a run time, or a parameter of the component.
         value: The new value.
-        user: Who wants it, for the record.
+        user: The person who changes it, for the story.
 
     Returns:
-        What holds now, for people.
+        The present values, for people.
 
     Raises:
-        Refusal: It cannot be so; nothing changed.
-        LinkError: Somebody did not answer; the outcome is unknown.
+        Refusal: The value is impossible; nothing is changed.
+        LinkError: A component did not answer; the outcome is unknown.
     """
     if attribute == PRIORITY:
         return await _set_priority(bus, name, value)

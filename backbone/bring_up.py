@@ -1,7 +1,7 @@
 """Bring a mission up in the papers' order, keep its core services alive, take it down in reverse.
 
-The launcher is itself a component (``backbone/launcher``): it can be asked for its processes and
-told to stop. It starts only core services; everything else is asked of the placer, like everybody does.
+The launcher is a component (``backbone/launcher``), which lists its processes and can be stopped. It starts only the
+core services, and asks the placer to start all other components.
 
 Source: RAM 2002, "Backbone": nameserver, component database, placer, creators, static dependency
 database, RC manager, then the mission.
@@ -66,22 +66,22 @@ from backbone.wire import Envelope, Message
 log = logging.getLogger(__name__)
 
 START_TIME_S = 40.0  # chosen: a renderer on a slow machine opens within half of it
-STOP_TIME_S = 10.0  # chosen: asking, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
+STOP_TIME_S = 10.0  # chosen: request, SIGTERM and SIGKILL take 2 s in all; a busy machine takes longer
 LISTING_TIME_S = 1.0  # chosen: a thousand round trips
 CORE_POLICY = RestartPolicy(
     back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
-)  # chosen: a dead hub stops everybody, and leases outlast a restart of the RC manager only if its pause stays short
-MEET_TIME_S = 5.0  # chosen: the placer hears of a creator milliseconds after its token, on a busy machine later
-MEET_EACH_S = 0.1  # chosen: nobody notices this pause, and it is a hundred times what asking costs
+)  # chosen: a dead hub stops all components, and leases outlast a restart of the RC manager only if its pause is short
+MEET_TIME_S = 5.0  # chosen: the placer knows a creator milliseconds after its token rises, on a busy machine later
+MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost of a question
 
 
 @dataclass
 class Outcome:
-    """How a mission went.
+    """The outcome of a mission.
 
     Attributes:
-        ready_after_s: Seconds of the machine from the beginning to all ready; None if it never was.
-        failure: Why it ended badly, None if it did not.
+        ready_after_s: Seconds of the machine from the start until all was ready; None if it was never ready.
+        failure: Why it failed; None if it did not fail.
         ended: How each process ended, in the order of their ends.
     """
 
@@ -91,37 +91,37 @@ class Outcome:
 
     @property
     def pushed(self) -> list[ProcessEnded]:
-        """Those that could not be asked, as they were only starting or did not answer, and were not merely asked."""
+        """Processes that needed a signal, because they were starting or did not answer."""
         return [end for end in self.ended if end.by in (EndedBy.SIGTERM, EndedBy.SIGKILL)]
 
     @property
     def went_well(self) -> bool:
-        """True if it came up, nothing failed, and every process ended in good order, be it after SIGTERM."""
+        """True if it came up, nothing failed, and every process ended in good order or by SIGTERM."""
         killed = any(end.by is EndedBy.SIGKILL for end in self.ended)
         return self.ready_after_s is not None and self.failure is None and not killed
 
 
 class Observer(Protocol):
-    """Who watches a mission come up and go down."""
+    """Shows a mission's bring-up, run and end to a person."""
 
     def began(self, step: str) -> None:
-        """Take note that this step has begun."""
+        """Show that this step has begun."""
 
     def done(self, step: str, took_s: float) -> None:
-        """Take note that this step is done after these seconds of the machine."""
+        """Show that this step is done after these seconds of the machine."""
 
     def announce(self, line: str) -> None:
-        """Show a person what to know or do now."""
+        """Show a message to the person."""
 
     def connected(self, bus: Bus) -> None:
-        """Listen to what the mission says; the hub is up, nothing else is."""
+        """Subscribe to the mission's messages. Called when only the hub is up."""
 
     async def up(self, bus: Bus, clock: Clock) -> None:
-        """Do what is to be done while the mission is up; cancelled when it ends."""
+        """Run while the mission is up; cancelled when it ends."""
 
 
 class Launcher(Component[NoParameters]):
-    """Starts core services and mission, restarts core services, stops all."""
+    """Starts the core services and the mission, restarts core services, stops all."""
 
     accepts: ClassVar[Any] = ListProcesses | AskLog | AskPeople
 
@@ -152,14 +152,14 @@ class Launcher(Component[NoParameters]):
         keeper.on_changed = self.changed
 
     async def connect(self) -> None:
-        """Start the core services in order, each waited for until it is ready."""
+        """Start the core services in order; start each when the one before is ready."""
         for launch in core_launches(self._description, self.launch, self._options):
             async with self._step(launch.name):
                 await self._keeper.start(launch, CORE_POLICY, READY_WITHIN_S)
         self.bus.watch_alive(f"{Subsystem.BACKBONE}/*", self._backbone_changed)
 
     async def serve(self) -> None:
-        """Start the mission through the placer, then let it run; publish its health meanwhile."""
+        """Start the mission through the placer and keep it running; publish its health."""
         self.start_task(self._health_watch.run(), "health")
         try:
             await self._start_mission()
@@ -188,7 +188,7 @@ class Launcher(Component[NoParameters]):
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Tell of the core services' processes, and of what happened in the mission."""
+        """Answer ``ListProcesses`` for the core services, ``AskLog`` and ``AskPeople``."""
         match asked.body:
             case ListProcesses():
                 return Processes(self.launch.host, [], self._keeper.processes())
@@ -199,7 +199,7 @@ class Launcher(Component[NoParameters]):
         return await super().answer(asked)
 
     def absences(self) -> list[Absence]:
-        """Return what is missing of the mission file: core services, components, machines; and what its look missed."""
+        """Return the absent core services, components and machines, and the absences of the health watch."""
         return [*self._own_absences(), *self._health_watch.absences()]
 
     def _own_absences(self) -> list[Absence]:
@@ -210,14 +210,14 @@ class Launcher(Component[NoParameters]):
         return [*core, *mission, *self._others.absences()]
 
     def _being_started(self) -> str:
-        """Return which components the start waits for, and what they say they are doing."""
+        """Return the components for which the start waits, with their feedback."""
         processes = self._health_watch.picture.processes
         doing = {name: processes[name].doing for name in self._awaited if name in processes}
         starts = [f"{name} ({doing[name]})" if doing.get(name) else name for name in sorted(self._awaited)]
         return f"starts {', '.join(starts)}" if starts else "starts its services"
 
     async def drain(self) -> None:
-        """Stop the mission in reverse order of its start, then the core services but the nameserver."""
+        """Stop the mission in reverse order of its start, then the core services except the nameserver."""
         async with self._step("stop consoles"):
             await self._stop_consoles()
         async with self._step("stop mission"):
@@ -268,10 +268,10 @@ class Launcher(Component[NoParameters]):
             await self._start_all(behavior_orders(description))
 
     async def _start_all(self, orders: list[Start]) -> None:
-        """Have all of them running, and running again whenever one is missing; return when all run.
+        """Start all components and keep them running; return when all run.
 
         Raises:
-            Refusal: The first that could not be started.
+            Refusal: The first refusal of a start.
         """
         placed = [asyncio.get_running_loop().create_future() for _ in orders]
         for order, first in zip(orders, placed, strict=True):
@@ -279,7 +279,7 @@ class Launcher(Component[NoParameters]):
         await asyncio.gather(*placed)
 
     async def _keep(self, order: Start, placed: asyncio.Future[None]) -> None:
-        """Fulfill one wish of the mission file; an order to stop suspends it until the component is started again."""
+        """Keep one wish of the mission file; an order to stop suspends it until the component is started again."""
 
         def now_placed(_placement: Placement, _was_there: bool) -> None:
             self._awaited.discard(order.name)
@@ -299,7 +299,7 @@ class Launcher(Component[NoParameters]):
                 return
             finally:
                 self._wishes.remove(wish)
-            if not placed.done():  # stopped before it ran: the start of the mission does not wait for it
+            if not placed.done():  # stopped before it ran: the bring-up does not wait for it
                 placed.set_result(None)
             self._awaited.discard(order.name)
             self.tell(order.name, f"is not wanted any more: {stopped}")
@@ -312,7 +312,7 @@ class Launcher(Component[NoParameters]):
     async def _keep_placed(
         self, wish: Wish, order: Start, at: str, now_placed: Callable[[Placement, bool], None]
     ) -> str:
-        """Keep it placed; begin anew while another machine is missing, or may not have met the placer yet."""
+        """Keep it placed; repeat a refused start while another machine is missing or is new to the placer."""
         until_s = time.monotonic() + MEET_TIME_S
         while True:
             try:
@@ -328,8 +328,8 @@ class Launcher(Component[NoParameters]):
 
     # ------------------------------------------------------------------ stop
     async def _stop_consoles(self) -> None:
-        """Tell every console that the mission ends; each gives its robot back."""
-        with contextlib.suppress(LinkError):  # no nameserver: no console can be reached either
+        """Ask every console to stop; each gives its robot back."""
+        with contextlib.suppress(LinkError):  # without a nameserver no console can be reached
             listing = await self.bus.ask(
                 NAMESERVER, ListComponents(subsystem=Subsystem.UI_CONSOLE), Components, within_s=LISTING_TIME_S
             )
@@ -340,13 +340,13 @@ class Launcher(Component[NoParameters]):
             await asyncio.gather(*stops, return_exceptions=True)
 
     async def _stop_mission(self) -> None:
-        """Stop behaviors first, children by their parents, then what ARCs are left, then hardware."""
+        """Stop behaviors first, which stop their children, then the remaining ARCs, then hardware."""
         description = self._description
         roots = [order.name for order in behavior_orders(description)]
         hardware = [r.name for r in description.resources] + [c.name for c in description.components]
         for name in reversed(roots):
             await self._stop(name)
-        with contextlib.suppress(LinkError, Refusal):  # no placer: its creators end what is left
+        with contextlib.suppress(LinkError, Refusal):  # without a placer the creators end the rest
             left = await self.bus.ask(PLACER, ListPlacements(), Placements, within_s=LISTING_TIME_S)
             others = [p.name for p in left.placements if p.name not in hardware]
             await asyncio.gather(*(self._stop(name) for name in others))
@@ -362,7 +362,7 @@ class Launcher(Component[NoParameters]):
         self.outcome.ended.append(ProcessEnded(name, ended.by, 0))
 
     async def _stop_other_hosts(self) -> None:
-        """Have the other machines end their creators and return when they did; a silent one ends all by itself."""
+        """Ask the other machines to end their creators, and wait; a silent machine ends its creator by itself."""
         stops = (
             self.bus.ask(offer, Stop("the mission ends"), Stopping, within_s=LISTING_TIME_S)
             for offer in self._others.offering
@@ -394,13 +394,13 @@ class Launcher(Component[NoParameters]):
 
 
 async def run_mission(description: MissionDescription, options: UpOptions, observer: Observer) -> Outcome:
-    """Bring the mission up, let it run, take it down; nothing of it is left when this returns.
+    """Bring the mission up, run it, take it down; return when all its processes and files are gone.
 
     Raises:
         MissionAlreadyUp: A mission of this name runs on this machine.
-        RunFolderUnusable: Its files cannot be written.
-        TraceUnwritable: Its trace cannot be written.
-        BackboneError: The nameserver could not be started.
+        RunFolderUnusable: The run folder is not writable.
+        TraceUnwritable: The trace is not writable.
+        BackboneError: The nameserver did not start.
     """
     began_s = time.monotonic()
     share_heaps()
@@ -473,6 +473,6 @@ async def end_mission(bus: Bus) -> None:
     """Ask the launcher to take its mission down.
 
     Raises:
-        LinkError: It did not answer.
+        LinkError: The launcher did not answer.
     """
-    await bus.ask(LAUNCHER, Stop(f"told by {component_of(bus.source)}"), Stopping, within_s=LISTING_TIME_S)
+    await bus.ask(LAUNCHER, Stop(f"ordered by {component_of(bus.source)}"), Stopping, within_s=LISTING_TIME_S)

@@ -1,7 +1,7 @@
 """The command line ``scout-backbone``.
 
-Data goes to stdout, talk to stderr. What a command needs is imported inside it, so that ``--help``
-and ``check`` stay quick. Exit codes are those of ARCHITECTURE.md, section 5; see ``ExitCode``.
+Data goes to stdout, messages to stderr. A command imports its modules itself, so that ``--help`` and ``check`` stay
+quick. Exit codes are those of ``ExitCode``.
 """
 
 from __future__ import annotations
@@ -50,13 +50,13 @@ app = typer.Typer(
 
 EXPERIMENTS = "mission_control.experiments.cli"
 SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
-LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to work out
-LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer one is a slip of the hand
+LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to compute
+LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer time is a typing error
 MOST_SEEDS = 1_000_000  # chosen: a day of work
-LARGEST_SEED = 2**32 - 1  # as numpy has it
+LARGEST_SEED = 2**32 - 1  # the limit of numpy
 MOST_EVENTS = 10_000  # as in mission_log
 LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link
-PIPE_WIDTH = 180  # chosen: into a file or pipe nothing is cut; no table is wider
+PIPE_WIDTH = 180  # chosen: no table is wider, so files and pipes get whole tables
 
 
 def main() -> None:
@@ -98,10 +98,10 @@ def connected(
 
 
 def read_secret_option(secret_file: Path | None) -> str:
-    """Return the secret in that file, or typed unseen for ``-``; empty if none was named.
+    """Return the secret in the file, or typed without echo for ``-``; empty if no file is named.
 
     Raises:
-        NoSecret: There is none in it.
+        NoSecret: The file or the input holds no secret.
     """
     from getpass import getpass
 
@@ -159,7 +159,7 @@ def check(
 
 
 def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> ExitCode:
-    """Print a dry run; return how the mission would come up."""
+    """Print a dry run; return the exit code."""
     from rich.console import Console
 
     from backbone.dry_run import FIRST_MINUTE_S, dry_run
@@ -252,7 +252,7 @@ def why(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Say why a request waits or runs, why a component is where it is, until when."""
+    """Explain why a request waits or runs, until when, and why a component is on its host."""
 
     async def work() -> int:
         from backbone.reasons import reasons_for
@@ -273,7 +273,7 @@ def story(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Tell the events that touched a component, request or resource, with their causes."""
+    """Print the events about a component, request or resource, with their causes."""
 
     async def work() -> int:
         from backbone.log_lines import story_json, story_lines
@@ -286,7 +286,7 @@ def story(
         if not told.events:
             say(f"no component has an event about {name}")
         if told.missing:
-            say(f"incomplete: {counted(len(told.missing), 'component')} did not tell their part")
+            say(f"incomplete: {counted(len(told.missing), 'component')} did not answer")
             for missing in told.missing:
                 say(f"  {missing}")
         return ExitCode.DONE
@@ -301,20 +301,22 @@ def log(
     ] = "0",
     until: Annotated[str, typer.Option("--until", help="Not after; as --since.")] = "",
     robot: Annotated[
-        str, typer.Option("--robot", autocompletion=complete_resource, help="Only what is about this robot, or name.")
+        str, typer.Option("--robot", autocompletion=complete_resource, help="Only events about this robot, or name.")
     ] = "",
     person: Annotated[
-        str, typer.Option("--person", autocompletion=complete_person, help="Only what this person did, or is told of.")
+        str, typer.Option("--person", autocompletion=complete_person, help="Only actions and mentions of this person.")
     ] = "",
-    level: Annotated[LogLevel, typer.Option("--level", help="Only what matters at least so much.")] = LogLevel.INFO,
-    text: Annotated[str, typer.Option("--text", help="Only what has this text in it.")] = "",
-    most: Annotated[int, typer.Option("--most", min=1, max=MOST_EVENTS, help="At most so many, the newest.")] = 1_000,
+    level: Annotated[LogLevel, typer.Option("--level", help="Only events of at least this level.")] = LogLevel.INFO,
+    text: Annotated[str, typer.Option("--text", help="Only events that contain this text.")] = "",
+    most: Annotated[
+        int, typer.Option("--most", min=1, max=MOST_EVENTS, help="Largest number of events, the newest.")
+    ] = 1_000,
     as_json: AsJson = False,
     mission: MissionName = None,
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Tell what happened in the mission and what people did: the newest that fit the options, oldest first."""
+    """Print the events of the mission and the actions of people: the newest that match, oldest first."""
 
     async def work() -> int:
         from datetime import datetime
@@ -331,11 +333,11 @@ def log(
             told = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
         show([json.dumps(log_json(told, now))] if as_json else log_lines(told, now))
         if not told.events:
-            say("nothing of that kind happened")
+            say("no event matches")
         if told.left_out:
             say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
         if told.since_s > asked.since_s:
-            say(f"what was before {told.since_s:.1f} s is not kept any more")
+            say(f"events before {told.since_s:.1f} s are no longer kept")
         return ExitCode.DONE
 
     run(work)
@@ -345,7 +347,7 @@ def log(
 def start(
     type_: Annotated[str, typer.Argument(metavar="TYPE", help="Component type of the mission.")],
     name: Annotated[str, typer.Option("--name", help="Name; default: numbered by the placer.")] = "",
-    host: Annotated[str, typer.Option("--host", help="Must run there.")] = "",
+    host: Annotated[str, typer.Option("--host", help="The only possible host.")] = "",
     parameter: Annotated[
         list[str] | None, typer.Option("--parameter", help="NAME=VALUE, value as JSON or text; repeatable.")
     ] = None,
@@ -384,7 +386,7 @@ def stop(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Stop one component for good."""
+    """Stop one component; it is not restarted."""
 
     async def work() -> int:
         from backbone.operators import OperatorAction, tell_acted
@@ -417,7 +419,7 @@ def set_(
     connect: Endpoint = None,
     secret_file: SecretFile = None,
 ) -> None:
-    """Set priority, parent or a run time of whoever asks for resources, or any parameter; without a value show it."""
+    """Set priority, parent or a run time of an owner of ARCs, or any parameter; without a value show it."""
     if value is not None and as_json:
         raise typer.BadParameter("--json shows attributes; leave the value out")
 
@@ -459,7 +461,7 @@ def creator(
     connect: Annotated[str, typer.Option("--connect", callback=hub_endpoint, help="The mission's hub, tcp/HOST:PORT.")],
     mission: Annotated[str, typer.Option("--mission", help="Name of the mission.")],
     secret_file: SecretFile = None,
-    tag: Annotated[list[str] | None, typer.Option("--tag", help="What this machine has; repeatable.")] = None,
+    tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
 ) -> None:
     """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
 
@@ -502,7 +504,7 @@ def experiment(context: typer.Context) -> None:
 
 
 def _width() -> int | None:
-    """Return how wide tables are; None: as the terminal."""
+    """Return the width of tables; None: the terminal's."""
     return None if sys.stdout.isatty() else PIPE_WIDTH
 
 

@@ -1,6 +1,6 @@
-"""What the command lines share: options, completed names, whole summaries, and a table that loads only what it needs.
+"""Shared parts of the command lines: options, completed names, whole summaries, and a table of commands.
 
-A completion imports what it needs when a shell asks for it, so that ``--help`` stays quick.
+A completion imports its modules when a shell asks for it, so that ``--help`` stays quick.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixs
 
 
 def hub_endpoint(value: str | None) -> str | None:
-    """Refuse what names no hub; for options that take an endpoint."""
+    """Refuse a text that is no endpoint of a hub; for options that take an endpoint."""
     if value is not None and ENDPOINT.fullmatch(value) is None:
         raise typer.BadParameter(f"{value!r} is no endpoint; write tcp/HOST:PORT, for example tcp/192.0.2.7:7447")
     return value
@@ -89,9 +89,9 @@ def complete_mission() -> list[str]:
 
 
 def picture_for(ctx: typer.Context) -> Any:
-    """Return the picture of the mission that the words typed so far name; None if there is none.
+    """Return the picture of the mission that the typed words name; None if it is not up.
 
-    The bus is loaded only if there is a mission to ask.
+    The bus is loaded only if a mission is up.
     """
     mission, endpoint = ctx.params.get("mission"), ctx.params.get("connect")
     can_ask = (mission and ENDPOINT.fullmatch(endpoint)) if endpoint is not None else complete_mission()
@@ -104,7 +104,7 @@ def picture_for(ctx: typer.Context) -> Any:
 
 
 def complete_name(ctx: typer.Context) -> list[str]:
-    """Return what can be asked about in the mission that is up."""
+    """Return the names that questions may use in the mission that is up."""
     picture = picture_for(ctx)
     if picture is None:
         return []
@@ -167,7 +167,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 
 
 def finite(value: float | None) -> float | None:
-    """Refuse what is no number, which no range refuses; for options with a range."""
+    """Refuse NaN, which no range refuses; for options with a range."""
     if value is not None and not math.isfinite(value):
         raise typer.BadParameter(f"{value} is no finite number; see the range in --help")
     return value

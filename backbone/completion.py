@@ -1,6 +1,6 @@
 """Names of a mission that is up, for shells that complete them.
 
-A shell waits for the answer with the person: what cannot be had at once is left out, and nothing is ever complained of.
+A person waits for the completion, so names that do not arrive at once are left out, and errors are not printed.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
 from backbone.people import is_console
 
-WITHIN_S = 1.5  # chosen: a person who pressed Tab waits no longer
+WITHIN_S = 1.5  # chosen: a person does not wait longer after Tab
 
 
 def names_of(picture: MissionPicture) -> list[str]:
-    """Return what can be asked about: components, requests, resources, hosts and people, sorted, each once."""
+    """Return the names of components, requests, resources, hosts and people, sorted, each once."""
     schedule = picture.schedule
     names = {component_of(at) for at in picture.components}
     names |= {component.host for component in picture.components.values() if component.type == CREATOR}
@@ -31,22 +31,22 @@ def names_of(picture: MissionPicture) -> list[str]:
 
 
 def resources_of(picture: MissionPicture) -> list[str]:
-    """Return the resources that can be held, sorted."""
+    """Return the names of resources, sorted."""
     return sorted(rc.rc for rc in picture.schedule.rcs) if picture.schedule else []
 
 
 def people_of(picture: MissionPicture) -> list[str]:
-    """Return the people who sit at consoles, sorted."""
+    """Return the people at consoles, sorted."""
     return sorted({c.user for at, c in picture.components.items() if is_console(at) and is_word(c.user)})
 
 
 def is_word(text: str) -> bool:
-    """Say whether a shell takes the text as one word."""
+    """Return whether a shell takes the text as one word."""
     return bool(text) and text.isprintable() and not any(each in text for each in " \t'\"\\$`&|;<>()*?[]#~=%!{}:")
 
 
 def picture_now(mission: str | None, connect: str | None, secret_file: Path | None) -> MissionPicture | None:
-    """Return how a mission is; None if there is none, or it does not answer ``WITHIN_S``."""
+    """Return the picture of a mission; None if no mission is up or it does not answer within ``WITHIN_S``."""
 
     async def looked() -> MissionPicture:
         secret = read_secret_file(secret_file) if connect is not None and secret_file is not None else ""

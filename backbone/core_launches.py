@@ -1,4 +1,4 @@
-"""The launches of a mission's core services: which class with which parameters, on which host."""
+"""Launches of a mission's core services: class, parameters and host of each."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from backbone.naming import Subsystem
 
 @dataclass(frozen=True)
 class UpOptions:
-    """How a mission is run.
+    """Options of ``scout-backbone up``.
 
     Attributes:
         speed: Mission seconds per second of the machine.
         trace: File for the schedule trace, or None.
-        for_s: Mission seconds after readiness until it ends by itself, or None: until told.
+        for_s: Mission seconds from readiness to the end; None: until an order ends it.
     """
 
     speed: float = 1.0
@@ -36,7 +36,7 @@ class UpOptions:
 def core_launches(description: MissionDescription, own: Launch, options: UpOptions) -> list[Launch]:
     """Return the launches of the core services after the nameserver, in the papers' order.
 
-    Hosts that are other machines start their creator themselves (``scout-backbone creator``).
+    On other machines a person or service manager starts the creator (``scout-backbone creator``).
     """
     types = [msgspec.to_builtins(component_type) for component_type in description.types]
     resources = [msgspec.to_builtins(resource) for resource in description.resources]
@@ -71,7 +71,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
 
 
 def launcher_launch(description: MissionDescription, endpoint: str, clock: MissionClock, directory: Path) -> Launch:
-    """Return the launch of the launcher itself, of which those of the core services are made."""
+    """Return the launch of the launcher, from which the launches of the core services are made."""
     return Launch(
         mission=description.name,
         subsystem=Subsystem.BACKBONE,

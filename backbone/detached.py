@@ -1,4 +1,4 @@
-"""``up --detach`` and ``down``: a launcher without a terminal, and how to end one."""
+"""``up --detach`` and ``down``: start a launcher without a terminal, and end one."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty component
 
 
 def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path | None, for_s: float | None) -> int:
-    """Start a launcher in a session of its own; return 0 when all is ready, else how its mission failed.
+    """Start a launcher in a session of its own; return 0 when all is ready, else the exit code of its failure.
 
-    The launcher's verdict alone decides: that its process still lives proves nothing, because it cleans up.
+    Only the launcher's verdict decides, because its process still lives while it cleans up after a failure.
     """
     told, telling = os.pipe()
     command = [sys.executable, "-m", "backbone.cli", "up", str(mission_file.absolute()), "--headless"]
@@ -56,7 +56,7 @@ def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path |
 
 
 def _died(launcher: subprocess.Popen[bytes]) -> int:
-    """Return the exit code for a launcher whose pipe ended without a verdict."""
+    """Return the exit code for a launcher that ended without a verdict."""
     try:
         ended = launcher.wait(KILL_S)
     except subprocess.TimeoutExpired:
@@ -68,7 +68,7 @@ def _died(launcher: subprocess.Popen[bytes]) -> int:
 
 
 async def take_down(mission: str | None) -> int:
-    """End a mission of this machine and return when nothing of its launcher is left."""
+    """End a mission of this machine and return when its launcher has ended."""
     found = run_files.find(mission)
     launcher = psutil.Process(found.launcher_pid)
     waiting = os.pidfd_open(launcher.pid)

@@ -1,8 +1,8 @@
-"""Dry run of a mission: where its components would go, and the beginning of its master schedule.
+"""Dry run of a mission: the hosts of its components, and the begin of its master schedule.
 
-Nothing is started. Every host counts as idle and alike, every component comes up at once, every
-behavior claims its ARC at the beginning and goes on with it, no console is attached. The placer's
-and the RC manager's own deciding code is asked, so what it shows is what a mission without surprises does.
+A dry run starts no process. It assumes that all hosts are equal and idle, that every component comes up at once, that
+every behavior claims its ARC at the begin and keeps it, and that no console attaches. It calls the deciding code of the
+placer and of the RC manager, so its result equals a mission without disturbances.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ FIRST_MINUTE_S = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """One component and where it would go.
+    """One component and its host.
 
     Attributes:
         name: Its name.
         type: Its component type.
-        host: Its host; empty: none can take it.
-        reasons: Why there, or why nowhere; one line a host.
+        host: Its host; empty: no host is possible.
+        reasons: The reasons of the choice or of the refusal, one line a host.
     """
 
     name: str
@@ -56,19 +56,19 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class Claimed:
-    """The request of one behavior's ARC and what became of it.
+    """The request of one behavior's ARC and its outcome.
 
     Attributes:
         arc: Name of the ARC.
         behavior: Name of its owner.
         priority: The owner's place in the tree, for people: ``mission:10/watch:3``.
-        rcs: The RCs chosen for it; empty: it was refused.
+        rcs: Its RCs; empty: it was refused.
         minimum_s: Shortest useful time, seconds.
-        refused: Why it can never be served; empty: it was taken.
+        refused: Why it can never be served; empty: it was admitted.
         turns: Grants until the end of the dry run.
-        first_grant_s: Mission time of the first; None: there was none.
-        worst_wait_s: Longest wait, one that goes on at the end included.
-        why: Where it is at the end and because of whom; None: it was refused.
+        first_grant_s: Mission time of the first grant; None: no grant.
+        worst_wait_s: Longest wait, including a wait at the end.
+        why: Its state at the end with the reason; None: it was refused.
     """
 
     arc: str
@@ -84,20 +84,20 @@ class Claimed:
 
     @property
     def never_runs(self) -> bool:
-        """It was refused, or got no turn and none can be predicted."""
+        """True if it was refused, or got no turn and none is predicted."""
         return bool(self.refused) or (self.turns == 0 and self.why is not None and self.why.expected_start_s < 0)
 
 
 @dataclass(frozen=True, slots=True)
 class DryRun:
-    """What a mission would do.
+    """The result of a dry run.
 
     Attributes:
         mission: Its name.
         placed: Its components in the order of their start.
         claimed: The requests of its behaviors in the order of the file.
-        timetable: Who would have run when.
-        trace: Every decision, as the RC manager would record it.
+        timetable: The slices of all ARCs.
+        trace: Every decision, in the RC manager's format.
     """
 
     mission: str
@@ -108,7 +108,7 @@ class DryRun:
 
     @property
     def can_come_up(self) -> bool:
-        """Every component has a host and no request is refused."""
+        """True if every component has a host and no request is refused."""
         return all(placed.host for placed in self.placed) and not any(claimed.refused for claimed in self.claimed)
 
     def write_trace(self, file: Path) -> None:
@@ -122,7 +122,7 @@ class DryRun:
 
 
 def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> DryRun:
-    """Return what the mission would do from its beginning on.
+    """Run a mission from its begin without starting a process.
 
     Args:
         description: The mission.
@@ -150,9 +150,9 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
 
 # ---------------------------------------------------------------------- placement
 def placements(description: MissionDescription) -> list[Placed]:
-    """Return where each component would go, in the order of their start: hardware, then the tree with its ARCs.
+    """Return the host of each component, in the order of their starts: hardware, then the tree with its ARCs.
 
-    A behavior is not started, and so not in the answer, if its parent has no host.
+    A behavior whose parent has no host is not started, so it is not in the result.
     """
     types = {one.name: one for one in description.types}
     counts: Counter[str] = Counter()
@@ -194,7 +194,7 @@ def _place(
 # ---------------------------------------------------------------------- schedule
 @dataclass(frozen=True, slots=True)
 class _Claim:
-    """What a behavior will ask for, or why it cannot even ask."""
+    """A behavior's claim, or why the behavior cannot claim."""
 
     arc: str
     behavior: Behavior
@@ -205,7 +205,7 @@ class _Claim:
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """A claim and what the schedule manager said to it."""
+    """A claim and the schedule manager's answer."""
 
     claim: _Claim
     rcs: tuple[str, ...] = ()
@@ -213,7 +213,7 @@ class _Asked:
 
 
 def requests(description: MissionDescription) -> list[SchedulingRequest]:
-    """Return the requests the ARCs of the mission's behaviors will send, parents' before their children's."""
+    """Return the requests of the ARCs of the mission's behaviors, parents before children."""
     return [claim.request for claim in _claims(description) if claim.request is not None]
 
 
@@ -265,12 +265,12 @@ def _rcs(description: MissionDescription, hosts: dict[str, str]) -> Iterator[RcK
 
 
 def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _Claim, hosts: dict[str, str]) -> _Asked:
-    """Let the ARC ask, if it and its behavior run."""
+    """Send the ARC's request, if the ARC and its behavior have hosts."""
     if claim.request is None:
         return _Asked(claim, refused=claim.obstacle)
     nowhere = [name for name, _ in claim.path[1:] if not hosts.get(name)]
     if not hosts.get(claim.arc):
-        return _Asked(claim, refused=f"{[*nowhere, claim.arc][0]} has no host, so nobody asks")
+        return _Asked(claim, refused=f"{[*nowhere, claim.arc][0]} has no host, so no ARC is asked for")
     try:
         rcs = manager.choose(claim.request)
     except Refusal as refusal:

@@ -1,4 +1,4 @@
-"""A dry run as rich tables: who goes where, who runs when, who never does and why.
+"""A dry run as rich tables: hosts of components, times of ARCs, and ARCs that never run with the reasons.
 
 Imported by the command line only.
 """
@@ -23,7 +23,7 @@ RUNS, SWITCHES, WAITS, FREE = "█", "▒", "·", "·"
 
 
 def screen(dry: DryRun) -> RenderableType:
-    """Return all that a dry run found."""
+    """Return the tables of a dry run."""
     head = Text(f"mission {dry.mission}: dry run, {dry.timetable.end_s:g} s", style="bold")
     keys = {claimed.arc: key for claimed, key in zip(dry.claimed, [*KEYS, *NO_KEY * len(dry.claimed)], strict=False)}
     return Group(
@@ -135,6 +135,4 @@ def _never(dry: DryRun) -> RenderableType:
             lines += [Text(f"{claimed.arc} {how}", style="bold red" if claimed.never_runs else "yellow")]
             lines += [Text(f"  {line}") for line in claimed.why.lines]
             lines += [Text(f"  rule {claimed.why.rule}; what would change it: {claimed.why.would_change}")]
-    return (
-        Group(*lines) if lines else Text("every request gets its turn" if dry.claimed else "nobody asks for anything")
-    )
+    return Group(*lines) if lines else Text("every request gets its turn" if dry.claimed else "there is no request")

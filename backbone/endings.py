@@ -1,4 +1,4 @@
-"""Endings: what a command prints for a person, and the exit codes it ends with.
+"""Endings: a command's messages for the person at the terminal, and its exit codes.
 
 Data goes to stdout, talk to stderr. Exit codes are those of ARCHITECTURE.md, section 5.
 """
@@ -15,7 +15,7 @@ from backbone.printable import printable_lines
 
 
 class ExitCode(IntEnum):
-    """What the command's end means."""
+    """Exit codes of commands."""
 
     DONE = 0
     UNEXPECTED = 1
@@ -28,19 +28,19 @@ class ExitCode(IntEnum):
 
 
 def say(line: str) -> None:
-    """Talk to the person, printable; the command goes on also if that cannot be written."""
+    """Print a message on stderr as printable text; the command continues if stderr is closed."""
     with suppress(OSError):
         print(printable_lines(line), file=sys.stderr, flush=True)
 
 
 def show(lines: Iterable[str]) -> None:
-    """Print data on stdout, printable and whole."""
+    """Print data on stdout as printable text."""
     for line in lines:
         print(printable_lines(line, most=sys.maxsize), flush=True)
 
 
 def complaint_of(error: BackboneError) -> tuple[str, ExitCode]:
-    """Return what a person reads of an error that ended a command, and the command's exit code."""
+    """Return the message and the exit code for an error that ended a command."""
     match error:
         case Refusal():
             codes = {"run": ExitCode.NO_BACKBONE, "usage": ExitCode.USAGE}

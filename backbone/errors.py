@@ -1,11 +1,11 @@
-"""What can go wrong between components, and whose fault it is.
+"""Errors between components, and which side is at fault.
 
-Three kinds, never mixed:
+There are three kinds:
 
-* ``Refusal``: the other side understood and said no.  Nothing changed there.  It travels over the
-  bus as (code, detail, remedy, facts) and is raised again on the asking side as the same class.
-* ``LinkError``: no answer came.  The outcome is *unknown*, which is never the same as failed.
-* anything else is a bug: it is not caught, the process dies, its creator reports and restarts it.
+* ``Refusal``: the receiver refused and changed nothing. A refusal travels over the bus as (code, detail, remedy, facts)
+  and is raised again at the requester as the same class.
+* ``LinkError``: no answer arrived. The outcome is *unknown*, which never means failed.
+* Any other exception is a bug: it is not caught, the process dies, its creator reports and restarts it.
 
 A code is for machines, the detail carries the numbers for people, the remedy is for operators.
 """
@@ -19,16 +19,16 @@ Fact = str | int | float | bool
 
 
 class BackboneError(Exception):
-    """Root of everything this project raises on purpose."""
+    """Base class of all exceptions that this project raises on purpose."""
 
 
 class Refusal(BackboneError):
-    """A typed no: nothing was changed by what was asked.
+    """A typed refusal; the request changed nothing.
 
     Attributes:
-        code: Stable word for machines, ``subject.reason``.
-        remedy: What the operator or developer can do about it.
-        detail: The sentence with the names and numbers of this case.
+        code: Stable code for machines, ``subject.reason``.
+        remedy: What the operator or developer can do.
+        detail: A sentence with the names and numbers of this case.
         facts: The same names and numbers for programs.
     """
 
@@ -44,7 +44,7 @@ class Refusal(BackboneError):
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
-        if "code" in cls.__dict__:  # a class that inherits its code travels as the class it inherits it from
+        if "code" in cls.__dict__:  # a class that inherits its code travels as its base class
             _classes_by_code[cls.code] = cls
 
     def __str__(self) -> str:
@@ -55,16 +55,15 @@ _classes_by_code: dict[str, type[Refusal]] = {}
 
 
 class UnknownRefusal(Refusal):
-    """A refusal of a class this process never imported; its own code is in ``facts["code"]``."""
+    """A refusal of a class that this process has not imported; its code is in ``facts["code"]``."""
 
     code = "refused.unknown"
 
 
 def revive(code: str, detail: str, remedy: str, facts: Mapping[str, Fact]) -> Refusal:
-    """Return the refusal that was sent, as the class it had there if this process knows it.
+    """Return the refusal that was sent, as its own class if this process knows the class.
 
-    What was sent is taken as it is: the class's own constructor is not called, so no content can
-    make this fail.
+    The class's own constructor is not called, so no content can make this fail.
 
     Example:
         >>> revive("refused", "no", "ask later", {}).remedy
@@ -79,28 +78,28 @@ def revive(code: str, detail: str, remedy: str, facts: Mapping[str, Fact]) -> Re
 
 
 def code_of(refusal: Refusal) -> str:
-    """Return the code under which the refusal was first raised, also when its class is unknown here."""
+    """Return the code under which the refusal was raised, also if its class is unknown here."""
     return str(refusal.facts.get("code", refusal.code)) if isinstance(refusal, UnknownRefusal) else refusal.code
 
 
 class LinkError(BackboneError):
-    """No answer: what was asked may or may not have happened."""
+    """No answer arrived; the outcome is unknown."""
 
 
 class NoResponder(LinkError):
-    """Nobody answers at this address, or the one who did died before answering."""
+    """No component serves this address, or it died before its answer."""
 
 
 class ReplyTimeout(LinkError):
-    """Somebody is there but did not answer in time."""
+    """The component did not answer in time."""
 
 
 class HubUnreachable(LinkError):
-    """The mission's hub could not be reached."""
+    """The mission's hub cannot be reached."""
 
 
 class OutcomeUnknown(Refusal):
-    """The one asked had to ask another, who did not answer: what was wanted may or may not have happened."""
+    """The component got no answer to a question of its own; the outcome is unknown."""
 
     code = "link.unknown"
-    remedy = "Ask how things are before you ask again."
+    remedy = "Look at the present state before you ask again."

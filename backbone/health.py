@@ -1,10 +1,10 @@
-"""Health of a mission in one word, with the list of what is wanted and absent.
+"""Health of a mission in one word, with its absent components.
 
-Rules of this file: pure; what was observed goes in, the verdict comes out. Each owner reports the components that it
-wants and misses (``Component.absences``); this file joins these reports with what the observer itself found missing.
+Rules of this file: pure; observations go in, the verdict comes out. Each owner reports its absent components
+(``Component.absences``); this file joins these reports with the absences that the observer found itself.
 
-* ``ok``: nothing that is wanted is absent.
-* ``degraded``: something is absent, and its owner works on it.
+* ``ok``: no wanted component is absent.
+* ``degraded``: a wanted component is absent, and its owner is restarting it.
 * ``failed``: a vital component has been absent for longer than ``FAILED_AFTER_S``, or the owner of an absent
   component has no further attempt to make.
 """
@@ -20,14 +20,14 @@ from backbone.component.messages import Absence, ComponentState
 from backbone.ranges import MANY
 from backbone.wire import Message, plain
 
-LOOK_EVERY_S = 0.5  # chosen: an absence is shown within two looks; machine seconds
+LOOK_EVERY_S = 0.5  # chosen: an absence appears within two rounds; machine seconds
 SAY_EVERY_S = 1.0  # chosen: one small message a second from one process; machine seconds
 SILENT_AFTER_S = 2.0  # chosen: two messages of the launcher were missed; machine seconds
 FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery that is an aim (a killed creator, 5 s)
 
 
 class HealthWord(StrEnum):
-    """How a mission is."""
+    """The health of a mission."""
 
     OK = "ok"
     DEGRADED = "degraded"
@@ -39,7 +39,7 @@ class MissionHealth(Message, frozen=True):
 
     Attributes:
         word: The verdict.
-        absent: What is wanted and absent: vital components first, then by name.
+        absent: Absent components: vital ones first, then by name.
     """
 
     word: HealthWord
@@ -48,11 +48,11 @@ class MissionHealth(Message, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """How a mission is, and what it lacks.
+    """The health of a mission, with its absent components.
 
     Attributes:
         word: The verdict.
-        absent: What is wanted and absent: vital components first, then by name.
+        absent: Absent components: vital ones first, then by name.
     """
 
     word: HealthWord
@@ -63,7 +63,7 @@ class Health:
         return [line(absence, now_s) for absence in self.absent]
 
     def to_message(self) -> MissionHealth:
-        """Return the message that says so."""
+        """Return the health as a message."""
         return MissionHealth(self.word, list(self.absent))
 
     def to_json(self) -> dict[str, Any]:
@@ -90,7 +90,7 @@ def health(
 
     Args:
         components: State of each registered component, by address.
-        missed: What the observer itself misses: services that are not registered, or did not answer.
+        missed: Absences that the observer found: services that are not registered or did not answer.
         now_s: Mission time.
         rate: Mission seconds per second of the machine.
     """

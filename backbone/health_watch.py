@@ -1,4 +1,4 @@
-"""The launcher's look at its mission: what is absent since when, published on change and every second."""
+"""Health watch: the launcher computes the mission's health and publishes it on change and every second."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from backbone.printable import printable_all
 
 
 class HealthWatch:
-    """Looks at the mission every ``LOOK_EVERY_S`` and publishes its health under the launcher's address.
+    """Examines the mission every ``LOOK_EVERY_S`` and publishes its health under the launcher's address.
 
     Args:
-        bus: The launcher's.
-        clock: The mission's time.
+        bus: Bus of the launcher.
+        clock: The mission's clock.
         changed: Called when ``absences`` changes.
-        own: Returns what the launcher wants and misses.
+        own: Returns the absences that the launcher reports as an owner.
     """
 
     def __init__(
@@ -37,16 +37,16 @@ class HealthWatch:
         self._said_s = 0.0
 
     def absences(self) -> list[Absence]:
-        """Return what the look itself missed; reports of other owners are in their own states."""
+        """Return the absences that the watch found; other owners report theirs in their own states."""
         return list(self._picture.missed)
 
     @property
     def picture(self) -> MissionPicture:
-        """The mission at the last look."""
+        """The mission in the last round."""
         return self._picture
 
     async def run(self) -> None:
-        """Look and publish until cancelled; a look that waits for an answer delays no word about what is known."""
+        """Examine and publish until cancelled; a round that waits for an answer delays no publication."""
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._look_again_and_again())
             loops.create_task(self._list_again_and_again())
@@ -63,9 +63,9 @@ class HealthWatch:
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
 
     async def _list_again_and_again(self) -> None:
-        """Hear what components report of absences, also while a look waits for a creator that is cut off."""
+        """Collect the components' reports of absences, also while a round waits for a creator that is cut off."""
         while True:
-            with suppress(LinkError, Refusal):  # the look says so
+            with suppress(LinkError, Refusal):  # the round reports it
                 listed = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S)
                 self._components = {state.address: state for state in printable_all(listed.components)}
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
@@ -75,7 +75,7 @@ class HealthWatch:
         return await look(self._bus, now_s, before=self._picture, rate=rate, schedule=False)
 
     def _health(self) -> Health:
-        # The launcher's own state in the list is a look old: what it missed then may be back.
+        # The launcher's own state in the list is one round old: its absences may have ended.
         others = {at: state for at, state in self._components.items() if at != self._bus.source}
         missed = [*self._own(), *self._picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)

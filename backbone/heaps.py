@@ -1,4 +1,4 @@
-"""Heaps: how many of them the C library keeps for the threads of a process."""
+"""Heaps: the number of heaps that the C library keeps for the threads of a process."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import ctypes
 from contextlib import suppress
 
 FEW = 2
-"""Measured: a nameserver beside which 64 components come and go grows from 21.4 to 23.2 MB, with one heap for each of
-its threads to 24.6 MB."""
+"""Measured: while 64 components start and end, a nameserver grows from 21.4 to 23.2 MB; with one heap for each thread
+it grows to 24.6 MB."""
 _M_ARENA_MAX = -8  # malloc.h of glibc
 
 
 def share_heaps() -> None:
-    """Let the threads of this process, and of those forked from it, share few heaps; where there is glibc.
+    """Make the threads of this process and of its forks share few heaps, if the C library is glibc.
 
-    By default each thread gets a heap of its own, and what another thread frees there is kept. A hub whose threads
-    serve links that come and go grows by that for hours.
+    By default each thread has a heap of its own, which keeps memory that other threads free. So a hub grows for hours
+    while links come and go.
     """
     with suppress(AttributeError):  # another C library
         ctypes.CDLL(None).mallopt(_M_ARENA_MAX, FEW)

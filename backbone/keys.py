@@ -1,7 +1,7 @@
 """Key expressions: ``scout/<mission>/<subsystem>/<component>/<conversation>``.
 
-The only place that knows how a key is spelt.  Components speak of addresses
-(``<subsystem>/<component>``, see ``naming.address``) and conversations.
+Only this file knows the form of a key. Components use addresses (``<subsystem>/<component>``, see ``naming.address``)
+and conversations.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from functools import lru_cache
 from backbone.naming import IllegalName
 
 ROOT = "scout"
-_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # what a key expression may hold between slashes, or * for any one
+_SEGMENT = re.compile(r"\*|[^@/*$#?][^/*$#?]*")  # a legal segment of a key expression, or * for any one
 
 
 class Conversation(StrEnum):
-    """What is talked about under a component's address."""
+    """Kind of message under a component's address, the last segment of its key."""
 
     ASK = "ask"  # questions: request/response
     ALIVE = "alive"  # liveliness token, declared last: it means ready
     STATUS = "status"  # life-cycle state and feedback, on change
-    COMMAND = "command"  # commands nobody acknowledges: a radio's packets on the simulated air
-    TELEMETRY = "telemetry"  # what was applied, measured or overrun
+    COMMAND = "command"  # commands without an answer: a radio's packets on the simulated air
+    TELEMETRY = "telemetry"  # applied commands, measures, overruns
     FRAMES = "frames"  # pictures
-    EVENTS = "events"  # what a behavior or world found out
-    OPERATORS = "operators"  # what people did: one event for each action
+    EVENTS = "events"  # findings of a behavior or world
+    OPERATORS = "operators"  # actions of people, one event each
     SCHEDULE = "schedule"  # the RC manager's decisions and leases
-    LEASES = "leases"  # the RC manager's renewals of what is held
-    BEAT = "beat"  # heartbeats of ARCs: their loop runs, and their owner's
+    LEASES = "leases"  # the RC manager's renewals of holds
+    BEAT = "beat"  # heartbeats of ARCs: their event loop and their owner's run
     HEALTH = "health"  # the launcher's verdict on the whole mission
     CLOCK = "clock"
     LOG = "log"
@@ -37,7 +37,7 @@ class Conversation(StrEnum):
 
 @lru_cache(maxsize=4096)
 def key(mission: str, address: str, conversation: Conversation) -> str:
-    """Return the key of one conversation of one component (or of many, with ``*`` in the address).
+    """Return the key of one conversation of one component, or of many with ``*`` in the address.
 
     Example:
         >>> key("iros2001", "resource_pool/scout1", Conversation.ASK)

@@ -14,7 +14,7 @@ SUBJECT_COLUMNS = 20  # chosen: names of a mission fit
 
 
 def log_lines(log: Log, now: Now) -> list[str]:
-    """Return one line for each event: time of day here, mission time, how much it matters, about what, what.
+    """Return one line for each event: local time of day, mission time, level, subject, event.
 
     Example:
         >>> from datetime import datetime
@@ -30,7 +30,7 @@ def log_lines(log: Log, now: Now) -> list[str]:
 
 
 def _about(event: StoryEvent) -> str:
-    """Return whom or what it is about, unless the sentence begins with that."""
+    """Return the subject, unless the sentence begins with it."""
     return "" if event.what.startswith(f"{event.subject} ") else event.subject
 
 
@@ -41,7 +41,7 @@ def log_json(log: Log, now: Now) -> dict[str, Any]:
 
 
 def story_lines(events: Iterable[StoryEvent]) -> list[str]:
-    """Return one line for each event, with who told it and because of which message."""
+    """Return one line for each event, with the component that recorded it and its cause."""
     return [
         f"{event.at_s:10.3f} s  {event.where:32s} {event.subject}: {event.what}"
         + (f"   because of {event.cause}" if event.cause else "")
@@ -50,7 +50,7 @@ def story_lines(events: Iterable[StoryEvent]) -> list[str]:
 
 
 def story_json(name: str, events: Iterable[StoryEvent], missing: Sequence[str]) -> dict[str, Any]:
-    """Return a story as plain data; ``missing`` names those who did not tell their part."""
+    """Return a story as plain data; ``missing`` names the components that did not answer."""
     return {"name": name, "events": [event_json(event) for event in events], "missing": list(missing)}
 
 

@@ -1,7 +1,7 @@
-"""A question to the mission's log as people put it, for the command line and every console. Pure.
+"""A person's question to the mission's log, for the command line and every console. Pure.
 
-Rules of this file: words in, an ``AskLog`` or a typed refusal out. Whatever is typed, the question that goes to the
-launcher has the limits of ``AskLog``.
+Rules of this file: words in, an ``AskLog`` or a typed refusal out. For any input, the question to the launcher keeps
+the limits of ``AskLog``.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from backbone.mission_log import FOR_EVER_S, MOST_EVENTS, AskLog
 from backbone.moments import Now, moment
 from backbone.ranges import LONGEST_MENTION
 
-LONGEST_WORDS = 200  # chosen: more than a person searches for, and a page's message has room for it
+LONGEST_WORDS = 200  # chosen: longer than any search of a person, and it fits a page's message
 
 
 class WrongSearch(Refusal):
-    """A field of a question to the log has a value that it cannot have."""
+    """A field of a question to the log has an illegal value."""
 
     code = "log.wrong_search"
     remedy = f"Levels are {', '.join(LogLevel)}; names and texts are short; since comes before until."
@@ -26,15 +26,15 @@ class WrongSearch(Refusal):
 
 @dataclass(frozen=True, slots=True)
 class LogQuestion:
-    """What a person wants to know of the log. Empty fields match all; what is asked must all be so.
+    """A person's question to the log. Empty fields match all; an event must match all fields.
 
     Attributes:
-        text: Words that stand in the event.
-        robot: Only what is about this name.
-        person: Only what this person did, or what speaks of them.
-        level: Only what matters at least so much.
-        since: Not before this moment, see ``moments``.
-        until: Not after it.
+        text: Words that the event contains.
+        robot: Only events about this name.
+        person: Only actions of this person, and events that mention the person.
+        level: Only events of at least this level.
+        since: Earliest moment, see ``moments``.
+        until: Latest moment.
     """
 
     text: str = ""
@@ -48,8 +48,8 @@ class LogQuestion:
         """Return the question for the launcher.
 
         Args:
-            now: What time it is.
-            most: At most so many events, the newest.
+            now: The present time.
+            most: Largest number of events; the newest are kept.
 
         Example:
             >>> from datetime import datetime
@@ -58,8 +58,8 @@ class LogQuestion:
             ('anna', 30.0)
 
         Raises:
-            WrongSearch: A field has a value that it cannot have.
-            NoMoment: ``since`` or ``until`` tells no moment.
+            WrongSearch: A field has an illegal value.
+            NoMoment: ``since`` or ``until`` is no moment.
         """
         since_s, until_s = _instant(self.since, now, 0.0), _instant(self.until, now, FOR_EVER_S)
         if since_s > until_s:
@@ -76,7 +76,7 @@ class LogQuestion:
 
 
 def _instant(text: str, now: Now, default_s: float) -> float:
-    """Return the mission time that is meant; what lies before the mission or beyond all times is cut."""
+    """Return the mission time of the text, limited to the mission's begin and the latest time."""
     return min(max(0.0, moment(text.strip(), now)), FOR_EVER_S) if text.strip() else default_s
 
 

@@ -1,8 +1,8 @@
-"""The mission's log: what components told people and what people did, kept by the launcher for as long as it lives.
+"""The mission's log: events of components and actions of people, which the launcher keeps while it lives.
 
-A component's own story ends with it, and a console lives shorter than the question what was done at it. Therefore one
-place hears all that is told and keeps the newest ``EVENTS_KEPT``. Which of them are wanted is decided in one place,
-``wants``, for the command line and for the tables of consoles.
+A component's story ends with the component, and questions about a console outlive it. So the launcher subscribes to all
+events and keeps the newest ``EVENTS_KEPT``. ``wants`` selects events, for the command line and for the tables of
+consoles.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from backbone.ranges import MANY, Count, Instant, Line, Mention
 from backbone.wire import Envelope, Message
 
 EVENTS_KEPT = 20_000  # chosen: hours of a busy mission, some megabytes
-MOST_EVENTS = 10_000  # chosen: what one message carries with room to spare
-FOR_EVER_S = 1e12  # as the latest instant there is
+MOST_EVENTS = 10_000  # chosen: fits one message with room to spare
+FOR_EVER_S = 1e12  # the latest ``Instant``
 _ORDER = list(LogLevel)
 
 
 class AskLog(Message, frozen=True):
-    """What happened? Empty fields match all; what is asked must all be so.
+    """Ask for events. Empty fields match all; an event must match all fields.
 
     Attributes:
-        since_s: Not before this mission time.
-        until_s: Not after it.
-        robot: Only what is about this name: a robot's, or any other.
-        person: Only what this person did, or what speaks of them.
-        level: Only what matters at least so much.
-        text: Only what has this text in it, in upper or lower case.
-        most: At most so many, the newest.
+        since_s: Earliest mission time.
+        until_s: Latest mission time.
+        robot: Only events about this name, of a robot or any other subject.
+        person: Only actions of this person, and events that mention the person.
+        level: Only events of at least this level.
+        text: Only events that contain this text, in upper or lower case.
+        most: Largest number of events; the newest are kept.
     """
 
     since_s: Instant = 0.0
@@ -52,7 +52,7 @@ class AskLog(Message, frozen=True):
     most: Annotated[int, msgspec.Meta(ge=1, le=MOST_EVENTS)] = MOST_EVENTS
 
     def wants(self, event: StoryEvent) -> bool:
-        """Say whether the event is one of those asked for.
+        """Return whether the event matches the question.
 
         Example:
             >>> stopped = StoryEvent(2.0, "ui_console/c", "anna stops it", "scout1", "", LogLevel.ALARM, "anna")
@@ -67,7 +67,7 @@ class AskLog(Message, frozen=True):
         )
 
     def reaches(self, event: StoryEvent) -> bool:
-        """Say whether the event has the time and the level asked for, whatever it says."""
+        """Return whether time and level of the event match; its text is not compared."""
         in_time = self.since_s <= event.at_s <= self.until_s
         return in_time and _ORDER.index(event.level) <= _ORDER.index(self.level)
 
@@ -77,8 +77,8 @@ class Log(Message, frozen=True):
 
     Attributes:
         events: Oldest first.
-        left_out: How many older ones would have fitted too.
-        since_s: What was before this mission time is not kept any more.
+        left_out: Number of older events that match too.
+        since_s: Mission time of the oldest kept event; earlier ones are lost.
     """
 
     events: Annotated[list[StoryEvent], MANY]
@@ -87,54 +87,54 @@ class Log(Message, frozen=True):
 
 
 class AskPeople(Message, frozen=True):
-    """Who sits at which console, or sat there?"""
+    """Ask for the people at consoles, present and past."""
 
 
 class PeopleKnown(Message, frozen=True):
     """Answer to ``AskPeople``.
 
     Attributes:
-        consoles: Name of the console → the person's.
+        consoles: Name of the console → name of the person.
     """
 
     consoles: Annotated[dict[Mention, Mention], MANY]
 
 
 class MissionLog:
-    """The newest of what happened. Pure.
+    """The newest events. Pure.
 
     Args:
-        kept: How many.
+        kept: Largest number of events.
     """
 
     def __init__(self, kept: int = EVENTS_KEPT) -> None:
         self._events: deque[StoryEvent] = deque(maxlen=kept)
         self._since_s = 0.0
         self.people = People()
-        """Who sits at which console: their names stand in what is told."""
+        """People at consoles, whose names replace the consoles' names in answers."""
 
     def add(self, event: StoryEvent) -> None:
-        """Keep that this happened."""
+        """Add an event."""
         if len(self._events) == self._events.maxlen:
             self._since_s = self._events[1].at_s
         self._events.append(event)
 
     def answer(self, asked: AskLog) -> Log:
-        """Return what is wanted, by the names of people."""
+        """Return the events that match, with the names of people."""
         found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
         return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)
 
 
 def chosen(events: Iterable[StoryEvent], asked: AskLog) -> list[StoryEvent]:
-    """Return the events asked for, by their times."""
+    """Return the events that match, in the order of their times."""
     return sorted(filter(asked.wants, events), key=lambda event: event.at_s)
 
 
 class LogKeeper:
-    """Hears what a mission tells.
+    """Subscribes to a mission's events and keeps them.
 
     Args:
-        bus: Of the component that keeps it.
+        bus: Bus of the component that keeps the log.
     """
 
     def __init__(self, bus: Bus) -> None:

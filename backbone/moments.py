@@ -1,4 +1,4 @@
-"""Moments as people type them, in mission time. Pure: what time it is is told."""
+"""Moments as people type them, in mission time. Pure: the present time is an argument."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MISSION_TIME = re.compile(r"\d+(?:\.\d+)?")
 
 
 class NoMoment(Refusal):
-    """The text tells no moment."""
+    """The text is no moment."""
 
     code = "usage.moment"
     remedy = "Say 5m (s, m, h, d ago), 14:05 or 14:05:30 (time of day), or 123.4 (mission time, as stories show it)."
@@ -23,12 +23,12 @@ class NoMoment(Refusal):
 
 @dataclass(frozen=True)
 class Now:
-    """What time it is.
+    """The present time.
 
     Attributes:
-        mission_s: In the mission.
-        here: On this machine.
-        rate: Mission seconds a second of the machine.
+        mission_s: Mission time.
+        here: Local time of this machine.
+        rate: Mission seconds per second of the machine.
     """
 
     mission_s: float
@@ -36,12 +36,12 @@ class Now:
     rate: float = 1.0
 
     def time_of_day(self, at_s: float) -> datetime:
-        """Return what this machine's clock showed at a mission time."""
+        """Return this machine's local time at a mission time."""
         return self.here - timedelta(seconds=(self.mission_s - at_s) / self.rate)
 
 
 def moment(text: str, now: Now) -> float:
-    """Return the mission time that is meant.
+    """Return the mission time of a typed moment.
 
     Example:
         >>> now = Now(600.0, datetime(2026, 5, 4, 14, 10))
@@ -49,7 +49,7 @@ def moment(text: str, now: Now) -> float:
         (300.0, 300.0, 123.4)
 
     Raises:
-        NoMoment: None is.
+        NoMoment: The text is no moment.
     """
     if ago := _AGO.fullmatch(text):
         return now.mission_s - float(ago[1]) * _SECONDS[ago[2]] * now.rate
@@ -59,6 +59,6 @@ def moment(text: str, now: Now) -> float:
         hour, minute, second = int(clock[1]), int(clock[2]), int(clock[3] or 0)
         if hour < 24 and minute < 60 and second < 60:
             then = now.here.replace(hour=hour, minute=minute, second=second, microsecond=0)
-            then -= timedelta(days=1) if then > now.here else timedelta(0)  # the last time that it was so
+            then -= timedelta(days=1) if then > now.here else timedelta(0)  # the last moment with this time of day
             return now.mission_s - (now.here - then).total_seconds() * now.rate
     raise NoMoment(f"{text!r} is no moment", text=text)

@@ -1,8 +1,7 @@
 """Legal names: one rule for components, resources, behaviors, hosts and missions.
 
 A name is a lower-case letter followed by lower-case letters, digits, ``_`` or ``-``, at most
-63 characters.  Such a name is at the same time a key segment, a file name and a host label, so
-nothing has to be quoted anywhere.
+63 characters. Such a name is also a legal key segment, file name and host label, so it needs no quoting.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ _LEGAL = re.compile(rf"[a-z][a-z0-9_-]{{0,{MAX_NAME_LENGTH - 1}}}")
 
 
 class Subsystem(StrEnum):
-    """The four subsystems every component belongs to (RAM 2002, "Distributed Control Architecture")."""
+    """The four subsystems; every component belongs to one (RAM 2002, "Distributed Control Architecture")."""
 
     BACKBONE = "backbone"
     RESOURCE_POOL = "resource_pool"
@@ -36,7 +35,7 @@ class IllegalName(Refusal):
 
 
 def is_legal(name: str) -> bool:
-    """Say whether the name follows the rule.
+    """Return whether the name follows the rule.
 
     Example:
         >>> is_legal("scout1"), is_legal("Scout 1")
@@ -49,7 +48,7 @@ def legal(name: str) -> str:
     """Return the name unchanged.
 
     Raises:
-        IllegalName: It does not follow the rule.
+        IllegalName: The name breaks the rule.
     """
     if not is_legal(name):
         raise IllegalName(f"{name!r} is not a legal name")
@@ -67,7 +66,7 @@ def address(subsystem: Subsystem, component: str) -> str:
 
 
 def is_component(component_address: str) -> bool:
-    """Say whether a component can have this address.
+    """Return whether a component can have this address.
 
     Example:
         >>> is_component("resource_pool/scout1"), is_component("anywhere/scout1"), is_component("backbone/No One")
@@ -83,7 +82,7 @@ def component_of(component_address: str) -> str:
 
 
 def claim_address(component_address: str, host: str, pid: int) -> str:
-    """Return the address of the token that says which process was given a name, ready or not.
+    """Return the address of the claim, the token of the process that holds a name, ready or not.
 
     Example:
         >>> claim_address("resource_pool/scout1", "lab-pc", 4242)
@@ -100,7 +99,7 @@ def read_claim(claim: str) -> tuple[str, str, int]:
         ('resource_pool/scout1', 'lab-pc', 4242)
 
     Raises:
-        IllegalName: It is none.
+        IllegalName: The text is no address of a claim.
     """
     component_address, _, process = claim.rpartition("/")
     host, _, pid = process.rpartition(".")
@@ -110,7 +109,7 @@ def read_claim(claim: str) -> tuple[str, str, int]:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return a remark on the known name nearest to a wrong one, to be put behind it; empty if none is near.
+    """Return a remark with the known name nearest to a wrong one, to append to it; empty if none is near.
 
     Example:
         >>> did_you_mean("scuot1", ["scout1", "pioneer"])

@@ -1,4 +1,4 @@
-"""What operators did: one event for each action, with the user's name, for consoles, logs and recordings."""
+"""Actions of operators: one event for each, with the user's name, for consoles and logs."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from backbone.wire import Message
 
 
 class OperatorAction(StrEnum):
-    """What people do to a mission."""
+    """An action of a person on a mission."""
 
     ATTACH = "attach"  # sat down at a console
-    DETACH = "detach"  # left it in good order; a console that died is a lost component
+    DETACH = "detach"  # left it in good order; a dead console is a lost component
     TAKE = "take"  # asked for a robot
     RELEASE = "release"  # gave it back
     DRIVE_BEGIN = "drive_begin"  # the first command of a drive was applied
-    DRIVE_END = "drive_end"  # the wheels were stopped, or the robot was lost or given back
+    DRIVE_END = "drive_end"  # the drive ended, or the robot was lost or given back
     JUMP = "jump"
     STOP_ROBOT = "stop_robot"  # emergency stop
     STOP_ALL = "stop_all"
     LIFT_STOP = "lift_stop"
-    ASK_LIFT = "ask_lift"  # asked who stopped a robot whether it may move again
+    ASK_LIFT = "ask_lift"  # asked the operator who stopped a robot whether it may move again
     LET_LIFT = "let_lift"  # let another operator lift the stop
     KEEP_STOPPED = "keep_stopped"
     SET_PARAMETER = "set_parameter"
@@ -77,10 +77,10 @@ class OperatorActed(Message, frozen=True):
     """Published by the console or command through which a person acted, under ``Conversation.OPERATORS``.
 
     Attributes:
-        user: Who.
-        action: What.
-        subject: Name of the robot, component or alarm it was done to.
-        detail: For people: how, why, or what came of it.
+        user: The person.
+        action: The action.
+        subject: Name of the robot, component or alarm.
+        detail: Manner, reason or outcome, for people.
         at_s: Mission time.
     """
 
@@ -92,7 +92,7 @@ class OperatorActed(Message, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """What happened to the subject, for people.
+        """The action as a sentence about the subject, for people.
 
         Example:
             >>> OperatorActed("anna", OperatorAction.STOP_ROBOT, "scout1", "child in the room", 2.0).sentence
@@ -102,10 +102,10 @@ class OperatorActed(Message, frozen=True):
         return f"{said}: {self.detail}" if self.detail else said
 
     def event(self, where: str, cause: str = "") -> StoryEvent:
-        """Return it as an event of the log.
+        """Return the action as an event of the log.
 
         Args:
-            where: Address of the console or command it was done by.
+            where: Address of the console or command.
             cause: Id of the message that led to it.
         """
         level = _LEVELS.get(self.action, LogLevel.NOTICE)
@@ -113,21 +113,21 @@ class OperatorActed(Message, frozen=True):
 
 
 def login_name() -> str:
-    """Return who is logged in, as far as the system knows."""
+    """Return the name of the logged-in user, if the system knows it."""
     try:
         return getpass.getuser()
-    except (OSError, KeyError):  # a user without a name, in a container
+    except (OSError, KeyError):  # the user has no name, as in a container
         return f"uid-{os.getuid()}"
 
 
 def tell_acted(bus: Bus, clock: Clock, action: OperatorAction, subject: str, detail: str = "") -> None:
-    """Let a mission know that who is logged in here did this.
+    """Publish an action of the logged-in user to the mission.
 
     Args:
-        bus: Of the command by which it was done.
-        clock: The mission's time.
-        action: What.
-        subject: Whom or what it was done to.
-        detail: For people.
+        bus: Bus of the command.
+        clock: The mission's clock.
+        action: The action.
+        subject: Name of the robot, component or alarm.
+        detail: Manner, reason or outcome, for people.
     """
     bus.publish(bus.source, Conversation.OPERATORS, OperatorActed(login_name(), action, subject, detail, clock.now_s()))

@@ -1,7 +1,7 @@
-"""The machines of a mission besides its first: which of them have their creator in the mission, and which lack it.
+"""The machines of a mission besides its first, and which of them have a creator in the mission.
 
-Pure: liveliness tokens go in, absences come out. Nothing is started from here: a person, or the machine's own
-service manager, types the command on the machine that is missing.
+Pure: liveliness tokens go in, absences come out. This file starts no machine: a person or the machine's own service
+manager runs the command on a missing machine.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def endpoint_for_others(description: MissionDescription) -> str:
 
 
 def command_on(host: Host, description: MissionDescription) -> str:
-    """Return what is typed on that machine to offer it to the mission; ``secret`` is a copy of the mission's."""
+    """Return the command that offers this machine to the mission; the file ``secret`` is a copy of the mission's."""
     words = ["scout-backbone", "creator", "--host", host.name, "--connect", endpoint_for_others(description)]
     words += ["--mission", description.name, *(word for tag in host.tags for word in ("--tag", tag))]
     return shlex.join([*words, "--secret-file", SECRET_NAME])
@@ -36,11 +36,11 @@ class _Absent:
 
 
 class OtherHosts:
-    """Which other machines of a mission are there.
+    """The other machines of a mission, present or missing.
 
     Args:
         description: The mission.
-        now_s: Mission time from which on they are missed.
+        now_s: Mission time from which on they count as missing.
     """
 
     def __init__(self, description: MissionDescription, now_s: float) -> None:
@@ -52,25 +52,25 @@ class OtherHosts:
 
     @property
     def names(self) -> list[str]:
-        """Their names, in the order of the mission file."""
+        """Names of all other machines, in the order of the mission file."""
         return list(self._commands)
 
     @property
     def missing(self) -> list[str]:
-        """Those without a creator in the mission now."""
+        """Names of the machines without a creator in the mission."""
         return [host for host in self._commands if host in self._absent]
 
     @property
     def offering(self) -> list[str]:
-        """Addresses of the commands that keep these machines' creators, as far as they are there."""
+        """Addresses of the present offers, which keep the creators of these machines."""
         return sorted(self._offering)
 
     def command(self, host: str) -> str:
-        """Return what is typed on that machine."""
+        """Return the command that offers this machine."""
         return self._commands[host]
 
     def token_changed(self, changed: str, stands: bool, now_s: float) -> bool:
-        """Take note of a component's liveliness token; say whether a machine came or went by it."""
+        """Record a change of a liveliness token; return whether it added or removed a machine."""
         if changed in self._offers:
             (self._offering.add if stands else self._offering.discard)(changed)
         host = self._creators.get(changed)

@@ -1,11 +1,11 @@
-"""People by their names: whoever reads of a console, or of what it claims, reads of the person who sits at it.
+"""People by their names: texts name the person at a console instead of the console or its ARC.
 
-Rules of this file: pure. Who sits where is what consoles say of themselves; nothing proves it.
+Rules of this file: pure. Consoles publish the names of their users, without proof.
 
-* One person is one name, at however many consoles.
-* What a console claims bears the console's name before its own (``console-7-capture``), and reads as the person too.
-* A name of which nobody is known stays as it is.
-* Who has left is remembered for a while: timelines and logs speak of the past.
+* One person has one name, also at several consoles.
+* The ARC of a console begins with the console's name (``console-7-capture``), and is replaced by the person too.
+* A name without a known person stays unchanged.
+* People who have left are kept for a while, because timelines and logs are about the past.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ import msgspec
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.naming import Subsystem, component_of
 
-CONSOLES_KEPT = 1_000  # chosen: those of a busy day
+CONSOLES_KEPT = 1_000  # chosen: the consoles of a busy day
 _NAME = re.compile(r"(?<![\w/#-])(?:(?:ui_console|resource_pool)/)?([a-z][a-z0-9_-]*)(?![\w/#-])")
 
 Value = TypeVar("Value")
 
 
 class People:
-    """Who sits at which console.
+    """The people at consoles.
 
     Args:
-        components: Of the mission; consoles among them say who sits there.
+        components: Components of the mission; the states of consoles name their users.
     """
 
     def __init__(self, components: Iterable[ComponentState] = ()) -> None:
@@ -38,7 +38,7 @@ class People:
             self.heard(component)
 
     def heard(self, component: ComponentState) -> None:
-        """Take in who sits at this component, if it is a console that says so."""
+        """Record the person at this component, if it is a console with a user."""
         name = component_of(component.address)
         if component.user and is_console(component.address):
             self._called.pop(name, None)
@@ -47,23 +47,23 @@ class People:
             del self._called[next(iter(self._called))]
 
     def remember(self, consoles: Mapping[str, str]) -> None:
-        """Take in who sat where; what is known already is newer.
+        """Add people of the past; known consoles keep their newer names.
 
         Args:
-            consoles: Name of the console → the person's.
+            consoles: Name of the console → name of the person.
         """
         self._called = {**consoles, **self._called}
 
     @property
     def consoles(self) -> dict[str, str]:
-        """Name of each console → the person's."""
+        """Name of each console → name of the person."""
         return dict(self._called)
 
     def person(self, name: str) -> str:
-        """Return whom a console, or what it claims, is there for; the name itself if nobody is known.
+        """Return the person at a console, or behind its ARC; the name itself if no person is known.
 
         Args:
-            name: Name or address.
+            name: Name or address of a console or an ARC.
 
         Example:
             >>> people = People([ComponentState("ui_console/c-7", "console", "base", 7, "ready", 0.0, user="Anna B.")])
@@ -78,7 +78,7 @@ class People:
         return self._called[name]
 
     def named(self, text: str) -> str:
-        """Return the text with every name of a console, or of what it claims, replaced by the person's.
+        """Return the text with every name of a console or of its ARC replaced by the person's.
 
         Example:
             >>> people = People([ComponentState("ui_console/c-7", "console", "base", 7, "ready", 0.0, user="Anna B.")])
@@ -88,11 +88,11 @@ class People:
         return _NAME.sub(self._name_of, text) if self._called else text
 
     def doing(self, component: ComponentState) -> str:
-        """Return what a component says it is doing, beginning with who sits there if somebody does."""
+        """Return the component's feedback, after the name of the person at it, if any."""
         return f"{component.user} {self.named(component.feedback)}".strip()
 
     def named_event(self, event: StoryEvent) -> StoryEvent:
-        """Return the event with the persons' names in what it says; where it was told and its cause stay."""
+        """Return the event with people's names in its text; its place and its cause stay."""
         subject, what = self.person(event.subject), self.named(event.what)
         if (subject, what) == (event.subject, event.what):
             return event
@@ -109,7 +109,7 @@ class People:
     def _named(self, value: Any) -> Any:
         match value:
             case str():
-                return self.named(value) if type(value) is str else value  # words of an enumeration are our own
+                return self.named(value) if type(value) is str else value  # texts of an enumeration are safe
             case msgspec.Struct():
                 found = {name: self._named(getattr(value, name)) for name in value.__struct_fields__}
                 return msgspec.structs.replace(value, **found)
@@ -121,7 +121,7 @@ class People:
 
 
 def is_console(address: str) -> bool:
-    """Say whether a person may sit at this address.
+    """Return whether this is the address of a console.
 
     Example:
         >>> is_console("ui_console/console-1"), is_console("resource_pool/scout1")
@@ -131,5 +131,5 @@ def is_console(address: str) -> bool:
 
 
 def screens_of(user: str, components: Iterable[ComponentState]) -> list[ComponentState]:
-    """Return the consoles at which this person sits; more than one: it is one person with several screens."""
+    """Return the consoles of this person, who may use several screens."""
     return [each for each in components if user and each.user == user and is_console(each.address)]

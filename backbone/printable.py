@@ -1,11 +1,11 @@
-r"""Text from the bus as text for people: nothing in it can command a terminal, a browser or a log.
+r"""Text from the bus as text for people: it cannot control a terminal, a browser or a log.
 
-Rules of this file: pure. What ``str.isprintable`` refuses becomes a visible escape: control characters (ESC, CR, the
-8-bit CSI), format characters (bidirectional overrides), lone surrogates, line separators. A text that is too long is
-cut, with the number of characters that are missing.
+Rules of this file: pure. Characters that ``str.isprintable`` refuses become visible escapes: control characters (ESC,
+CR, the 8-bit CSI), format characters (bidirectional overrides), lone surrogates, line separators. A text that is too
+long is cut and ends with the number of missing characters.
 
-``printable_all`` is applied where news of a mission enters what faces people: the mission picture, ``why`` and
-``story``, and the feed of the consoles. Everything behind these may trust its texts.
+``printable_all`` is applied where messages enter the parts for people: the mission picture, ``why`` and ``story``, and
+the feed of the consoles. Code behind these trusts its texts.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 import msgspec
 
 MOST_CHARACTERS = 2000  # chosen: several times a component's longest feedback
-MOST_LINES = 200  # chosen: more than the end of a log that a refusal carries
+MOST_LINES = 200  # chosen: more lines than a refusal quotes from a log
 
 Value = TypeVar("Value")
 
@@ -59,7 +59,7 @@ def printable_all(value: Value) -> Value:
 def _clean(value: Any) -> Any:
     match value:
         case str():
-            return printable(value) if type(value) is str else value  # words of an enumeration are our own
+            return printable(value) if type(value) is str else value  # texts of an enumeration come from this project
         case msgspec.Struct():
             changes = _changes(value, value.__struct_fields__)
             return msgspec.structs.replace(value, **changes) if changes else value

@@ -1,18 +1,19 @@
-"""Ranges: what each kind of number, name and text on the bus may be.
+"""Ranges: the legal values of each kind of number, name and text on the bus.
 
-Every field of every message has one of these types, so that the decoder refuses nonsense with
-``MalformedMessage`` before a component sees it. A test walks all message classes and fails for a field without.
+Every field of every message has one of these types, so that the decoder refuses illegal values with
+``MalformedMessage`` before a component gets them. A test examines all message classes and fails for a field without a
+range.
 
 Rules of this file:
 
 * A number has both limits. ``NaN`` fails each comparison and so each lower limit, an infinity fails one of the two;
   a number with one limit only would let one infinity pass.
-* A range is wide enough for every honest mission, and narrow enough that sums of such numbers stay exact. Where a
-  refusal at the place of use carries the better remedy (a run time of 0, a lease of 0), the range lets the value pass.
-* Names are matched against the one rule for names where a name is first said. Where it is only looked up or shown
-  its length is limited and no more: a pattern costs 0.3 µs a name, and one message may renew thousands of leases.
+* A range is wide enough for every honest mission, and narrow enough that sums of such numbers stay exact. If a refusal
+  at the place of use has the better remedy (a run time of 0, a lease of 0), the range admits the value.
+* A field that introduces a name has the pattern of legal names. A field that only mentions a name has a limit of
+  length, because a pattern costs 0.3 µs a name, and one message may renew thousands of leases.
 
-Inside one process objects are handed over without decoding: nothing hostile speaks there, and type checks hold.
+Inside one process objects are delivered without decoding, because all code there is trusted and type-checked.
 """
 
 from __future__ import annotations
@@ -26,33 +27,33 @@ from backbone.naming import MAX_NAME_LENGTH
 
 # ---------------------------------------------------------------------- how much
 MOST_ENTRIES = 65_536  # chosen: twice the leases of 10 000 ARCs on three RCs each
-MOST_FEW = 256  # chosen: tags, features, roles, steps of a path: the largest mission tried has 12
+MOST_FEW = 256  # chosen: tags, features, roles, steps of a path; the largest tested mission has 12
 MOST_STREAMS = 64  # chosen: one for each kind of packet; the largest mission has four
 MANY = Meta(max_length=MOST_ENTRIES)
 FEW = Meta(max_length=MOST_FEW)
 FEW_STREAMS = Meta(max_length=MOST_STREAMS)
 
 # ---------------------------------------------------------------------- words
-LONGEST_MENTION = 255  # chosen: four names with what joins them; the longest file name
-LONGEST_SOURCE = LONGEST_MENTION - 18  # what ``#<sequence>`` needs behind it
+LONGEST_MENTION = 255  # chosen: four names and their separators; the longest file name
+LONGEST_SOURCE = LONGEST_MENTION - 18  # leaves room for ``#<sequence>``
 LONGEST_LINE = 4_096  # chosen: far more than a person reads in one line
 LONGEST_TEXT = 262_144  # chosen: the names of 10 000 ARCs in one sentence
-LONGEST_DOCUMENT = 524_288  # chosen: the XML of a room with a thousand things
+LONGEST_DOCUMENT = 524_288  # chosen: the XML of a room with a thousand objects
 
 Name = Annotated[str, Meta(max_length=MAX_NAME_LENGTH, pattern=r"^[a-z][a-z0-9_-]*\Z")]
 """A legal name, see ``naming``."""
 NameOrNone = Annotated[str, Meta(max_length=MAX_NAME_LENGTH, pattern=r"^([a-z][a-z0-9_-]*)?\Z")]
 """A legal name, or empty."""
 Address = Annotated[str, Meta(max_length=LONGEST_MENTION, pattern=r"^[a-z_]+(/[A-Za-z0-9_.-]+)+\Z")]
-"""``<subsystem>/<component>``, or that of a process or a token below it."""
+"""``<subsystem>/<component>``, or the address of a process or token below it."""
 Mention = Annotated[str, Meta(max_length=LONGEST_MENTION)]
 """A name, an address or an id that is looked up, compared or shown: an unknown one finds nothing."""
 Source = Annotated[str, Meta(max_length=LONGEST_SOURCE)]
-"""Who speaks: shorter than a mention, so that the id of a message, which others name as their cause, is one."""
+"""Address of a sender: shorter than a mention, so that a message id, which is ``<source>#<sequence>``, is a mention."""
 Line = Annotated[str, Meta(max_length=LONGEST_LINE)]
 """One line for people or for the operating system: a reason, a path, a class."""
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
-"""Lines that a component composed."""
+"""Text of several lines from a component."""
 Document = Annotated[str, Meta(max_length=LONGEST_DOCUMENT)]
 """A whole file."""
 
@@ -62,20 +63,20 @@ StateVector = Annotated[bytes, Meta(max_length=524_288)]  # chosen: 65 536 numbe
 Pixels = Annotated[memoryview, Meta(max_length=8_000_000)]  # chosen: a frame of 1080p in color is 6.2 MB
 
 # ---------------------------------------------------------------------- counts and ids
-EXACT = 2**53  # up to here a double, a JSON trace and JavaScript count exactly
+EXACT = 2**53  # up to here integers are exact in a double, a JSON trace and JavaScript
 
 Epoch = Annotated[int, Meta(ge=0, le=EXACT)]
 """Fencing number of a connection; ``most_epoch`` in ``rc_manager.messages`` says which are plausible now."""
 Count = Annotated[int, Meta(ge=0, le=EXACT)]
-"""How many, or which one of many that are numbered."""
+"""A count, or a number in a sequence."""
 Number = Annotated[int, Meta(ge=-EXACT, le=EXACT)]
-"""An integer of which no more is known (a seed)."""
+"""Any integer, such as a seed."""
 Version = Annotated[int, Meta(ge=0, le=1_000_000)]  # chosen: a version grows by one with a release
 Pid = Annotated[int, Meta(ge=0, le=2**22)]  # Linux, PID_MAX_LIMIT; 0: none
 ExitCode = Annotated[int, Meta(ge=-255, le=255)]  # POSIX: a byte; Python: minus the signal
 Signal = Annotated[int, Meta(ge=1, le=64)]  # Linux, the real-time signals included
 Priority = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]  # the mission file's xs:int
-Rank = Annotated[int, Meta(ge=-1, le=MOST_ENTRIES)]  # place among the holders of one RC; -1: as it was
+Rank = Annotated[int, Meta(ge=-1, le=MOST_ENTRIES)]  # place among the holders of one RC; -1: unchanged
 PixelCount = Annotated[int, Meta(ge=0, le=8_192)]  # chosen: twice the width of a 4K picture
 PixelPlace = Annotated[int, Meta(ge=-8_192, le=8_192)]  # a region may begin outside the picture
 
@@ -86,42 +87,42 @@ Instant = Annotated[float, Meta(ge=-A_DAY_S, le=1e12)]
 MachineTime = Annotated[float, Meta(ge=-1e12, le=1e12)]
 """Time of a machine's clock; it may have begun after mission time 0."""
 Duration = Annotated[float, Meta(ge=0, le=A_DAY_S)]
-"""How long something takes or may take."""
+"""A duration."""
 RunTime = Annotated[float, Meta(ge=0, le=A_DAY_S)]
-"""Shortest or longest time of a slice; 0 where it need not be said."""
+"""Shortest or longest time of a slice; 0: not stated."""
 Period = Annotated[float, Meta(ge=0, le=A_DAY_S)]
-"""Of a stream, with its packet time, deadline and jitter."""
+"""Period of a stream, its packet time, deadline or jitter."""
 Pause = Annotated[float, Meta(ge=-1, le=A_DAY_S)]
 """A pause; negative: it never ends."""
 LONGEST_LEASE_S = 3_600.0  # chosen: 2 s at 1800 times the speed; --speed goes to 100
 LeaseSeconds = Annotated[float, Meta(ge=0, le=LONGEST_LEASE_S)]
-"""How long a hold lasts unless renewed, mission time."""
+"""Duration of a hold without renewal, mission time."""
 Rate = Annotated[float, Meta(gt=0, le=1_000)]  # chosen: mission seconds a second; --speed goes to 100
 
 # ---------------------------------------------------------------------- measures
 Share = Annotated[float, Meta(ge=0, le=1)]
-"""Part of a whole."""
+"""A share of a whole, 0 to 1."""
 Meters = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a thousand kilometres from the corner of the room
 Radians = Annotated[float, Meta(ge=-1e6, le=1e6)]  # chosen: a heading may count turns
 WheelSpeed = Annotated[float, Meta(ge=-1e4, le=1e4)]  # chosen: a hundred times a Scout's; RCs clip
 Measure = Annotated[float, Meta(ge=-1e18, le=1e18)]
-"""A number whose meaning only its name tells: statistics, facts."""
+"""A number whose meaning is in its name: statistics, facts."""
 Whole = Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)]
-"""An integer whose meaning only its name tells."""
+"""An integer whose meaning is in its name."""
 
 Facts = Annotated[dict[Mention, Text | Whole | Measure | bool], FEW]
-"""What a refusal tells programs."""
+"""A fact of a refusal, for programs."""
 
 # ---------------------------------------------------------------------- values of any kind
 Values = Annotated[dict[Mention, Any], MANY]
-"""Named values of any kind, as of a mission file; ``wildness`` says what in them may not pass."""
+"""Named values of any kind, as in a mission file; ``wildness`` finds illegal values."""
 DEEPEST = 24  # chosen: the description of a world is six deep
 
 
 def wildness(value: Any, depth: int = 0) -> str:
-    """Return what is wrong with a value of any kind, empty if nothing: only plain, finite, bounded things may pass.
+    """Return why a value of any kind is illegal, empty if it is legal: plain, finite and bounded.
 
-    The reader asks this of messages that have fields of any kind; all others hold by their types.
+    The reader calls this for messages with fields of any kind; types check all other messages.
 
     Example:
         >>> wildness({"speed": [1, 2.5, None]}), wildness([float("nan")])

@@ -1,7 +1,7 @@
 """Missions that are up on this machine, found by name: one small file for each.
 
-The launcher writes it as soon as the hub listens and removes it at the end. A file whose launcher
-is gone is stale: it is passed over, and overwritten by the next mission of that name.
+The launcher writes its file as soon as the hub listens and removes it at the end. A file whose launcher has ended is
+stale: readers skip it, and the next mission of that name overwrites it.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from backbone.naming import is_legal, legal
 
 FILE_NAME = "run.json"
 KEPT = ".kept"  # no legal name of a mission
-ENDED = ".ended-"  # a folder whose mission ends is hidden as .<mission>.ended-<pid of the zygote that removes it>
-TRIAL_BYTES = 1 << 16  # chosen: room for what a mission writes until all is ready, logs included
-START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports a process's start in hundredths, corrected by clock steps
+ENDED = ".ended-"  # the folder of an ending mission is renamed to .<mission>.ended-<pid of the zygote that removes it>
+TRIAL_BYTES = 1 << 16  # chosen: what a mission writes until all is ready, logs included
+START_TIME_TOLERANCE_S = 2.0  # chosen: the system reports starts in hundredths and shifts them with the clock
 
 
 class RunFile(msgspec.Struct, frozen=True):
-    """How to reach a mission that is up.
+    """How to connect to a mission that is up.
 
     Attributes:
         mission: Name of the mission.
-        endpoint: Where its hub listens.
-        launcher_pid: Process of the launcher.
+        endpoint: Endpoint of its hub.
+        launcher_pid: Pid of the launcher.
         clock_origin_monotonic_s: This machine's monotonic clock at mission time 0.
         clock_rate: Mission seconds per second of the machine.
         host: Name of this machine in the mission.
         source: Path of the mission file.
-        launcher_started_s: When the launcher's process began, seconds since 1970; filled in by ``write``.
+        launcher_started_s: Start of the launcher's process, seconds since 1970; set by ``write``.
     """
 
     mission: str
@@ -66,44 +66,45 @@ class SeveralMissions(Refusal):
 
 
 class UnsafeDirectory(Refusal):
-    """The folder of the run files belongs to somebody else, or others may write into it."""
+    """The folder of the run files belongs to another user, or other users may write into it."""
 
     code = "run.unsafe_directory"
     remedy = "Set XDG_RUNTIME_DIR to a folder of your own with mode 0700."
 
 
 class RunFolderUnusable(Refusal):
-    """The system does not let the files of a mission be written."""
+    """The system refuses to write the files of a mission."""
 
     code = "run.folder"
     remedy = "Free the disk, or set XDG_RUNTIME_DIR to a folder of your own that can be written into."
 
 
 class TraceUnwritable(Refusal):
-    """The system does not let the trace be written."""
+    """The system refuses to write the trace."""
 
     code = "run.trace"
     remedy = "Name a file in a folder that can be written into, on a disk that is not full."
 
 
 def run_directory(mission: str) -> Path:
-    """Return the folder of a mission's files; the folder around it exists afterwards, for this user alone.
+    """Return the folder of a mission's files; its parent folder exists afterwards, for this user alone.
 
     Raises:
         IllegalName: The mission's name is no legal name.
-        UnsafeDirectory: Somebody else could put files there.
+        UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused.
     """
     return _directory() / legal(mission)
 
 
 def kept_directory() -> Path:
-    """Return the folder for what outlives a process and belongs to no mission of this machine, for this user alone.
+    """Return this user's folder for files that outlive a process and belong to no mission of this machine.
 
-    It ends with the login session, or where the system keeps no folder for that, with the machine's temporary files.
+    The folder lasts as long as the login session, or as the machine's temporary files if there is no folder for
+    sessions.
 
     Raises:
-        UnsafeDirectory: Somebody else could put files there.
+        UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused.
     """
     directory = _directory() / KEPT
@@ -116,11 +117,11 @@ def kept_directory() -> Path:
 
 
 def prepare(mission: str) -> Path:
-    """Make the folder of a mission's files, find out that it can be written into, and return it.
+    """Create the folder of a mission's files, check that it is writable, and return it.
 
     Raises:
-        UnsafeDirectory: Somebody else could put files there.
-        RunFolderUnusable: The system refused; the folder is away.
+        UnsafeDirectory: Another user could write files there.
+        RunFolderUnusable: The system refused; the folder is removed.
     """
     directory = run_directory(mission)
     _remove_what_dead_zygotes_left(directory)
@@ -139,10 +140,10 @@ def prepare(mission: str) -> Path:
 
 
 def require_writable(trace: Path) -> None:
-    """Return if the trace can be appended to; what it holds stays, an empty file may be new.
+    """Return if the trace is writable; its content stays, and an empty file may be created.
 
     Raises:
-        TraceUnwritable: It cannot.
+        TraceUnwritable: The trace is not writable.
     """
     try:
         with trace.open("ab"):
@@ -155,7 +156,7 @@ def write(run_file: RunFile) -> Path:
     """Make the mission findable and return the file's path.
 
     Raises:
-        UnsafeDirectory: Somebody else could put files there.
+        UnsafeDirectory: Another user could write files there.
         RunFolderUnusable: The system refused.
     """
     directory = run_directory(run_file.mission)
@@ -172,19 +173,19 @@ def write(run_file: RunFile) -> Path:
 
 
 def remove(mission: str) -> None:
-    """Remove the mission's folder with all that is in it; right also if it is gone."""
+    """Remove the mission's folder and its files. Idempotent."""
     shutil.rmtree(run_directory(mission), ignore_errors=True)
 
 
 def find(mission: str | None = None) -> RunFile:
-    """Return how to reach a mission that is up on this machine.
+    """Return the run file of a mission that is up on this machine.
 
     Args:
-        mission: Its name; None: the only one.
+        mission: Its name; None: the only mission.
 
     Raises:
-        MissionNotUp: There is none; the detail names those that are up.
-        SeveralMissions: None was named and several are up.
+        MissionNotUp: The mission is not up; the detail names the missions that are up.
+        SeveralMissions: ``mission`` is None and several missions are up.
     """
     up = find_all()
     names = ", ".join(run_file.mission for run_file in up)
@@ -201,7 +202,7 @@ def find(mission: str | None = None) -> RunFile:
 
 
 def secret(run_file: RunFile) -> str:
-    """Return what the mission's hub asks its clients for; empty: nothing."""
+    """Return the mission's secret; empty: the hub asks for none."""
     return secret_of(str(run_directory(run_file.mission)))
 
 
@@ -220,7 +221,7 @@ def _remove_what_dead_zygotes_left(directory: Path) -> None:
 
 
 def _directory() -> Path:
-    """Return the folder all run files of this user lie in, made and checked."""
+    """Create and check the folder of this user's run files, and return it."""
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     base = Path(runtime) if runtime else Path(tempfile.gettempdir()) / f"scout-backbone-{_user()}"
     directory = base / "scout-backbone"
@@ -240,7 +241,7 @@ def _unusable(directory: Path, error: OSError) -> RunFolderUnusable:
 
 
 def _check_private(directory: Path) -> None:
-    # The folder for temporary files is everybody's: whoever made the folder first decides what is in it.
+    # All users can write into the folder for temporary files, so another user may have created this folder first.
     found = directory.lstat()
     if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & 0o022 or directory.is_symlink()):
         raise UnsafeDirectory(f"{directory} is not this user's alone", directory=str(directory))
@@ -251,7 +252,7 @@ def _user() -> str:
 
 
 def _read(path: Path) -> RunFile | None:
-    """Return what the file says, or None if there is none, or none that this release wrote."""
+    """Return the run file at this path; None if it is missing or from another release."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=RunFile)
     except (FileNotFoundError, NotADirectoryError, msgspec.DecodeError):

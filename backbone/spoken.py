@@ -7,7 +7,7 @@ from typing import Any
 
 
 def counted(number: int, noun: str) -> str:
-    """Return how many there are, in words that fit the number.
+    """Return number and noun, in the singular for 1.
 
     Example:
         >>> counted(1, "component"), counted(2, "component"), counted(0, "alarm")
@@ -17,7 +17,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Return a value of a parameter as one types it, with no more digits than a person can use.
+    """Return a value of a parameter as a person types it, rounded to a readable number of digits.
 
     Example:
         >>> value_text(50.83098785400034), value_text([1, 0.1 + 0.2]), value_text("base"), value_text(None)

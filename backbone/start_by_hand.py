@@ -1,4 +1,4 @@
-"""``start``: what an operator's few words mean in a mission whose file says more about the component."""
+"""``start``: completes an operator's order with the mission file's declaration of the component."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backbone.dependency_database.messages import AskResources, Resource, Resour
 from backbone.errors import Refusal
 from backbone.placer.messages import Start
 
-REPLY_TIME_S = 2.0  # chosen: a person waits this long
+REPLY_TIME_S = 2.0  # chosen: a person at a terminal waits this long
 
 
 class OtherType(Refusal):
@@ -21,10 +21,10 @@ class OtherType(Refusal):
 
 
 async def completed(bus: Bus, order: Start) -> tuple[Start, str]:
-    """Return the order with what the mission file says of a resource of this name, and a remark for the operator.
+    """Return the order completed from the mission file's resource of this name, and a remark for the operator.
 
     Raises:
-        OtherType: The name is a resource's, the type is not.
+        OtherType: The resource of this name has another type.
         LinkError: The dependency database did not answer.
     """
     found = await bus.ask(DEPENDENCY_DATABASE, AskResources(), Resources, within_s=REPLY_TIME_S)
@@ -32,7 +32,7 @@ async def completed(bus: Bus, order: Start) -> tuple[Start, str]:
 
 
 def complete(order: Start, resources: list[Resource]) -> tuple[Start, str]:
-    """Return the order as ``completed`` does, given the mission's resources.
+    """Return the result of ``completed`` for these resources.
 
     Example:
         >>> complete(Start("scout", "scout9"), [Resource("scout1", "scout")])[1]

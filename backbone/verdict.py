@@ -22,10 +22,10 @@ class Talk(msgspec.Struct, frozen=True, tag="talk"):
 
 
 class Verdict(msgspec.Struct, frozen=True, tag="verdict"):
-    """How the start went.
+    """The launcher's verdict on the start.
 
     Attributes:
-        exit_code: 0: the mission is up, and goes on; else the exit code of a mission that ended.
+        exit_code: 0: the mission is up and continues; else the exit code of a mission that ended.
     """
 
     exit_code: int
@@ -35,10 +35,10 @@ _lines = msgspec.json.Decoder(Talk | Verdict)
 
 
 class VerdictPipe:
-    """The launcher's end of the pipe; what is written after the verdict is dropped.
+    """The launcher's end of the pipe; lines after the verdict are dropped.
 
     Args:
-        file: Where to; closed after the verdict, and as soon as nobody reads it any more.
+        file: The pipe; closed after the verdict, or when its reader is gone.
     """
 
     def __init__(self, file: TextIO) -> None:

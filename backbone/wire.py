@@ -1,15 +1,15 @@
 """Structs to bytes and back, and the envelope around every message.
 
-Every message is a frozen msgspec struct sent as a MessagePack array whose first element is its
-schema name and version, ``<Name>/<version>``.  The envelope adds who said it, its place in what
-that source said, when (mission time), and because of which message (``cause``).
+Every message is a frozen msgspec struct, encoded as a MessagePack array whose first element is its schema name and
+version, ``<Name>/<version>``. The envelope adds the sender, its sequence number, the mission time, and the message that
+led to this one (``cause``).
 
 Rules of this file:
 
-* A message that cannot be read is refused with a class that says which of the four ways it is bad:
-  too big, not readable, of a schema nobody here knows, or of another version of a known one.
-* Reading never half succeeds: either the whole typed message, or a refusal.
-* Each field has its range (``ranges``); what is beyond is malformed.
+* An unreadable message is refused with one of four classes: too big, malformed, of an unknown schema, or of another
+  version of a known schema.
+* The reader returns the whole typed message or raises a refusal.
+* Each field has its range (``ranges``); a value outside its range is malformed.
 
 A change of a struct that old readers cannot read gets a new version: ``class Drive(Message, tag="Drive/2")``.
 """
@@ -42,18 +42,18 @@ class Message(
     tag_field="schema_and_version",
     tag=lambda name: f"{name}/1",
 ):
-    """Base of everything said on the bus. Derived classes repeat ``frozen=True`` for the type checker."""
+    """Base class of all messages. Derived classes repeat ``frozen=True`` for the type checker."""
 
 
 class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A message and where it comes from.
+    """A message with its origin.
 
     Attributes:
         wire: Version of this envelope.
-        source: Address of the component that said it.
-        sequence: Grows by one with everything that source says.
-        stamp_s: Mission time at which it was said, seconds.
-        cause: Id of the message that led to it, empty for a first cause.
+        source: Address of the sender.
+        sequence: Grows by one with each message of that sender.
+        stamp_s: Mission time of sending, seconds.
+        cause: Id of the message that led to it; empty: a first cause.
         body: The message.
     """
 
@@ -66,12 +66,12 @@ class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forb
 
     @property
     def id(self) -> str:
-        """Name of this message, unique in the mission while its source lives: ``<source>#<sequence>``."""
+        """Id of this message, unique in the mission while its sender lives: ``<source>#<sequence>``."""
         return f"{self.source}#{self.sequence}"
 
 
 class Refused(Message, frozen=True):
-    """How a refusal travels."""
+    """A refusal as a message."""
 
     code: Mention
     detail: Text
@@ -80,7 +80,7 @@ class Refused(Message, frozen=True):
 
     @classmethod
     def of(cls, refusal: Refusal) -> Refused:
-        """Return the message that carries this refusal."""
+        """Return this refusal as a message."""
         facts = {name: _bounded(fact) for name, fact in list(refusal.facts.items())[:MOST_FEW]}
         return cls(code_of(refusal), refusal.detail[:LONGEST_TEXT], refusal.remedy[:LONGEST_TEXT], facts)
 
@@ -90,35 +90,35 @@ class Refused(Message, frozen=True):
 
 
 class MalformedMessage(Refusal):
-    """The bytes are no message of any schema expected here."""
+    """The bytes are no valid message of an accepted schema."""
 
     code = "wire.malformed"
     remedy = "Send the struct as documented, unchanged and whole."
 
 
 class OversizedMessage(Refusal):
-    """The message is longer than any honest one."""
+    """The message is longer than ``MAX_MESSAGE_BYTES``."""
 
     code = "wire.oversized"
     remedy = f"Keep messages under {MAX_MESSAGE_BYTES} bytes; send large data as frames."
 
 
 class UnknownMessage(Refusal):
-    """The schema is not one this component answers."""
+    """The component does not answer messages of this schema."""
 
     code = "wire.unknown"
     remedy = "Ask a component that answers this message; 'facts' lists what is answered here."
 
 
 class WrongVersion(Refusal):
-    """The schema is known, the version is not."""
+    """The schema is known, but not its version."""
 
     code = "wire.version"
     remedy = "Run the same release of scout-backbone on every host."
 
 
 def _bounded(fact: Fact) -> Fact:
-    """Return the fact as it may travel: a refusal must arrive whatever it is about."""
+    """Return the fact in a bounded form, because every refusal must fit a message."""
     if isinstance(fact, str):
         return fact[:LONGEST_TEXT]
     return fact if not wildness(fact) else str(fact)
@@ -132,7 +132,7 @@ def write(envelope: Envelope[Any]) -> bytes:
     """Return the envelope as bytes.
 
     Raises:
-        OversizedMessage: It would be longer than ``MAX_MESSAGE_BYTES``.
+        OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
     """
     raw = _encoder.encode(envelope)
     if len(raw) > MAX_MESSAGE_BYTES:
@@ -151,10 +151,10 @@ def kinds_of(accepts: type[Any] | types.UnionType) -> tuple[type[Any], ...]:
 
 
 def refuse_oversized(length: int) -> None:
-    """Return if a message of so many bytes may be read: asked before they are copied out of the bus.
+    """Return if a message of this length may be read; called before its bytes are copied out of the bus.
 
     Raises:
-        OversizedMessage: It may not.
+        OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
     """
     if length > MAX_MESSAGE_BYTES:
         raise OversizedMessage(f"message of {length} bytes", bytes=length)
@@ -180,7 +180,7 @@ def plain(value: Any) -> Any:
 
 @functools.cache
 def holds_values_of_any_kind(kind: Any) -> bool:
-    """Say whether a value of this type, or one inside it, may be of any kind, so that types alone do not hold it."""
+    """Return whether this type admits values of any kind, which types alone cannot check."""
     if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
         return any(map(holds_values_of_any_kind, typing.get_type_hints(kind).values()))
     return kind is Any or any(map(holds_values_of_any_kind, typing.get_args(kind)))
@@ -204,10 +204,10 @@ class Reader(Generic[Body]):
         """Return the envelope these bytes hold.
 
         Raises:
-            OversizedMessage: Longer than ``MAX_MESSAGE_BYTES``.
-            WrongVersion: Envelope or message of another version.
-            UnknownMessage: A message, but none that is accepted here.
-            MalformedMessage: Anything else that does not fit, with the place where it does not.
+            OversizedMessage: The message is longer than ``MAX_MESSAGE_BYTES``.
+            WrongVersion: The envelope or the message has another version.
+            UnknownMessage: The schema of the message is not accepted here.
+            MalformedMessage: The message is not valid; the detail names the field.
         """
         refuse_oversized(len(raw))
         try:

@@ -1,1 +1,1 @@
-"""Bus and Clock: how components talk and what time it is."""
+"""Bus and Clock: messages between components, and the mission's time."""

@@ -1,10 +1,9 @@
 """Clocks: the only file that sleeps.
 
-``MissionClock`` follows the machine's monotonic clock from the mission's start, at the mission's
-rate.  ``VirtualLoop`` is an event loop in which time passes only when nothing is left to do: then it
-jumps to the next timer.  Everything that waits through asyncio (sleeps, time-outs) then runs on
-virtual time, in one process, as fast as the machine can and always in the same order.  Work that other
-loops give to threads is done by this one itself: it takes no virtual time, and its place in the order is fixed.
+``MissionClock`` follows the machine's monotonic clock from the mission's start, at the mission's rate. ``VirtualLoop``
+is an event loop with virtual time: when no callback is ready, it jumps to the next timer. So all sleeps and time-outs
+of asyncio run on virtual time, in one process, as fast as the machine can and always in the same order. This loop runs
+the work of threads itself: such work takes no virtual time, and its place in the order is fixed.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ class MissionClock:
     """Mission time on one machine.
 
     Args:
-        origin_monotonic_s: The machine's monotonic clock at mission time 0.
+        origin_monotonic_s: Reading of the machine's monotonic clock at mission time 0.
         rate: Mission seconds per second of the machine, above 0.
     """
 
@@ -69,7 +68,7 @@ class VirtualClock:
 
     @property
     def rate(self) -> float:
-        """Always 1: time-outs and mission time are the same here."""
+        """Always 1, because time-outs and mission time are the same."""
         return 1.0
 
     def now_s(self) -> float:
@@ -86,19 +85,19 @@ class VirtualClock:
 
 
 class NothingLeftToHappen(BackboneError):
-    """Every task waits for something that no timer will bring: a deadlock, found the moment it occurs."""
+    """Deadlock: all tasks wait, and no timer is set."""
 
 
 class EndOfVirtualTime(BackboneError):
-    """Virtual time went on for longer than it can be told exactly."""
+    """Virtual time has reached the end of its exact range."""
 
 
 RESOLUTION_S = time.get_clock_info("monotonic").resolution
-LAST_VIRTUAL_S = 2.0**23  # 97 days; beyond, steps of a float are coarser than the loop's 1 ns and timers never come
+LAST_VIRTUAL_S = 2.0**23  # 97 days; later, steps of a float are coarser than the loop's 1 ns and timers never expire
 
 
 class _JumpingSelector(selectors.BaseSelector):
-    """Selects without waiting; where it would have waited, the loop's time moves on instead."""
+    """Selects without waiting; instead of waiting it advances the loop's time."""
 
     def __init__(self) -> None:
         self._real = selectors.DefaultSelector()
@@ -145,10 +144,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def call_at(
         self, when: float, callback: Callable[[*Ts], object], *args: *Ts, context: Context | None = None
     ) -> asyncio.TimerHandle:
-        """Call it at this time; see ``asyncio.AbstractEventLoop.call_at``.
+        """Call the callback at this time; see ``asyncio.AbstractEventLoop.call_at``.
 
-        The loop takes a timer less than its resolution away for due and lets no time pass. Whoever then waits for
-        the rest of a nanosecond would do so for ever, so that rest is made one in which time passes.
+        A timer less than the loop's resolution away is due at once, and no time passes. A task that waits for the rest
+        of a nanosecond would wait for ever, so this method rounds such a rest up to a time that passes.
         """
         if self.time() < when < self.time() + RESOLUTION_S:
             when = self.time() + 2 * RESOLUTION_S
@@ -160,9 +159,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         func: Callable[[*Ts], T],
         *args: *Ts,
     ) -> asyncio.Future[T]:
-        """Do it here and now instead of in a thread; see ``asyncio.AbstractEventLoop.run_in_executor``.
+        """Run the function at once instead of in a thread; see ``asyncio.AbstractEventLoop.run_in_executor``.
 
-        Time would jump past a thread that is still at work, and who comes first would be the machine's choice.
+        With a thread, time would jump past its unfinished work, and the order of events would depend on the machine.
         """
         future: asyncio.Future[T] = self.create_future()
         try:

@@ -1,11 +1,11 @@
-"""Bus and Clock: all that a component knows of the world between components.
+"""Bus and Clock: a component's interfaces to other components and to the mission's time.
 
 Three implementations of ``Bus`` pass one conformance suite: ``zenoh_bus`` between processes,
-``local_bus`` inside one, and ``shared_bus`` where several components share a process among others.
-Which of them a component got is never visible to it.
+``local_bus`` inside one, and ``shared_bus`` for the members of a shared process. A component cannot see which of them
+it has.
 
-Words: a *question* is asked of one address and answered by exactly one reply or refusal; a
-*publication* goes to whoever subscribed; a *liveliness token* stands as long as its component lives.
+Words: a *question* goes to one address and gets exactly one reply or refusal; a *publication* goes to all subscribers;
+a *liveliness token* stands while its component lives.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ LifeListener = Callable[[str, bool], None]
 LinkListener = Callable[[bool], None]
 
 current_cause: ContextVar[str] = ContextVar("current_cause", default="")
-"""Id of the message being handled; what is said meanwhile, also by tasks begun meanwhile, names it as its cause."""
+"""Id of the message being handled, which is the cause of all messages from this handler and its tasks."""
 
 
 class Subscription(Protocol):
-    """Something declared on the bus that can be taken back."""
+    """A declaration on the bus that can be withdrawn."""
 
     def close(self) -> None:
-        """Take it back; what already arrived may still be handed over. Closing twice is allowed."""
+        """Withdraw the declaration; messages that have already arrived may still be delivered. Idempotent."""
 
 
 class Clock(Protocol):
@@ -55,19 +55,19 @@ class Clock(Protocol):
 
 
 class Bus(Protocol):
-    """How components talk.
+    """Questions, publications and liveliness tokens between components.
 
-    Addresses and missions that cannot be part of a key are refused with ``IllegalName``. On a closed bus
-    asking ends with ``NoResponder``, publishing does nothing, and declaring anything is a bug.
+    Addresses and missions that cannot be part of a key are refused with ``IllegalName``. On a closed bus a question
+    ends with ``NoResponder``, a publication does nothing, and a declaration is a bug.
     """
 
     @property
     def mission(self) -> str:
-        """Name of the mission all keys of this bus belong to."""
+        """Name of the mission of all keys of this bus."""
 
     @property
     def source(self) -> str:
-        """Address of the component that speaks on this bus."""
+        """Address of the component that uses this bus."""
 
     async def ask(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask one component and return its answer.
@@ -75,26 +75,26 @@ class Bus(Protocol):
         Args:
             address: ``<subsystem>/<component>``.
             question: The message.
-            reply: Class the answer must have.
+            reply: Class of the answer.
             within_s: Seconds of the machine (not mission time: a link does not speed up with the clock).
 
         Raises:
-            Refusal: It understood and said no, as the class it raised there.
-            NoResponder: Nobody is there, or it died before it answered. The outcome is unknown.
-            ReplyTimeout: No answer in time. The outcome is unknown.
-            MalformedMessage: The answer is none of class ``reply``. The outcome is unknown.
+            Refusal: The component refused; the class is the one it raised.
+            NoResponder: No component serves the address, or it died before its answer. The outcome is unknown.
+            ReplyTimeout: No answer arrived in time. The outcome is unknown.
+            MalformedMessage: The answer has another class than ``reply``. The outcome is unknown.
         """
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
-        """Answer questions asked of this address until closed.
+        """Answer questions to this address until closed.
 
-        ``answer`` runs as a task of its own for each question; a ``Refusal`` it raises travels back.
-        Unreadable questions are refused without calling it. Any other exception is a bug: it is
-        handed to ``on_bug`` and the asker sees ``NoResponder``.
+        ``answer`` runs as a task of its own for each question; its ``Refusal`` is raised again at the requester.
+        Unreadable questions are refused without a call. Any other exception is a bug: ``on_bug`` gets it, and the
+        requester gets ``NoResponder``.
         """
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
-        """Hand the message to whoever subscribed now. Never waits, never fails for lack of listeners."""
+        """Send the message to all present subscribers. Never waits, and needs no subscriber."""
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
@@ -103,17 +103,16 @@ class Bus(Protocol):
 
         Args:
             latest: Keep only the newest undelivered publication of each address (pictures, states); else all, in
-                the order in which each source said them.
+                the order of each source.
         """
 
     def declare_alive(self, address: str) -> Subscription:
         """Raise this component's liveliness token. Declared last, it means ready."""
 
     def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
-        """Call ``listener(address, alive)`` for each token that stands now and for every change later.
+        """Call ``listener(address, alive)`` for each token that stands now and for every later change.
 
-        A token falls when its process dies, closes it, or when the link to it is cut; ``watch_link``
-        tells the last case from the others.
+        A token falls when its process dies or closes it, or when a link is cut; ``watch_link`` reports the own link.
         """
 
     def watch_link(self, listener: LinkListener) -> Subscription:
@@ -121,18 +120,19 @@ class Bus(Protocol):
 
     @property
     def on_bug(self) -> Callable[[BaseException], None]:
-        """Who is told of an exception that is no refusal; settable."""
+        """Callback for an exception that is no refusal; settable."""
 
     @on_bug.setter
     def on_bug(self, tell: Callable[[BaseException], None]) -> None: ...
 
     def statistics(self) -> BusStatistics:
-        """Return what passed since the bus was opened."""
+        """Return the counts of messages since the bus was opened."""
 
     async def close(self) -> None:
-        """Take back everything declared and leave; return when that is done, however often called.
+        """Withdraw all declarations and leave the network. Idempotent.
 
-        Questions still open, asked here or being answered here, end with ``NoResponder`` for their askers.
+        Open questions of this bus, and questions that it is still answering, end with ``NoResponder`` at their
+        requesters.
         """
 
 
@@ -143,7 +143,7 @@ class BusStatistics(Message, frozen=True):
         asked: Questions sent.
         answered: Questions answered, refusals included.
         published: Publications sent.
-        heard: Publications handed to listeners.
+        heard: Publications delivered to listeners.
         refused: Answers that were refusals.
         unreadable: Messages that could not be read, in either direction.
     """

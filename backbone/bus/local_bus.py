@@ -1,10 +1,10 @@
-"""The bus inside one process: objects are handed over as they are, never serialised, never copied.
+"""The bus inside one process: it delivers the objects themselves, without serialization and without copies.
 
-Deliveries are separate steps of the event loop in the order in which they were said, so on a
-``VirtualLoop`` the same program gives the same run.
+Each delivery is a separate step of the event loop, in the order of sending, so on a ``VirtualLoop`` the same program
+gives the same run.
 
-``LocalBus`` is a whole bus, for missions that live in one process. What neighbors in one process hand
-over to each other is the same for ``shared_bus``, whose members speak with other processes too.
+``LocalBus`` is a complete bus, for missions in one process. ``shared_bus``, whose members also reach other processes,
+uses the same delivery between neighbors.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from backbone.keys import Conversation, key
 from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
 
 Answered = Callable[[Envelope[Any] | None], None]
-"""Takes the answer to a question, or None if the one asked died over it."""
+"""Callback with the answer to a question, or None if the component died over it."""
 
 
 class LocalNetwork:
-    """What the buses of one process share. One network is one mission."""
+    """The network of the buses of one process and one mission."""
 
     def __init__(self, mission: str = "local") -> None:
         self.mission = mission
@@ -36,29 +36,29 @@ class LocalNetwork:
         self.watchers: list[Watching] = []
 
     def join(self, source: str, clock: Clock) -> LocalBus:
-        """Return a new bus on this network that speaks as ``source``."""
+        """Return a new bus of the component ``source`` on this network."""
         return LocalBus(self, source, clock)
 
-    # How things travel. A network on which they do not always arrive overrides these three.
+    # Transport. A network that loses messages overrides these three.
     def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
-        """Hand the question to who serves the address, and its outcome to ``answered``.
+        """Deliver the question to the component that serves the address, and its outcome to ``answered``.
 
         Raises:
-            NoResponder: Nobody does.
+            NoResponder: No component serves the address.
         """
         server = self.servers.get(address)
         if server is None:
-            raise NoResponder(f"nobody answers at {address}")
+            raise NoResponder(f"no component answers at {address}")
         answering = server.owner.start(_answer(server, asked))
         answering.add_done_callback(lambda task: answered(_outcome(task)))
 
     def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
-        """Hand a publication to one of those who listen."""
+        """Deliver a publication to one listener."""
         listening.deliver(address, envelope)
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
-        """Tell one of those who watch that a token rose or fell."""
-        watching.tell(address, alive)
+        """Deliver the rise or fall of a token to one watcher."""
+        watching.notify(address, alive)
 
 
 class Neighbor(BusBase):
@@ -73,7 +73,7 @@ class Neighbor(BusBase):
     declared: list[Declared]
 
     async def ask_neighbor(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
-        """Ask whoever serves the address in this process; see ``Bus.ask``."""
+        """Ask the neighbor that serves the address; see ``Bus.ask``."""
         answered = self.open_question()
         self.asked += 1
         asked = self.envelope(question)
@@ -95,26 +95,26 @@ class Neighbor(BusBase):
             raise MalformedMessage(f"{address} answered {type(envelope.body).__name__}, not {reply.__name__}")
         return envelope.body
 
-    def tell_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Any]) -> None:
-        """Hand what was published to every listener in this process."""
+    def publish_to_neighbors(self, address: str, conversation: Conversation, envelope: Envelope[Any]) -> None:
+        """Deliver a publication to every listener in this process."""
         for listening in self.network.listeners[conversation]:
             if _matches(listening.pattern, address):
                 self.network.carry_publication(listening, address, envelope)
 
     def serve_neighbors(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
-        """Answer questions asked in this process; of several who serve an address the latest is asked."""
+        """Answer questions from this process; if several neighbors serve an address, the newest one answers."""
         serving = self.network.servers[address] = Serving(self, address, accepts, answer)
         return serving
 
-    def hear_neighbors(
+    def subscribe_to_neighbors(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool
     ) -> Listening:
-        """Hear publications made in this process."""
+        """Subscribe to publications of this process."""
         listening = Listening(self, address, conversation, accepts, listener, latest)
         self.network.listeners[conversation].append(listening)
         return listening
 
-    def show_neighbors(self, address: str) -> Declared:
+    def declare_to_neighbors(self, address: str) -> Declared:
         """Raise a token in this process."""
         tokens = self.network.tokens.setdefault(address, [])
 
@@ -139,7 +139,7 @@ class Neighbor(BusBase):
         return watching
 
     def take_back_from_neighbors(self) -> None:
-        """Take back everything declared in this process."""
+        """Withdraw all declarations in this process."""
         for declared in list(self.declared):
             declared.close()
 
@@ -156,7 +156,7 @@ class Declared:
         owner.declared.append(self)
 
     def close(self) -> None:
-        """Take it back."""
+        """Withdraw the declaration."""
         if not self.closed:
             self.closed = True
             self.owner.declared.remove(self)
@@ -164,7 +164,7 @@ class Declared:
 
 
 class Serving(Declared):
-    """Somebody who answers at an address."""
+    """A declaration that answers at an address."""
 
     def __init__(self, owner: Neighbor, address: str, accepts: Accepted, answer: Answer) -> None:
         super().__init__(owner, lambda: self._leave(owner.network, address))
@@ -176,7 +176,7 @@ class Serving(Declared):
 
 
 class Listening(Declared):
-    """Somebody who hears a conversation."""
+    """A declaration that subscribes to a conversation."""
 
     def __init__(
         self,
@@ -193,7 +193,7 @@ class Listening(Declared):
         self.newest: dict[str, Envelope[Any]] = {}
 
     def deliver(self, address: str, envelope: Envelope[Any]) -> None:
-        """Hand it over in a step of its own."""
+        """Deliver the publication in a step of its own."""
         loop = asyncio.get_running_loop()
         if not self.latest:
             loop.call_soon(self._hand_over, envelope)
@@ -217,18 +217,18 @@ class Listening(Declared):
 
 
 class Watching(Declared):
-    """Somebody who watches tokens."""
+    """A declaration that watches tokens."""
 
     def __init__(self, owner: Neighbor, pattern: str, listener: LifeListener) -> None:
         super().__init__(owner, lambda: owner.network.watchers.remove(self))
         self.pattern, self.listener = pattern, listener
 
     def concerns(self, address: str) -> bool:
-        """Say whether the listener asked about this address."""
+        """Return whether the listener watches this address."""
         return _matches(self.pattern, address)
 
-    def tell(self, address: str, alive: bool) -> None:
-        """Tell the listener in a step of its own, if it asked about this address."""
+    def notify(self, address: str, alive: bool) -> None:
+        """Call the listener in a step of its own, if it watches this address."""
         if self.concerns(address):
             asyncio.get_running_loop().call_soon(self._hand_over, address, alive)
 
@@ -238,7 +238,7 @@ class Watching(Declared):
 
 
 class LocalBus(Neighbor):
-    """One component's voice and ears on a ``LocalNetwork``."""
+    """One component's bus on a ``LocalNetwork``."""
 
     def __init__(self, network: LocalNetwork, source: str, clock: Clock) -> None:
         super().__init__(network.mission, source, clock)
@@ -251,32 +251,32 @@ class LocalBus(Neighbor):
         return await self.ask_neighbor(address, question, reply, within_s=within_s)
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> Serving:
-        """Answer questions asked of this address; see ``Bus.serve``."""
+        """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         _check(self.mission, address)
         return self.serve_neighbors(address, accepts, answer)
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
-        """Hand the message to whoever subscribed; see ``Bus.publish``."""
+        """Send the message to all subscribers; see ``Bus.publish``."""
         if self.closed:
             return
         _check(self.mission, address)
         self.published += 1
-        self.tell_neighbors(address, conversation, self.envelope(message))
+        self.publish_to_neighbors(address, conversation, self.envelope(message))
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
     ) -> Listening:
-        """Hear publications; see ``Bus.subscribe``."""
+        """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
         _check(self.mission, address)
-        return self.hear_neighbors(address, conversation, accepts, listener, latest=latest)
+        return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest)
 
     def declare_alive(self, address: str) -> Declared:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         _check(self.mission, address)
-        return self.show_neighbors(address)
+        return self.declare_to_neighbors(address)
 
     def watch_alive(self, address: str, listener: LifeListener) -> Watching:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
@@ -285,7 +285,7 @@ class LocalBus(Neighbor):
         return self.watch_neighbors(address, listener)
 
     def watch_link(self, listener: LinkListener) -> Declared:
-        """Report the link, which inside one process is up for good."""
+        """Report the link, which is always up inside one process."""
         self.require_open()
         watching = Declared(self, lambda: None)
 
@@ -297,11 +297,11 @@ class LocalBus(Neighbor):
         return watching
 
     def take_back(self) -> None:
-        """Take back everything declared."""
+        """Withdraw all declarations."""
         self.take_back_from_neighbors()
 
     async def leave(self) -> None:
-        """Leave the network, of which nothing is held any more."""
+        """Return at once, because no declaration is left in the network."""
 
 
 async def _answer(server: Serving, asked: Envelope[Any]) -> Envelope[Any] | None:
@@ -319,7 +319,7 @@ def _outcome(answering: asyncio.Task[Envelope[Any] | None]) -> Envelope[Any] | N
 
 
 def _check(mission: str, address: str) -> None:
-    """Refuse here what the bus between processes would refuse as part of a key."""
+    """Refuse the names that the bus between processes refuses in keys."""
     key(mission, address, Conversation.ASK)
 
 

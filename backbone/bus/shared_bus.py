@@ -1,12 +1,12 @@
-"""The bus of a process that several components share: one session, one ``SharedBus`` for each member.
+"""The bus of a shared process: one session, one ``SharedBus`` for each member.
 
-Neighbors hand each other the object itself, as on the local bus; everybody else is reached over Zenoh.
-A member sees no difference, and nothing reaches it by both ways: what it publishes leaves the process
-once, for others, and what it asks of a neighbor does not leave the process at all.
+Neighbors exchange the objects themselves, as on the local bus; other processes are reached over Zenoh. A member sees no
+difference and gets no message twice: a publication leaves the process once, for other processes, and a question to a
+neighbor never leaves the process.
 
-A session tells its own tokens unreliably: late echoes of them come back from the hub, and one that falls
-here is told as fallen although another process holds it too. So neighbors' tokens are told here, and what
-the session says about an address that is or was a neighbor's is taken from the hub's own word.
+A session reports its own tokens unreliably: late echoes of them return from the hub, and a token that falls here is
+reported as fallen although another process holds it too. So this file reports neighbors' tokens, and asks the hub about
+an address that is or was a neighbor's.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from backbone.wire import Message
 
 
 class SharedSession:
-    """One session to the hub and the members who speak over it. Open it inside a running event loop.
+    """One session to the hub and the members that use it. Open it inside a running event loop.
 
     Args:
         mission: Name of the mission.
-        endpoint: Where the hub listens.
-        secret: What it asks its clients for; empty: nothing.
+        endpoint: Endpoint of the hub.
+        secret: Secret of the mission; empty: the hub asks for none.
 
     Raises:
-        HubUnreachable: Nobody listens there.
+        HubUnreachable: No hub listens at the endpoint.
     """
 
     def __init__(self, mission: str, endpoint: str, secret: str = "") -> None:
@@ -38,7 +38,7 @@ class SharedSession:
         self._neighbors = LocalNetwork(mission)
 
     def join(self, source: str, clock: Clock) -> SharedBus:
-        """Return a new member's bus. It is closed before the session is."""
+        """Return a new member's bus. Close it before the session."""
         return SharedBus(self._neighbors, source, clock, self._session)
 
     async def close(self) -> None:
@@ -47,7 +47,7 @@ class SharedSession:
 
 
 class SharedBus(Neighbor, ZenohBus):
-    """One member's voice and ears, towards its neighbors and towards other processes."""
+    """One member's bus, to its neighbors and to other processes."""
 
     def __init__(self, neighbors: LocalNetwork, source: str, clock: Clock, session: Any) -> None:
         super().__init__(neighbors.mission, source, clock, session, shared=True)
@@ -61,26 +61,26 @@ class SharedBus(Neighbor, ZenohBus):
         return await super().ask(address, question, reply, within_s=within_s)
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
-        """Answer questions asked of this address; see ``Bus.serve``."""
+        """Answer questions to this address; see ``Bus.serve``."""
         elsewhere = super().serve(address, accepts, answer)
         return _Both(self.serve_neighbors(address, accepts, answer), elsewhere)
 
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
-        """Hand the message to whoever subscribed; see ``Bus.publish``."""
+        """Send the message to all subscribers; see ``Bus.publish``."""
         if not self.closed:
-            self.tell_neighbors(address, conversation, self.send(address, conversation, message))
+            self.publish_to_neighbors(address, conversation, self.send(address, conversation, message))
 
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
     ) -> Subscription:
-        """Hear publications; see ``Bus.subscribe``."""
+        """Subscribe to publications; see ``Bus.subscribe``."""
         elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest)
-        return _Both(self.hear_neighbors(address, conversation, accepts, listener, latest=latest), elsewhere)
+        return _Both(self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest), elsewhere)
 
     def declare_alive(self, address: str) -> Subscription:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
         elsewhere = super().declare_alive(address)
-        return _Both(elsewhere, self.show_neighbors(address))
+        return _Both(elsewhere, self.declare_to_neighbors(address))
 
     def watch_alive(self, address: str, listener: LifeListener) -> Subscription:
         """Watch liveliness tokens; see ``Bus.watch_alive``."""
@@ -89,13 +89,13 @@ class SharedBus(Neighbor, ZenohBus):
         return _Both(_Both(elsewhere, self.watch_neighbors(address, watch.here_changed)), watch)
 
     def take_back(self) -> None:
-        """Take back everything declared, here and elsewhere."""
+        """Withdraw all declarations, in this process and on the session."""
         self.take_back_from_neighbors()
         super().take_back()
 
 
 class _Watch:
-    """One watch over tokens here and elsewhere, told as one."""
+    """One watch over tokens of neighbors and of other processes."""
 
     def __init__(self, bus: SharedBus, listener: LifeListener) -> None:
         self._bus, self._listener = bus, listener
@@ -104,31 +104,31 @@ class _Watch:
         self._stale: set[str] = set()
 
     def here_changed(self, address: str, stands: bool) -> None:
-        """Take note that a neighbor's token rose or fell."""
+        """Record that a neighbor's token rose or fell."""
         if not stands:
             self._check(address)
             return
         check = self._checks.pop(address, None)
-        if check is not None:  # it fell and rose again before the hub was heard: both are told
+        if check is not None:  # it fell and rose again before the hub answered: report both
             check.cancel()
-            self._tell(address, False)
-        self._tell(address, True)
+            self._notify(address, False)
+        self._notify(address, True)
 
     def elsewhere_changed(self, address: str, stands: bool) -> None:
-        """Take note of what the session says."""
+        """Record a report of the session."""
         if address not in self._bus.network.tokens:
-            self._tell(address, stands)
+            self._notify(address, stands)
         elif not self._bus.network.tokens[address]:
             self._check(address)
 
     def close(self) -> None:
-        """Tell nothing more."""
+        """Stop calling the listener."""
         for check in self._checks.values():
             check.cancel()
         self._checks.clear()
 
     def _check(self, address: str) -> None:
-        """Have the hub asked whether the token stands, again if it is just being asked."""
+        """Ask the hub whether the token stands; if a question is open, ask again after it."""
         if address in self._checks:
             self._stale.add(address)
         else:
@@ -141,9 +141,9 @@ class _Watch:
             stands = await self._bus.stands(address)
             is_stale = address in self._stale
         del self._checks[address]
-        self._tell(address, stands)
+        self._notify(address, stands)
 
-    def _tell(self, address: str, stands: bool) -> None:
+    def _notify(self, address: str, stands: bool) -> None:
         if stands is (address in self._stands):
             return
         if stands:
@@ -154,12 +154,12 @@ class _Watch:
 
 
 class _Both:
-    """What was declared in two places."""
+    """Two declarations that close together."""
 
     def __init__(self, first: Subscription, second: Subscription) -> None:
         self._declared = (first, second)
 
     def close(self) -> None:
-        """Take both back, the first first."""
+        """Withdraw both, in order."""
         for declared in self._declared:
             declared.close()

@@ -1,12 +1,11 @@
 """The bus between processes, over Eclipse Zenoh. The only file that imports zenoh.
 
-Zenoh's threads never run component code: they put what arrived into an inbox and wake the event
-loop once for a whole burst.  ``get`` callbacks are direct (zenoh would start a thread for each
-indirect one); subscribers and queryables keep their one indirect thread.
+Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
+burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one; subscribers and
+queryables keep their one indirect thread.
 
-Settings that were measured: clients of one hub, no scouting, lease 2 s, ``express`` on questions
-and replies only, what is said once is waited for, what is repeated may be dropped
-(docs/decisions/0003-zenoh-settings.md).
+Measured settings: clients of one hub, no scouting, lease 2 s, ``express`` on questions and replies only, blocking for
+messages that are sent once, dropping for repeated messages (docs/decisions/0003-zenoh-settings.md).
 """
 
 from __future__ import annotations
@@ -51,14 +50,14 @@ log = logging.getLogger(__name__)
 LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
 OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine is there within this
-WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest a hung consumer may stall a sender
+WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
 _TIMEOUT_PAYLOAD = b"Timeout"
 
-# Priority and what to do when a queue is full. Never express: without batching a queue holds two messages, and
-# of a burst of 1000 up to 360 were dropped; with batching none was, at a thirtieth of the cost for the sender.
+# Priority, and congestion control for a full queue. Never express: without batching a queue holds two messages and
+# dropped up to 360 of a burst of 1000; with batching it dropped none, at a thirtieth of the sender's cost.
 _URGENT = (zenoh.Priority.REAL_TIME, zenoh.CongestionControl.BLOCK)
 _SURE = (zenoh.Priority.DATA, zenoh.CongestionControl.BLOCK)
-MOST_PUBLISHERS = 64  # chosen: of a component's own far fewer; a framegrabber has one for each ARC it had
+MOST_PUBLISHERS = 64  # chosen: most components have far fewer; a framegrabber has one for each of its ARCs
 _REPEATED = (zenoh.Priority.DATA, zenoh.CongestionControl.DROP)
 _BULK = (zenoh.Priority.DATA_LOW, zenoh.CongestionControl.DROP)
 _QUALITY = {
@@ -97,10 +96,10 @@ _RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "per
 
 
 def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
-    """Return the settings of a component that talks through the hub at ``endpoint``.
+    """Return the settings of a client of the hub at ``endpoint``.
 
     Args:
-        secret: Proved to the hub, without being sent; empty: the hub asks for none.
+        secret: Secret that the client proves without sending it; empty: the hub asks for none.
     """
     auth = {"usrpwd": {"user": USER, "password": secret}} if secret else {}
     return _config(
@@ -118,10 +117,10 @@ def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
 
 
 def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
-    """Return the settings of a hub that listens on these endpoints and joins the hubs at the others.
+    """Return the settings of a hub that listens at some endpoints and joins the hubs at others.
 
     Args:
-        dictionary_file: Users and secrets of the clients it lets in; empty: it lets in all who reach it.
+        dictionary_file: Users and secrets of its clients; empty: it authenticates no client.
     """
     settings: dict[str, Any] = {
         "mode": "router",
@@ -138,7 +137,7 @@ def _is_hub(config: zenoh.Config) -> bool:
 
 
 def _unreachable(config: zenoh.Config, error: zenoh.ZError) -> HubUnreachable:
-    """Return what to tell of a session that did not open; zenoh's own words name its source lines."""
+    """Return the error of a session that did not open; zenoh's own text names lines of its source."""
     if _is_hub(config):
         return HubUnreachable(str(error))
     return HubUnreachable(f"no hub answers at {', '.join(json.loads(config.get_json('connect/endpoints')))}")
@@ -148,7 +147,7 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
     """Return a new session.
 
     Raises:
-        HubUnreachable: Nobody listens where the settings say, or (for a hub) the port is taken.
+        HubUnreachable: No hub listens at the endpoint, or (for a hub) the port is taken.
     """
     try:
         return zenoh.open(config)
@@ -162,13 +161,12 @@ async def close_session(session: zenoh.Session) -> None:
 
 
 class ZenohBus(BusBase):
-    """One component's voice and ears on a Zenoh session. Open it inside a running event loop.
+    """One component's bus on a Zenoh session. Open it inside a running event loop.
 
     Args:
         session: Closed with the bus, unless it is ``shared``.
-        is_hub: Whether the session is the hub itself.
-        shared: Whether other buses of this process speak over the session too. What is published here then
-            reaches other processes only.
+        is_hub: True if the session is the hub itself.
+        shared: True if other buses of this process use the session too. Then publications reach other processes only.
     """
 
     def __init__(
@@ -194,16 +192,16 @@ class ZenohBus(BusBase):
         """Return a bus on a new session.
 
         Raises:
-            HubUnreachable: Nobody listens where the settings say, or (for a hub) the port is taken.
+            HubUnreachable: No hub listens at the endpoint, or (for a hub) the port is taken.
         """
         return cls(mission, source, clock, open_session(config), is_hub=_is_hub(config))
 
     @classmethod
     async def open_when_up(cls, mission: str, source: str, clock: Clock, config: zenoh.Config) -> ZenohBus:
-        """Return a bus on a new session as soon as the hub listens, without holding up the event loop.
+        """Return a bus on a new session as soon as the hub listens, without blocking the event loop.
 
         Raises:
-            HubUnreachable: It did not listen within ``OPEN_TIMEOUT_MS``.
+            HubUnreachable: The hub did not listen within ``OPEN_TIMEOUT_MS``.
         """
         pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="zenoh_open")
         opening = pool.submit(zenoh.open, config)
@@ -248,7 +246,7 @@ class ZenohBus(BusBase):
     ) -> Reply:
         what = type(question).__name__
         if got is None:
-            raise NoResponder(f"nobody answered {what} at {address}")
+            raise NoResponder(f"no component answered {what} at {address}")
         if got.err is not None:
             payload = got.err.payload.to_bytes()
             if payload == _TIMEOUT_PAYLOAD:
@@ -267,7 +265,7 @@ class ZenohBus(BusBase):
         return cast("Reply", body)
 
     def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
-        """Answer questions asked of this address; see ``Bus.serve``."""
+        """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         reader = _reader(accepts)
         own = key(self._mission, address, Conversation.ASK)
@@ -286,9 +284,9 @@ class ZenohBus(BusBase):
         except Refusal as unreadable:
             self.unreadable += 1
             query.reply_err(write(self.envelope(Refused.of(unreadable))))
-        except zenoh.ZError as error:  # the asker or the link is gone: nobody is left to tell
+        except zenoh.ZError as error:  # the requester or the link is gone
             log.info("reply on %s not sent: %s", own, error)
-        except Exception as bug:  # the reply cannot be written
+        except Exception as bug:  # the reply cannot be encoded
             self.on_bug(bug)
         finally:
             query.drop()  # type: ignore[no-untyped-call]
@@ -301,12 +299,12 @@ class ZenohBus(BusBase):
 
     # ------------------------------------------------------------------ publications
     def publish(self, address: str, conversation: Conversation, message: Message) -> None:
-        """Hand the message to whoever subscribed; see ``Bus.publish``."""
+        """Send the message to all subscribers; see ``Bus.publish``."""
         if not self.closed:
             self.send(address, conversation, message)
 
     def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
-        """Publish over the session and return what was said, in its envelope."""
+        """Publish over the session and return the envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
         self._publishers.move_to_end((address, conversation))
         self.published += 1
@@ -330,7 +328,7 @@ class ZenohBus(BusBase):
     def subscribe(
         self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
     ) -> Subscription:
-        """Hear publications; see ``Bus.subscribe``."""
+        """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
         pattern = key(self._mission, address, conversation)
         receive = _Latest(self, _reader(accepts), listener) if latest else _Each(self, _reader(accepts), listener)
@@ -344,7 +342,7 @@ class ZenohBus(BusBase):
         return self._declare(self._session.liveliness().declare_token(own))
 
     async def stands(self, address: str) -> bool:
-        """Say whether the hub knows of a token at this address; without a hub it does not.
+        """Return whether the hub has a token at this address; False without a hub.
 
         Raises:
             NoResponder: The bus is closed already.
@@ -377,9 +375,9 @@ class ZenohBus(BusBase):
         )
 
     def watch_link(self, listener: LinkListener) -> _Declared:
-        """Report when this session's link goes or comes; see ``Bus.watch_link``.
+        """Report the loss and return of this session's link; see ``Bus.watch_link``.
 
-        A hub is its own hub: for it the link is up for good, whoever else comes and goes.
+        The link of a hub is always up.
         """
         self.require_open()
         if self._is_hub:
@@ -401,13 +399,13 @@ class ZenohBus(BusBase):
 
     # ------------------------------------------------------------------ leaving
     def take_back(self) -> None:
-        """Take back everything declared."""
+        """Withdraw all declarations."""
         for declared in tuple(self._declared):
             declared.close()
 
     async def leave(self) -> None:
-        """Leave the session, which is closed unless others speak over it; return when its threads have ended."""
-        self._inbox.clear()  # questions not yet begun: their askers hear that nobody answered
+        """Close the session unless other buses use it; return when its threads have ended."""
+        self._inbox.clear()  # pending questions: their requesters get ``NoResponder``
         if not self._shared:
             await close_session(self._session)
             return
@@ -417,13 +415,13 @@ class ZenohBus(BusBase):
 
     # ------------------------------------------------------------------ from zenoh's threads into the loop
     def push(self, act: Callable[[Any], None], what: Any) -> None:
-        """Have the loop call ``act(what)``; called from zenoh's threads."""
+        """Make the loop call ``act(what)``; called from zenoh's threads."""
         self._inbox.append((act, what))
         if not self._woken:
             self._woken = True
             try:
                 self._loop.call_soon_threadsafe(self._drain)
-            except RuntimeError:  # the loop is closed: nobody is left to be told
+            except RuntimeError:  # the loop is closed
                 log.debug("inbox dropped after the loop's end")
 
     def _drain(self) -> None:
@@ -434,7 +432,7 @@ class ZenohBus(BusBase):
                 continue
             try:
                 act(what)
-            except Exception as bug:  # one bad arrival must not take the rest of the burst along
+            except Exception as bug:  # one bad arrival must not lose the rest of the burst
                 self.on_bug(bug)
 
     def _declare(self, entity: Any) -> _Declared:
@@ -444,18 +442,18 @@ class ZenohBus(BusBase):
 
 
 class _Declared:
-    """A zenoh entity that can be taken back once, or none where nothing had to be declared."""
+    """A zenoh entity that can be withdrawn once; None if no entity was needed."""
 
     def __init__(self, entity: Any, register: set[_Declared]) -> None:
         self._entity, self._register = entity, register
 
     @property
     def stands(self) -> bool:
-        """Not taken back yet."""
+        """True until it is withdrawn."""
         return self in self._register
 
     def close(self) -> None:
-        """Take it back."""
+        """Withdraw the declaration."""
         if self.stands:
             self._register.remove(self)
             if self._entity is not None:
@@ -463,7 +461,7 @@ class _Declared:
 
 
 class _Arrived:
-    """What a question's zenoh callbacks leave for the loop: the first reply, or None when there was none."""
+    """Passes a question's first reply to the loop, or None if there was none."""
 
     __slots__ = ("_answered", "_bus", "_replied")
 
@@ -471,7 +469,7 @@ class _Arrived:
         self._bus, self._answered, self._replied = bus, answered, False
 
     def reply(self, got: zenoh.Reply) -> None:
-        self._replied = True  # exactly one answers: the end that follows has nothing to add
+        self._replied = True  # exactly one component answers, so the end that follows adds nothing
         self._bus.push(self._settle, got)
 
     def end(self) -> None:
@@ -502,10 +500,10 @@ class _Each:
 
 
 class _Latest(_Each):
-    """Receives of each key only the newest sample not yet handed over.
+    """Receives only the newest undelivered sample of each key.
 
-    The two threads meet in single steps of a dictionary and one flag. The order makes it safe: zenoh's
-    thread stores before it looks at the flag, the loop lowers the flag before it takes out.
+    Two threads share a dictionary and a flag, in atomic steps. Their order makes this safe: zenoh's thread stores
+    before it reads the flag, and the loop clears the flag before it takes samples out.
     """
 
     def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
@@ -527,10 +525,10 @@ class _Latest(_Each):
 
 
 def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
-    """Return what was sent; what is too long for a message is not even copied.
+    """Return the payload; a payload that is too long is not copied.
 
     Raises:
-        OversizedMessage: It is.
+        OversizedMessage: The payload is too long for a message.
     """
     if payload is None:
         return b""
@@ -557,6 +555,6 @@ def _reply_reader(reply: type[Any]) -> Reader[Any]:
 
 
 def _close_unwanted(opening: Future[zenoh.Session]) -> None:
-    """Close a session that opened after its opener was cancelled: an open one would keep the process from ending."""
+    """Close a session that opened after its opener was cancelled, because an open session keeps the process alive."""
     if opening.exception() is None:
         opening.result().close()  # type: ignore[no-untyped-call]

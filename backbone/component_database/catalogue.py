@@ -1,10 +1,10 @@
-"""Catalogue: which component types exist, and whether one more of a type may start.
+"""Catalogue: the component types of a mission, and admission control by multiplicity.
 
 Rules:
 
-* Behaviors and the like as often as wanted, types of multiplicity ONE once (RAM 2002, "Backbone").
-* Core services are never started by being asked for here; who asks hears which one runs, and where.
-* What runs is the nameserver's to know; it is an argument here.
+* A type of multiplicity ONE may run once, all other types any number of times (RAM 2002, "Backbone").
+* Core services are never admitted; the refusal gives name and host of the running one.
+* The nameserver knows the running components; here they are an argument.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Catalogue:
     """All component types of one mission.
 
     Args:
-        types: Names unique.
+        types: Component types with unique names.
     """
 
     def __init__(self, types: Iterable[ComponentType]) -> None:
@@ -38,7 +38,7 @@ class Catalogue:
         """Return the type of this name.
 
         Raises:
-            UnknownType: There is none.
+            UnknownType: The mission has no type of this name.
         """
         found = self._types.get(type_name)
         if found is None:
@@ -48,24 +48,24 @@ class Catalogue:
         return found
 
     def depends_on_what_runs(self, type_name: str) -> bool:
-        """Say whether admission of this type needs to know who runs.
+        """Return whether admission of this type depends on the running components.
 
         Raises:
-            UnknownType: There is none of this name.
+            UnknownType: The mission has no type of this name.
         """
         component_type = self.find(type_name)
         return component_type.core or component_type.multiplicity is Multiplicity.ONE
 
     def admit(self, type_name: str, name: str, running: Sequence[ComponentState]) -> ComponentType:
-        """Return the type if one more of it may start under this name.
+        """Return the type if one more component of it may start under this name.
 
         Args:
-            running: Who is registered now, of any type.
+            running: All registered components.
 
         Raises:
-            UnknownType: There is no such type.
-            MultiplicityExceeded: As many run as may; facts name one: ``name``, ``host``, ``pid``.
-            CoreService: It is a core service, and does not run now.
+            UnknownType: The mission has no type of this name.
+            MultiplicityExceeded: One runs already; facts: its ``name``, ``host``, ``pid``.
+            CoreService: It is a core service that does not run now.
         """
         component_type = self.find(type_name)
         one = component_type.core or component_type.multiplicity is Multiplicity.ONE
@@ -83,6 +83,6 @@ class Catalogue:
         return component_type
 
     def counts(self, running: Iterable[ComponentState]) -> list[TypeCount]:
-        """Return every type with how many of it are among those who run, sorted by name."""
+        """Return every type with the number of its running components, sorted by name."""
         many = Counter(state.type for state in running)
         return [TypeCount(self._types[name], many[name]) for name in sorted(self._types)]

@@ -1,4 +1,4 @@
-"""What can be said to the component database."""
+"""Messages to the component database."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ADDRESS = "backbone/component_database"
 
 
 class Multiplicity(StrEnum):
-    """How many components of a type may run at the same time (RAM 2002, "Backbone")."""
+    """Number of components of a type that may run at the same time (RAM 2002, "Backbone")."""
 
     ONE = "one"
     MANY = "many"
@@ -24,15 +24,15 @@ class ComponentType(Message, frozen=True):
     """One kind of component.
 
     Attributes:
-        name: Type name as used in the mission file.
+        name: Type name in the mission file.
         class_path: ``package.module:Class``.
-        subsystem: Where its components belong.
-        multiplicity: How many may run.
+        subsystem: Subsystem of its components.
+        multiplicity: How many of them may run.
         core: True for core services, which only the bring-up starts.
-        tags: Host tags its components need.
-        restart: True if its creator restarts it however it ended, unless it was ordered to; False: its owner asks for
-            another one.
-        needs: Kinds of RC it holds one of each; empty if it is no ARC.
+        tags: Tags that a host of its components must have.
+        restart: True if the creator restarts its components after every end without an order; False: the owner must ask
+            for a new start.
+        needs: Kinds of RC of which an ARC holds one each; empty if it is no ARC type.
     """
 
     name: Mention
@@ -46,24 +46,24 @@ class ComponentType(Message, frozen=True):
 
 
 class Admit(Message, frozen=True):
-    """May one more component of this type start under this name?"""
+    """Ask to admit one more component of this type under this name."""
 
     type: Mention
     name: Mention
 
 
 class Admitted(Message, frozen=True):
-    """Answer to ``Admit``: yes, and this is its type."""
+    """Answer to ``Admit``: admitted, with its type."""
 
     component_type: ComponentType
 
 
 class ListTypes(Message, frozen=True):
-    """Which types are there?"""
+    """Ask for all component types."""
 
 
 class TypeCount(Message, frozen=True):
-    """A type and how many of it run now."""
+    """A type and the number of its running components."""
 
     component_type: ComponentType
     running: Count
@@ -83,21 +83,21 @@ class UnknownType(Refusal):
 
 
 class MultiplicityExceeded(Refusal):
-    """As many of this type run as may; facts: ``name``, ``host``, ``pid`` of the one that runs."""
+    """The multiplicity of the type allows no further one; facts: ``name``, ``host``, ``pid`` of the running one."""
 
     code = "component_database.multiplicity"
     remedy = "Use the one that runs, or stop it first."
 
 
 class CoreService(Refusal):
-    """Core services are started by the bring-up alone."""
+    """Only the bring-up starts core services."""
 
     code = "component_database.core"
     remedy = "Core services start with 'scout-backbone up' and are restarted by it."
 
 
 class RunningUnknown(Refusal):
-    """Who runs is not known now, so nothing can be admitted by it."""
+    """The nameserver does not answer, so the running components are unknown and nothing is admitted."""
 
     code = "component_database.running_unknown"
     remedy = "Ask again when the nameserver is back."

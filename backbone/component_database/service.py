@@ -1,4 +1,4 @@
-"""The component database: tells which component types exist and whether one more of a type may start."""
+"""The component database: lists component types and admits new components."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ LIST_EACH_S, LIST_WITHIN_S = 1.0, 3.0  # chosen: a killed nameserver is back wit
 
 
 class ComponentDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the mission file says of its component types.
+    """The component types of the mission file.
 
     Attributes:
-        types: As ``msgspec.to_builtins`` writes them.
+        types: In the form of ``msgspec.to_builtins``.
     """
 
     types: list[ComponentType] = []
 
 
 class ComponentDatabase(Component[ComponentDatabaseParameters]):
-    """Knows the types from its parameters and asks the nameserver who runs, so a restart loses nothing."""
+    """Gets types from its parameters and running components from the nameserver, so a restart loses nothing."""
 
     parameters_type = ComponentDatabaseParameters
     accepts = ComponentDatabaseQuestion
@@ -50,7 +50,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
         self._admitted = self._refused = 0
 
     def parameters_changed(self) -> None:
-        """Admit by the new types from now on."""
+        """Use the new types from now on."""
         self._catalogue = Catalogue(self.parameters.types)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -64,7 +64,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
                 raise UnknownMessage(f"{type(other).__name__} is not answered here")
 
     def statistics(self) -> dict[str, float]:
-        """Return how many types there are and how admissions ended."""
+        """Return counts of types and of admissions."""
         return {
             "types": float(len(self.parameters.types)),
             "admitted": float(self._admitted),
@@ -86,7 +86,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
         return admitted
 
     async def _who_runs(self) -> Components:
-        """Return who is registered, after a hub's restart once everybody had the time to come back."""
+        """Return the registered components; after a hub's restart wait until all had time to reconnect."""
         while True:
             listed = await self._list()
             if listed.complete:
@@ -95,7 +95,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
             await self.clock.sleep_s(max(back_s - self.clock.now_s(), RECONNECT_S / 10 * self.clock.rate))
 
     async def _list(self) -> Components:
-        """Return who is registered.
+        """Return the registered components.
 
         Raises:
             RunningUnknown: The nameserver does not answer.
@@ -111,4 +111,4 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
                 within_s=LIST_WITHIN_S,
             )
         except LinkError as error:
-            raise RunningUnknown(f"the nameserver does not tell who runs: {error}") from error
+            raise RunningUnknown(f"the nameserver does not list the running components: {error}") from error

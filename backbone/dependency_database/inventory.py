@@ -1,11 +1,11 @@
-"""Inventory: which hardware exists, and which sets of RCs an ARC could have.
+"""Inventory: the hardware of a mission, and the sets of RCs that satisfy an ARC.
 
 Rules:
 
-* A set has one RC of each kind asked for, fits the wish and the features, and respects every link: an
-  RC that can only be used with some others of a kind is never put beside another one of that kind.
-* Sets come in the mission file's order: the first kind's resources vary slowest.
-* Either at least one set, or a refusal that names the part of the wish nothing fits.
+* A set has one RC of each wanted kind, matches the wish and the features, and respects every link: an RC with links to
+  some RCs of a kind is never combined with another RC of that kind.
+* Sets are in the order of the mission file: the resources of the first kind vary slowest.
+* The result has at least one set; otherwise a refusal names the part of the wish that no resource matches.
 
 Source: S000, "static dependency database": all hardware available now, described right before the mission.
 """
@@ -17,14 +17,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from backbone.dependency_database.messages import FindRcs, NoSuchHardware, Resource
 from backbone.naming import did_you_mean
 
-MOST_SETS = 4096  # chosen: 16 robots × 16 frequencies × 16 radios; nobody chooses among more
+MOST_SETS = 4096  # chosen: 16 robots × 16 frequencies × 16 radios
 
 
 class Inventory:
-    """All hardware of one mission, which does not change while it runs.
+    """All hardware of one mission; it does not change while the mission runs.
 
     Args:
-        resources: In the mission file's order, names unique.
+        resources: Resources with unique names, in the order of the mission file.
     """
 
     def __init__(self, resources: Sequence[Resource]) -> None:
@@ -36,10 +36,10 @@ class Inventory:
         return sorted(self._resources, key=lambda resource: resource.name)
 
     def find(self, wanted: FindRcs) -> list[dict[str, str]]:
-        """Return the sets of RCs that would do, kind → name, at most ``MOST_SETS``.
+        """Return the sets of RCs that match, kind → name, at most ``MOST_SETS``.
 
         Raises:
-            NoSuchHardware: None would; facts: ``role``, the kind nothing fits.
+            NoSuchHardware: No set matches; facts: ``role``, the kind without a match.
         """
         self._refuse_contradictions(wanted)
         candidates = {role: self._candidates(role, wanted) for role in wanted.roles}
@@ -67,10 +67,10 @@ class Inventory:
                     )
 
     def _candidates(self, role: str, wanted: FindRcs) -> list[Resource]:
-        """Return the resources of this kind that fit by themselves.
+        """Return the resources of this kind that match by themselves.
 
         Raises:
-            NoSuchHardware: None does.
+            NoSuchHardware: No resource of this kind matches.
         """
         kind = [resource for resource in self._resources if resource.type == role]
         if not kind:
@@ -96,7 +96,7 @@ class Inventory:
 def _sets(
     roles: Sequence[str], candidates: Mapping[str, Sequence[Resource]], chosen: dict[str, Resource]
 ) -> Iterator[dict[str, Resource]]:
-    """Yield every way to add the remaining roles to those already chosen."""
+    """Yield every way to add the remaining roles to the chosen ones."""
     if len(chosen) == len(roles):
         yield chosen
         return
@@ -125,7 +125,7 @@ def _lacks_features(role: str, named: Sequence[Resource], features: Sequence[str
 
 
 def _nothing_fits_together(wanted: FindRcs, candidates: Mapping[str, Sequence[Resource]]) -> NoSuchHardware:
-    """Name the first kind that finds no partner among the kinds before it, and what its resources want instead."""
+    """Name the first kind without a partner among the kinds before it, and the links of its resources."""
     for count in range(2, len(wanted.roles) + 1):
         roles = wanted.roles[:count]
         if next(_sets(roles, candidates, {}), None) is None:

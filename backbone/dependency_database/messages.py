@@ -1,4 +1,4 @@
-"""What can be said to the static dependency database: which hardware exists, and what an ARC needs of it."""
+"""Messages to the static dependency database: existing hardware, and sets of it for an ARC."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ ADDRESS = "backbone/dependency_database"
 
 
 class Resource(Message, frozen=True):
-    """One physical resource, and how to run its RC.
+    """One physical resource, and the launch of its RC.
 
     Attributes:
         name: Name of the resource and of its RC.
         type: Component type of its RC (``scout``, ``command_radio``, ``video_frequency``, ``framegrabber`` …).
-        host: Host its hardware is wired to; empty: any.
-        sharable: True if several ARCs may hold it within its capacity.
-        capacity: Share of its time it can give, 0 to 1; 1 for unit resources.
+        host: Host to which its hardware is wired; empty: any.
+        sharable: True if several ARCs may share its capacity.
+        capacity: Share of its time that it can give, 0 to 1; 1 for unit resources.
         connect_s: Settling time after a connection, seconds.
         disconnect_s: Release time, seconds.
-        driver: Name of the driver its RC uses.
-        parameters: Further values for the RC's parameters.
-        features: What it has, for wishes (``camera``).
-        links: Names of other resources it can only be used with, by kind
-            (a framegrabber's ``video_frequency``, a scout's ``command_radio``).
-        process: Name of the process its RC shares with others; empty: a process of its own.
+        driver: Name of its RC's driver.
+        parameters: Further parameters of its RC.
+        features: Its features, which a wish may ask for (``camera``).
+        links: The only resources with which it can be combined, by kind (a framegrabber's ``video_frequency``, a
+            scout's ``command_radio``).
+        process: Name of its RC's shared process; empty: a process of its own.
     """
 
     name: Mention
@@ -44,13 +44,13 @@ class Resource(Message, frozen=True):
     process: Mention = ""
 
     def rc_parameters(self) -> dict[str, Any]:
-        """Return the parameters its RC is launched with: driver, sharing and links, then its own."""
+        """Return the parameters of its RC's launch: driver, sharing and links, then its own."""
         common = {"driver": self.driver, "sharable": self.sharable, "capacity": self.capacity, "links": self.links}
         return {**common, **self.parameters}
 
 
 class AskResources(Message, frozen=True):
-    """Which hardware exists?"""
+    """Ask for all hardware."""
 
 
 class Resources(Message, frozen=True):
@@ -60,10 +60,10 @@ class Resources(Message, frozen=True):
 
 
 class FindRcs(Message, frozen=True):
-    """Which sets of RCs would do?
+    """Ask for the sets of RCs that match.
 
     Attributes:
-        roles: Kinds of RC the ARC needs, one of each: ``["scout", "command_radio", "video_frequency"]``.
+        roles: Kinds of RC that the ARC needs, one of each: ``["scout", "command_radio", "video_frequency"]``.
         wish: Kind → name wanted of that kind. Kinds left out: any.
         features: Kind → features wanted of that kind.
     """
@@ -74,13 +74,13 @@ class FindRcs(Message, frozen=True):
 
 
 class RcSets(Message, frozen=True):
-    """Answer to ``FindRcs``: kind → name, one entry a possible set, in the mission file's order; never empty."""
+    """Answer to ``FindRcs``: one entry kind → name for each set, in the order of the mission file; never empty."""
 
     sets: Annotated[list[Annotated[dict[Mention, Mention], FEW]], MANY]
 
 
 class NoSuchHardware(Refusal):
-    """No set of existing RCs fits the wish; the detail says which part of it nothing fits."""
+    """No set of existing RCs matches the wish; the detail names the part without a match."""
 
     code = "dependency_database.none"
     remedy = "Wish for less, or add the hardware to the mission file."

@@ -1,4 +1,4 @@
-"""The static dependency database: tells which hardware exists and which sets of it would do."""
+"""The static dependency database: lists hardware and finds sets of it for ARCs."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from backbone.wire import Envelope, Message, UnknownMessage
 
 
 class DependencyDatabaseParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the mission file says of its hardware.
+    """The hardware of the mission file.
 
     Attributes:
-        resources: As ``msgspec.to_builtins`` writes them, in the mission file's order.
+        resources: In the form of ``msgspec.to_builtins``, in the order of the mission file.
     """
 
     resources: list[Resource] = []
 
 
 class DependencyDatabase(Component[DependencyDatabaseParameters]):
-    """Answers from its parameters alone, so a restarted one knows as much as the first."""
+    """Answers from its parameters alone, so a restart loses nothing."""
 
     parameters_type = DependencyDatabaseParameters
     accepts = DependencyDatabaseQuestion
@@ -45,7 +45,7 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
         self._found = self._refused = 0
 
     def parameters_changed(self) -> None:
-        """Answer from the new list of hardware from now on."""
+        """Use the new list of hardware from now on."""
         self._inventory = Inventory(self.parameters.resources)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -59,7 +59,7 @@ class DependencyDatabase(Component[DependencyDatabaseParameters]):
                 raise UnknownMessage(f"{type(other).__name__} is not answered here")
 
     def statistics(self) -> dict[str, float]:
-        """Return how much hardware there is and how searches for it ended."""
+        """Return counts of resources and of searches."""
         return {
             "resources": float(len(self.parameters.resources)),
             "searches_found": float(self._found),

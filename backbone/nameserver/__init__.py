@@ -1,1 +1,1 @@
-"""Who is registered, where, since when; runs the hub."""
+"""The registered components of a mission, with host and time; runs the hub."""

@@ -1,4 +1,4 @@
-"""What can be said to the nameserver, and what it tells."""
+"""Messages to the nameserver, and its publications."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ RECONNECT_S = 1.0  # chosen: machine seconds, twice the 0.5 s in which component
 
 
 class Register(Message, frozen=True):
-    """I begin to live under this name. Asked by the component shell before its readiness.
+    """Register a name. The component shell asks this before its readiness.
 
     Attributes:
-        component: Who it is; its state is CONNECTING.
+        component: The component; its state is CONNECTING.
     """
 
     component: ComponentState
 
 
 class Registered(Message, frozen=True):
-    """Answer to ``Register``: the name is yours until your liveliness token falls."""
+    """Answer to ``Register``: the component holds the name until its liveliness token falls."""
 
 
 class Resolve(Message, frozen=True):
-    """Where is the component of this name?"""
+    """Ask for the component of this name."""
 
     name: Mention
 
@@ -40,7 +40,7 @@ class Resolved(Message, frozen=True):
 
 
 class ListComponents(Message, frozen=True):
-    """Who is there? Empty fields match all."""
+    """Ask for the registered components. Empty fields match all."""
 
     subsystem: Mention = ""
     type: Mention = ""
@@ -50,11 +50,11 @@ class Components(Message, frozen=True):
     """Answer to ``ListComponents``, sorted by address.
 
     Attributes:
-        components: Who is registered now.
-        complete: False for the moment after the hub's own restart in which components still reconnect
-            (``RECONNECT_S``): absence proves nothing then.
+        components: The registered components.
+        complete: False for ``RECONNECT_S`` after a restart of the hub, while components still reconnect: a missing
+            component may then be alive.
         hub_since_s: Mission time at which the hub began to listen.
-        unknown: Addresses that are alive and did not say yet who they are, sorted; they are not in the list.
+        unknown: Sorted addresses of living components that have not introduced themselves yet; not in the list.
     """
 
     components: Annotated[list[ComponentState], MANY]
@@ -83,10 +83,10 @@ class NameTaken(Refusal):
 
 
 class UnknownName(Refusal):
-    """Nobody of this name is registered."""
+    """No component of this name is registered."""
 
     code = "nameserver.unknown"
-    remedy = "See 'scout-backbone status' for the names that are there."
+    remedy = "See 'scout-backbone status' for the names of all components."
 
 
 NameserverQuestion = Register | Resolve | ListComponents

@@ -1,19 +1,19 @@
-"""Registry: who has which name, and who of them is ready.
+"""Registry: the holder of each name, and whether it is ready.
 
-Events go in (somebody registers, a token rises or falls, a component says who it is), instructions
-come out. The caller owns the bus and the clock.
+Events go in (a component registers or introduces itself, a token rises or falls), instructions come out. The caller
+owns the bus and the clock.
 
-Two tokens tell of every component. Its *claim* rises as soon as it was given its name and carries
-host and pid; its *token* proper rises when it is ready. A name is its holder's as long as one of them
-stands. Before the claim is seen the name is kept for a moment (``CLAIM_WITHIN_S``). Without claims, a
-process that died before it was ready would keep its name from its own successor.
+Every component has two tokens. Its *claim* rises after its registration and carries host and pid; its liveliness
+*token* rises when it is ready. A component holds its name while one of them stands. Until the claim rises, the registry
+keeps the name for ``CLAIM_WITHIN_S``. Without claims, a process that died before its readiness would block the name for
+its successor.
 
 Rules:
 
-* One name, one holder: whoever registers while another's claim or token stands is refused.
-* Truth lives at the edge: after the hub's own restart the registry is empty, the tokens come back by
-  themselves, and whoever stands behind an unknown one is asked who it is (``Introduce``).
-* Readiness is the token, never what a component says of itself.
+* One name, one holder: a registration is refused while the claim or token of another component stands.
+* Truth lives at the edge: after a restart of the hub the registry is empty, tokens return by themselves, and the
+  registry asks the component of each unknown token for its state (``Introduce``).
+* Only the token means readiness, never a component's own state.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from backbone.component.messages import ComponentState, LifeState
 from backbone.nameserver.messages import Appeared, Components, Disappeared, NameTaken, UnknownName
 from backbone.naming import component_of, did_you_mean
 
-CLAIM_WITHIN_S = 1.0  # chosen: a claim follows its registration within milliseconds; a busy machine has a second
+CLAIM_WITHIN_S = 1.0  # chosen: a claim follows its registration within milliseconds, on a busy machine within a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Announce:
 
 @dataclass(frozen=True, slots=True)
 class Introduce:
-    """Ask the component at this address who and how it is, and report the answer."""
+    """Ask the component at this address for its state, and report the answer."""
 
     address: str
 
@@ -56,14 +56,14 @@ class _Claim:
 
 @dataclass(slots=True)
 class _Entry:
-    """What is known of one name.
+    """The registry's record of one name.
 
     Attributes:
-        state: Who it is; None while only its tokens are known.
-        given_s: Mission time at which it was given to ``state``.
-        claims: Processes that were given it, as their tokens tell; two only if a hub's restart came between.
+        state: Its holder; None while only tokens are known.
+        given_s: Mission time of the registration.
+        claims: Processes with a claim to the name; two only after a restart of the hub.
         tokens: Addresses under which a component of this name is ready.
-        announced: Whether ``Appeared`` was told since its token rose.
+        announced: True if ``Appeared`` was published since its token rose.
     """
 
     state: ComponentState | None = None
@@ -78,9 +78,9 @@ class Registry:
 
     Args:
         hub_since_s: Mission time at which the hub began to listen.
-        reconnect_s: Mission seconds after that in which components of an earlier hub may still come back; 0 if there
-            was no earlier hub.
-        claim_within_s: Mission seconds for which a name is kept until its holder's claim is seen.
+        reconnect_s: Mission seconds after that in which components of an earlier hub may reconnect; 0 without an
+            earlier hub.
+        claim_within_s: Mission seconds for which a name is kept until its holder's claim rises.
     """
 
     def __init__(self, hub_since_s: float, reconnect_s: float, claim_within_s: float = CLAIM_WITHIN_S) -> None:
@@ -91,10 +91,10 @@ class Registry:
 
     # ------------------------------------------------------------------ events
     def registered(self, newcomer: ComponentState, now_s: float) -> None:
-        """Give the name to the newcomer; registering again with the same state changes nothing.
+        """Register the newcomer under its name. Idempotent for the same state.
 
         Raises:
-            NameTaken: Another holds the name.
+            NameTaken: Another component holds the name.
         """
         self._forget_unclaimed(now_s)
         name = component_of(newcomer.address)
@@ -114,7 +114,7 @@ class Registry:
         entry.state, entry.given_s = newcomer, now_s
 
     def claim_changed(self, address: str, host: str, pid: int, *, stands: bool) -> None:
-        """Take note that a process claims a name, or no longer does."""
+        """Record that a claim of a process rose or fell."""
         name, claim = component_of(address), _Claim(address, host, pid)
         if stands:
             self._entries.setdefault(name, _Entry()).claims.add(claim)
@@ -123,7 +123,7 @@ class Registry:
             self._forget_if_gone(name)
 
     def token_changed(self, address: str, *, stands: bool, now_s: float) -> list[Instruction]:
-        """Take note that a component became ready, or is no longer."""
+        """Record that a liveliness token rose or fell."""
         name = component_of(address)
         if not stands:
             return self._token_fell(name, address, now_s)
@@ -137,7 +137,7 @@ class Registry:
         return [Announce(Appeared(entry.state)), Introduce(address)]
 
     def introduced(self, state: ComponentState) -> list[Instruction]:
-        """Take over what a component whose token stands says of itself."""
+        """Record the state of a component whose token stands."""
         self._introducing.discard(state.address)
         entry = self._entries.get(component_of(state.address))
         if entry is None or state.address not in entry.tokens:
@@ -149,11 +149,11 @@ class Registry:
         return [Announce(Appeared(state))]
 
     def introduction_failed(self, address: str) -> None:
-        """Stop counting on this component's answer for a complete list; its token may stand for a hung process."""
+        """Stop waiting for this component's answer, because its process may hang."""
         self._introducing.discard(address)
 
-    def status_heard(self, state: ComponentState) -> None:
-        """Take over the published state of a ready component, so that lists show its feedback."""
+    def status_published(self, state: ComponentState) -> None:
+        """Record the published state of a ready component, so that lists show its feedback."""
         entry = self._entries.get(component_of(state.address))
         if (
             entry is not None
@@ -165,15 +165,15 @@ class Registry:
 
     # ------------------------------------------------------------------ questions
     def is_unknown(self, address: str) -> bool:
-        """Say whether a token stands at this address and nobody knows yet whose it is."""
+        """Return whether a token stands at this address without a known component."""
         entry = self._entries.get(component_of(address))
         return entry is not None and address in entry.tokens and (entry.state is None or entry.state.address != address)
 
     def resolve(self, name: str, now_s: float) -> ComponentState:
-        """Return who has this name.
+        """Return the holder of this name.
 
         Raises:
-            UnknownName: Nobody, or (``complete`` False in the facts) nobody yet since the hub's restart.
+            UnknownName: No component, or (``complete`` False in the facts) none yet since the hub's restart.
         """
         self._forget_unclaimed(now_s)
         entry = self._entries.get(name)
@@ -181,13 +181,13 @@ class Registry:
             return entry.state
         complete = self._is_complete(now_s)
         known = [other for other, entry in self._entries.items() if entry.state is not None]
-        yet = "" if complete else "; the hub began a moment ago and components still come back"
+        yet = "" if complete else "; the hub has just restarted and components still reconnect"
         raise UnknownName(
-            f"nobody is registered as {name!r}{did_you_mean(name, known)}{yet}", name=name, complete=complete
+            f"no component is registered as {name!r}{did_you_mean(name, known)}{yet}", name=name, complete=complete
         )
 
     def components(self, subsystem: str, type: str, now_s: float) -> Components:  # noqa: A002  the paper's word
-        """Return who is registered, sorted by address; empty arguments match all."""
+        """Return the registered components, sorted by address; empty arguments match all."""
         self._forget_unclaimed(now_s)
         found = [
             state
@@ -199,7 +199,7 @@ class Registry:
         return Components(found, self._is_complete(now_s), self._hub_since_s, unknown)
 
     def states(self) -> Iterator[ComponentState]:
-        """Yield everybody who is registered, sorted by address."""
+        """Yield all registered components, sorted by address."""
         known = (entry.state for entry in self._entries.values() if entry.state is not None)
         return iter(sorted(known, key=lambda state: state.address))
 
@@ -228,14 +228,14 @@ class Registry:
             del self._entries[name]
 
     def _forget_unclaimed(self, now_s: float) -> None:
-        """Forget whoever was given a name and died before its claim was seen."""
+        """Forget holders that died before their claim rose."""
         for name, entry in list(self._entries.items()):
             if not entry.tokens and not entry.claims and now_s >= entry.given_s + self._claim_within_s:
                 del self._entries[name]
 
 
 def _holder(entry: _Entry) -> ComponentState | None:
-    """Return who holds the name; with an empty type if only its tokens are known yet."""
+    """Return the holder of the name, with an empty type while only its tokens are known."""
     if entry.state is not None:
         return entry.state
     if entry.claims:

@@ -1,10 +1,11 @@
-"""The nameserver: runs the mission's hub and tells who is registered, where, since when.
+"""The nameserver: runs the mission's hub, registers components and resolves their names.
 
-It starts first (RAM 2002, "Backbone": everything else finds each other through it) and is the one
-process the others' links end at, so it hears of every death within milliseconds.
+It starts first (RAM 2002, "Backbone": all components find each other through it). All links end at its process, so it
+detects every death within milliseconds.
 
-A hub that is the mission's first knows that nobody can come back, so its lists are complete from the
-beginning and bring-up need not wait. It leaves a file in the run directory by which the next one knows better.
+The first hub of a mission has no predecessor whose components could reconnect, so its lists are complete at once and
+the bring-up need not wait. It writes a file into the run directory, from which the next hub learns that it is not the
+first.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from backbone.wire import Envelope, Message, UnknownMessage
 log = logging.getLogger(__name__)
 
 HUB_BEGAN = "hub-began"
-INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; its token is then all we know
+INTRODUCE_EACH_S = 1.0  # chosen: a component that does not answer within this hangs; only its token is known then
 
 
 class NameserverParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,7 +65,7 @@ class FixedEndpoints(Refusal):
 
 
 class Nameserver(Component[NameserverParameters]):
-    """Registers components by name and announces who appears and disappears."""
+    """Registers components by name and publishes their appearance and disappearance."""
 
     parameters_type = NameserverParameters
     accepts = NameserverQuestion
@@ -75,12 +76,12 @@ class Nameserver(Component[NameserverParameters]):
         """Return the bus of the hub itself, which listens at the launch's endpoint and for other machines.
 
         Raises:
-            NoSecret: It would listen for other machines without asking them for a secret.
+            NoSecret: The hub would listen for other machines without authentication.
         """
         listen = [str(endpoint) for endpoint in launch.parameters.get("listen", [])]
         dictionary_file = dictionary_of(launch.run_directory)
         if listen and not dictionary_file:
-            raise NoSecret(f"the hub would listen at {', '.join(listen)} for everybody")
+            raise NoSecret(f"the hub would listen at {', '.join(listen)} without a secret")
         config = hub_config([launch.endpoint, *listen], dictionary_file=dictionary_file)
         return ZenohBus.open(launch.mission, launch.address, clock, config)
 
@@ -97,7 +98,7 @@ class Nameserver(Component[NameserverParameters]):
         self._registry.claim_changed(self.address, self.launch.host, self.pid, stands=True)
         self.bus.watch_alive("*/*/*", self._claim_changed)
         self.bus.watch_alive("*/*", self._token_changed)
-        self.bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._status_heard)
+        self.bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._status_published)
 
     def parameters_changed(self) -> None:
         """Refuse: an open hub does not change its endpoints.
@@ -110,7 +111,7 @@ class Nameserver(Component[NameserverParameters]):
         )
 
     async def serve(self) -> None:
-        """Ask those who stand behind new tokens who they are."""
+        """Ask the components of unknown tokens for their states."""
         while True:
             address = await self._to_introduce.get()
             self.start_task(self._introduce(address), f"introduce {address}")
@@ -128,7 +129,7 @@ class Nameserver(Component[NameserverParameters]):
                 raise UnknownMessage(f"{type(other).__name__} is not answered here")
 
     def statistics(self) -> dict[str, float]:
-        """Return how many are registered and what happened since the hub's start."""
+        """Return counts of registered components, and of events since the hub's start."""
         return {
             "components": float(sum(1 for _ in self._registry.states())),
             "registrations": float(self._registrations),
@@ -153,19 +154,19 @@ class Nameserver(Component[NameserverParameters]):
     def _claim_changed(self, claim: str, stands: bool) -> None:
         try:
             address, host, pid = read_claim(claim)
-        except IllegalName as illegal:  # a stranger's token must not end the hub
+        except IllegalName as illegal:  # a token of an unknown client must not end the hub
             self.story.note(claim, f"ignored: {illegal.detail}")
             return
         self._registry.claim_changed(address, host, pid, stands=stands)
 
     def _token_changed(self, address: str, stands: bool) -> None:
-        if not is_component(address):  # a stranger's token: nobody would ever answer there, and each is kept
+        if not is_component(address):  # of an unknown client: no component would ever answer there
             self.story.note(address, "ignored: no component can have this address")
             return
         self._carry_out(self._registry.token_changed(address, stands=stands, now_s=self.clock.now_s()))
 
-    def _status_heard(self, heard: Envelope[ComponentState]) -> None:
-        self._registry.status_heard(heard.body)
+    def _status_published(self, heard: Envelope[ComponentState]) -> None:
+        self._registry.status_published(heard.body)
 
     def _carry_out(self, instructions: list[Instruction]) -> None:
         for instruction in instructions:
@@ -191,16 +192,16 @@ class Nameserver(Component[NameserverParameters]):
         self.bus.publish(self.address, Conversation.EVENTS, news)
 
     async def _introduce(self, address: str) -> None:
-        """Learn who is behind a token; ask again as long as it stands for somebody unknown."""
+        """Ask the component of a token for its state, until it answers or the token falls."""
         while True:
             try:
                 state = await self.bus.ask(address, AskState(), ComponentState, within_s=INTRODUCE_EACH_S)
             except LinkError as error:
                 self._unanswered += 1
-                self.story.note(component_of(address), f"did not say who it is: {error}")
-            except Refusal as refusal:  # a token without a component behind it: it will never say who it is
+                self.story.note(component_of(address), f"did not introduce itself: {error}")
+            except Refusal as refusal:  # a token without a component: asking again is useless
                 self._registry.introduction_failed(address)
-                self.story.note(component_of(address), f"would not say who it is: {refusal.detail}")
+                self.story.note(component_of(address), f"refused to introduce itself: {refusal.detail}")
                 return
             else:
                 self._carry_out(self._registry.introduced(state))
@@ -212,7 +213,7 @@ class Nameserver(Component[NameserverParameters]):
 
 
 def _is_first(launch: Launch) -> bool:
-    """Say whether no hub of this mission ran before; without a file to know it by, one may have."""
+    """Return whether this is the mission's first hub; without the file of the first hub it may be another."""
     if not launch.run_directory:
         return False
     directory = Path(launch.run_directory)
@@ -222,6 +223,6 @@ def _is_first(launch: Launch) -> bool:
     except FileExistsError:
         return False
     except OSError as error:
-        log.warning("no note of the first hub: %s; components are waited for as after a restart", error)
+        log.warning("cannot write the file of the first hub: %s; waiting for components as after a restart", error)
         return False
     return True

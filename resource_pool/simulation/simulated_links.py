@@ -135,7 +135,7 @@ class LinkedBus(LocalBus):
         super().__init__(network, source, clock)
         self.link = link
 
-    def show_neighbors(self, address: str) -> Declared:
+    def declare_to_neighbors(self, address: str) -> Declared:
         """Raise a token; another of the same address may stand where it cannot be seen."""
         tokens = self.network.tokens.setdefault(address, [])
         self.link.shown[address] = None
@@ -362,7 +362,7 @@ class LinkedNetwork(LocalNetwork):
             told.discard(address)
 
         def tell() -> None:
-            link.process.run(watching.tell, address, stands)
+            link.process.run(watching.notify, address, stands)
 
         if link.is_up:
             link.carry(tell, _nothing if stands else tell)  # with a lost link every token falls

@@ -87,7 +87,7 @@ class UnreliableNetwork(LocalNetwork):
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
         """Carry it, late to one that is cut off."""
-        self._travel("", watching.owner.source, None, lambda: watching.tell(address, alive))
+        self._travel("", watching.owner.source, None, lambda: watching.notify(address, alive))
 
     @staticmethod
     def _ask_again(ask: Callable[[Answered], None]) -> None:

@@ -98,7 +98,7 @@ def test_children_of_a_behavior_without_a_host_do_not_start() -> None:
     parent = watch("parent", children=(Behavior(type="capture", name="child", priority=1),))
     dry = dry_run(mission(parent, watch=["gl"]))
     assert "child" not in [one.name for one in dry.placed]
-    assert dry.claimed[0].refused == "parent has no host, so nobody asks"
+    assert dry.claimed[0].refused == "parent has no host, so no ARC is asked for"
 
 
 # ---------------------------------------------------------------------- schedule

@@ -65,7 +65,7 @@ def mission(complete: bool = True, unknown: tuple[str, ...] = ()) -> Bus:
             case Resolve(name=name) if name in states:
                 return Resolved(states[name])
             case Resolve(name=name):
-                raise UnknownName(f"nobody is registered as {name!r}")
+                raise UnknownName(f"no component is registered as {name!r}")
 
     async def tells(asked: Any) -> Story:
         of = asked.body.subject

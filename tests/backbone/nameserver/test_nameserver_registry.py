@@ -164,10 +164,10 @@ def test_ready_is_announced_at_once_and_the_truth_asked_for() -> None:
 def test_what_is_said_about_readiness_counts_only_under_a_token() -> None:
     registry = Registry(0.0, 0.0)
     begun(registry, state())
-    registry.status_heard(ComponentState("resource_pool/scout1", "scout", "a", 1, LifeState.READY, 1.0))
+    registry.status_published(ComponentState("resource_pool/scout1", "scout", "a", 1, LifeState.READY, 1.0))
     assert registry.resolve("scout1", 1.0).state is LifeState.CONNECTING
     registry.token_changed("resource_pool/scout1", stands=True, now_s=2.0)
-    registry.status_heard(ComponentState("resource_pool/scout1", "scout", "a", 1, LifeState.READY, 2.0, "drives"))
+    registry.status_published(ComponentState("resource_pool/scout1", "scout", "a", 1, LifeState.READY, 2.0, "drives"))
     assert registry.resolve("scout1", 2.0).feedback == "drives"
 
 
