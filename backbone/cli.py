@@ -243,7 +243,7 @@ def why(
     """Say why a request waits or runs, why a component is where it is, until when."""
 
     async def work() -> int:
-        from backbone.reasons import reasons_for
+        from backbone.picture.reasons import reasons_for
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             reasons = await reasons_for(bus, name, clock)
@@ -265,7 +265,7 @@ def story(
 
     async def work() -> int:
         from backbone.log_lines import story_json, story_lines
-        from backbone.reasons import story_of
+        from backbone.picture.reasons import story_of
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
@@ -310,8 +310,8 @@ def log(
         from backbone.log_lines import log_json, log_lines
         from backbone.log_question import LogQuestion
         from backbone.mission_log import Log
-        from backbone.mission_picture import LAUNCHER
         from backbone.moments import Now
+        from backbone.naming import LAUNCHER
 
         async with visiting(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)

@@ -12,9 +12,10 @@ from pathlib import Path
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.door import read_secret_file
 from backbone.errors import BackboneError
-from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
 from backbone.people import is_console
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
 from backbone.run_files import find_all
 from backbone.visit import visiting
 

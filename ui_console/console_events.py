@@ -21,16 +21,16 @@ from backbone.component.messages import (
     StoryEvent,
 )
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.health import MissionHealth
 from backbone.mission_log import Log, PeopleKnown
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.operators import OperatorActed
+from backbone.picture.health import MissionHealth
+from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
 from resource_pool.arc_client import StopState
 from ui_console.consent import Settled, Sought, Topic
-from ui_console.losses import why_lost
 
 
 # ---------------------------------------------------------------------- of its own robot

@@ -15,6 +15,7 @@ import msgspec
 
 from backbone.component.messages import StoryEvent
 from backbone.naming import Subsystem, component_of
+from backbone.picture.words import UNDECIDED, WANTED, why_lost
 from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
 from ui_console.alarms import AlarmBook
@@ -39,7 +40,6 @@ from ui_console.console_events import (
     PictureSeen,
 )
 from ui_console.lifting import question_line
-from ui_console.losses import UNDECIDED, WANTED, why_lost
 from ui_console.team_model import ROBOT_KIND, TeamModel
 from ui_console.views import (
     NONE_S,
@@ -156,7 +156,7 @@ class ConsoleModel:
         self.look(now_s)
         team = self.team
         return ConsoleView(
-            mission=team.mission,
+            mission=team.picture.mission,
             now_s=now_s,
             own=self.own(now_s),
             robots=self.robots(now_s),

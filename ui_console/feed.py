@@ -31,22 +31,21 @@ from backbone.component.messages import (
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
-from backbone.health import MissionHealth
 from backbone.keys import Conversation
 from backbone.mission_log import AskLog, AskPeople, Log, PeopleKnown
-from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents, Resolve, Resolved
-from backbone.naming import Subsystem, component_of
+from backbone.naming import LAUNCHER, Subsystem, component_of
 from backbone.operators import OperatorActed
+from backbone.picture.health import MissionHealth
+from backbone.picture.mission import LOG_KEPT
+from backbone.picture.reasons import reasons_for
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases
-from backbone.reasons import reasons_for
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.console_events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
-from ui_console.log_board import LOG_KEPT
 from ui_console.team_model import ROBOT_KIND
 
 log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ is; a word that is too old counts no longer: then the mission is at best degrade
 from __future__ import annotations
 
 from backbone.component.messages import Absence
-from backbone.health import SILENT_AFTER_S, Health, HealthWord, MissionHealth
+from backbone.picture.health import SILENT_AFTER_S, Health, HealthWord, MissionHealth
 from ui_console.alarms import AlarmBook
 from ui_console.views import AlarmKind, HealthView, Severity
 
@@ -46,17 +46,16 @@ class HealthBoard:
     def view(self, now_s: float) -> HealthView | None:
         """Return the word and one line for each absence; None: the launcher had no time yet to say anything."""
         said, silence = self._said, self._silence(now_s)
-        lines = Health(said.word, tuple(said.absent)).lines(now_s) if said is not None else []
         if silence is None:
-            return HealthView(str(said.word), lines) if said is not None else None
-        word = HealthWord.FAILED if said is not None and said.word is HealthWord.FAILED else HealthWord.DEGRADED
-        silent_s = max(0.0, now_s - silence.since_s)
-        return HealthView(str(word), [f"the launcher is silent for {silent_s:.0f} s: what is shown may be old", *lines])
+            return HealthView(str(said.word), Health(said.word, tuple(said.absent)).lines(now_s)) if said else None
+        is_failed = said is not None and said.word is HealthWord.FAILED
+        word = HealthWord.FAILED if is_failed else HealthWord.DEGRADED
+        return HealthView(str(word), Health(word, (silence, *(said.absent if said else ()))).lines(now_s))
 
     def _silence(self, now_s: float) -> Absence | None:
         if self._said_s is None or now_s <= self._said_s + SILENT_AFTER_S * self.rate:
             return None
-        return Absence(LAUNCHER_NAME, self._said_s, "it is silent", "", REMEDY, vital=True)
+        return Absence(LAUNCHER_NAME, self._said_s, "it is silent, so what is shown may be old", "", REMEDY, vital=True)
 
     def _tell(self, absent: list[Absence], at_s: float) -> None:
         """Begin an alarm for each absence, and end those of what is back."""

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable
 
 from backbone.errors import Refusal, code_of
+from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import StopState, SwappedOut
 from ui_console.console_events import (
@@ -24,7 +25,6 @@ from ui_console.console_events import (
     event_json,
 )
 from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
-from ui_console.losses import UNDECIDED
 from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.teleoperation import Teleoperation
 

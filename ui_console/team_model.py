@@ -26,12 +26,14 @@ from backbone.component.messages import (
     StoryEvent,
 )
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.health import MissionHealth
 from backbone.mission_log import AskLog, Log, PeopleKnown
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorActed
-from backbone.people import People, is_console, screens_of
+from backbone.people import is_console, screens_of
+from backbone.picture.health import MissionHealth
+from backbone.picture.mission import LOG_KEPT, MissionPicture, is_older
+from backbone.picture.words import because
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule, Why
@@ -41,10 +43,9 @@ from ui_console.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.console_events import LinkHeard, Said, TeamEvent
 from ui_console.health_board import HealthBoard
 from ui_console.lifting import author_name, authors, is_own, lift_line
-from ui_console.log_board import LOG_KEPT, LogBoard
 from ui_console.needs import Needs
 from ui_console.timeline import Timeline
-from ui_console.tree_board import TreeBoard, because
+from ui_console.tree_board import TreeBoard
 from ui_console.views import (
     NONE_S,
     AlarmKind,
@@ -65,7 +66,6 @@ STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
 OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
 NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
-_LIFE = list(LifeState)
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
 
 
@@ -78,17 +78,15 @@ class TeamModel:
     """
 
     def __init__(self, mission: str = "", lift_remedy: str = "Lift the stop when the robot may move.") -> None:
-        self.mission = mission
+        self.picture = MissionPicture(mission)
+        """What everybody knows of it who listens."""
         self._lift_remedy = lift_remedy
-        self.schedule: Schedule | None = None
-        """As last heard."""
         self.alarms = AlarmBook()
-        self.people = People()
+        self.people = self.picture.people
         """Who sits at which console."""
         self._health = HealthBoard(self.alarms)
         self._timeline = Timeline(self.person)
-        self._components: dict[str, ComponentState] = {}
-        self._lost: dict[str, float] = {}
+        self._lost: dict[str, tuple[float, ComponentState]] = {}
         self._tree = TreeBoard(self.people)
         self._arcs: set[str] = set()
         self._leases: Leases | None = None
@@ -103,7 +101,11 @@ class TeamModel:
         self._link = LinkHeard(0.0, True)
         self._link_heard_s = 0.0
         self._parameters: dict[tuple[str, str], ParameterView] = {}
-        self._log = LogBoard(self.people)
+
+    @property
+    def schedule(self) -> Schedule | None:
+        """As last heard."""
+        return self.picture.schedule
 
     # ------------------------------------------------------------------ events in
     def apply(self, event: TeamEvent) -> None:
@@ -114,26 +116,24 @@ class TeamModel:
             self._take(event.body, event.at_s, event.source)
 
     def _take(self, said: Said, at_s: float, source: str) -> None:
+        picture = self.picture
         match said:
             case Schedule():
                 self._take_schedule(said)
             case Leases():
                 self._take_leases(said, at_s)
             case StoryEvent():
-                self._log.add(said)
+                picture.take(said)
                 self._tree.told(said)
-            case Log():
-                self._log.recall(said.events)
-            case PeopleKnown():
-                self.people.remember(said.consoles)
-            case OperatorActed():
-                self._log.add(said.event(source))
+            case Log() | PeopleKnown() | OperatorActed():
+                picture.take(said, source)
             case ComponentState():
                 self._take_component(said, at_s)
             case Components():
-                self._take_list(said, at_s)
+                for change in picture.changes(said):
+                    self._take(change, at_s, source)
             case Disappeared():
-                self._gone(said.address, at_s)
+                self._gone(said, at_s)
             case ProcessFell():
                 self._take_fall(said, at_s)
             case HostLoad():
@@ -189,7 +189,7 @@ class TeamModel:
 
     def screens_of(self, user: str) -> list[ComponentState]:
         """Return the consoles at which this person sits now."""
-        return screens_of(user, self._components.values())
+        return screens_of(user, self.picture.components.values())
 
     def link_down_s(self, now_s: float) -> float:
         """Return since when nothing is heard from the mission's hub; negative: the link is up."""
@@ -199,7 +199,9 @@ class TeamModel:
     def robot_names(self) -> list[str]:
         """Return every robot heard of, in the schedule or as a component."""
         in_schedule = {rc.rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND} if self.schedule else set()
-        registered = {component_of(at) for at, component in self._components.items() if component.type == ROBOT_KIND}
+        registered = {
+            component_of(at) for at, component in self.picture.components.items() if component.type == ROBOT_KIND
+        }
         return sorted(in_schedule | registered)
 
     def stop_of(self, robot: str) -> StopState | None:
@@ -235,7 +237,7 @@ class TeamModel:
 
     def tree(self) -> list[NodeView]:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
-        return self._tree.views(self._components.values(), self._lost, self.schedule)
+        return self._tree.views(self._shown(), {at: since_s for at, (since_s, _) in self._lost.items()}, self.schedule)
 
     def requests(self) -> list[RequestView]:
         """Return the requests by the names of people, running ones first, then by predicted start."""
@@ -271,12 +273,11 @@ class TeamModel:
 
     def components(self) -> list[ComponentState]:
         """Return the components that are there, by address, doing what they do by the names of people."""
-        there = (component for _, component in sorted(self._components.items()))
-        return [replace(component, feedback=self.people.doing(component)) for component in there]
+        return [replace(component, feedback=self.people.doing(component)) for component in self._shown()]
 
     def component(self, name: str) -> ComponentState | None:
         """Return the component of this name, if it is there."""
-        return next((c for at, c in self._components.items() if component_of(at) == name), None)
+        return next((one for one in self._shown() if component_of(one.address) == name), None)
 
     def log(
         self, count: int = LOG_KEPT, asked: AskLog | None = None, found: Sequence[StoryEvent] = ()
@@ -286,9 +287,16 @@ class TeamModel:
         Args:
             count: At most so many.
             asked: Only what fits; None: all.
-            found: What the launcher's log has of it.
+            found: What the launcher's log has of it; what was heard here since comes after that.
         """
-        return self._log.rows(count, asked, found)
+        log = self.picture.log
+        if asked is None:
+            return log.newest(count)
+        known = found[-count:] if count else []
+        told = {(event.at_s, event.where) for event in known}
+        since_s = known[-1].at_s if known else 0.0
+        news = [one for one in log.told(asked).events if one.at_s >= since_s and (one.at_s, one.where) not in told]
+        return [*known, *news][-count:] if count else []
 
     def alarm_views(self, *own: AlarmBook) -> list[AlarmView]:
         """Return the alarms of the mission and of these books: one line for one cause, by the names of people."""
@@ -298,7 +306,7 @@ class TeamModel:
     # ------------------------------------------------------------------ the schedule
     def _take_schedule(self, schedule: Schedule) -> None:
         before = {request.arc for request in self.schedule.requests} if self.schedule else set()
-        self.schedule = schedule
+        self.picture.take(schedule)
         self._timeline.heard(schedule)
         now = {request.arc for request in schedule.requests}
         self._arcs |= now
@@ -323,7 +331,7 @@ class TeamModel:
         return self._leases is not None and rc in self._leases.missing
 
     def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
-        component = self._components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
+        component = self.picture.components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
         waiting = [self.person(requests[arc].owner) for arc in rc.next if arc in requests]
         free = RobotView(
             robot=rc.rc,
@@ -377,52 +385,46 @@ class TeamModel:
         )
 
     # ------------------------------------------------------------------ components
+    def _shown(self) -> list[ComponentState]:
+        """Return the components that are there, and the lost behaviors, whose place is kept until they are back."""
+        behaviors = {at: one for at, (_, one) in self._lost.items() if _is_in(Subsystem.MISSION_CONTROL, at)}
+        return [one for _, one in sorted({**behaviors, **self.picture.components}.items())]
+
     def _take_component(self, component: ComponentState, at_s: float) -> None:
-        self.people.heard(component)
+        address, name = component.address, component_of(component.address)
         self._needs.heard(component)
-        known = self._components.get(component.address)
-        if known is not None and known.pid == component.pid and _is_older(component, known):
+        known = self.picture.components.get(address)
+        if known is not None and is_older(component, known):
             return
-        name = component_of(component.address)
+        self.picture.take(component)
         (self._left.add if component.state in LEAVING else self._left.discard)(name)
+        before = known or self._lost.get(address, (0.0, None))[1]
         if component.state is LifeState.STOPPED:
-            if self._lost.pop(component.address, None) is not None or known is None:
-                self._components.pop(component.address, None)
+            self._lost.pop(address, None)
+            if known is None:
                 self.alarms.retract(AlarmKind.LOST, name)  # its last word came after the word that it is gone
-            else:
-                self._components[component.address] = component
             return
         if component.state is LifeState.FAILED:
-            self._components[component.address] = component
             self.alarms.happened(AlarmKind.LOST, name, f"{name} failed: {component.feedback}", at_s)
             return
-        if known is None or known.pid != component.pid:
+        self._lost.pop(address, None)
+        if before is None or before.pid != component.pid:
             self._tree.begins(name)
-        self._components[component.address] = component
-        self._lost.pop(component.address, None)
         self.alarms.end(AlarmKind.LOST, name, at_s)
-        is_rc = _is_in(Subsystem.RESOURCE_POOL, component.address)
-        self.alarms.hold(
-            "not safe after" in component.feedback and is_rc, AlarmKind.UNSAFE, name, component.feedback, at_s
-        )
+        is_unsafe = "not safe after" in component.feedback and _is_in(Subsystem.RESOURCE_POOL, address)
+        self.alarms.hold(is_unsafe, AlarmKind.UNSAFE, name, component.feedback, at_s)
         has_no_trace = "the trace of the schedule stopped" in component.feedback
         self.alarms.hold(has_no_trace, AlarmKind.NOT_RECORDED, name, component.feedback, at_s)
 
-    def _take_list(self, listed: Components, at_s: float) -> None:
-        for component in listed.components:
-            self._take_component(component, at_s)
-        if listed.complete:  # else absence proves nothing
-            for address in self._components.keys() - {component.address for component in listed.components}:
-                self._gone(address, at_s)
-
-    def _gone(self, address: str, at_s: float) -> None:
-        component = self._components.pop(address, None)
-        name = component_of(address)
+    def _gone(self, gone: Disappeared, at_s: float) -> None:
+        address, name = gone.address, component_of(gone.address)
+        component = self.picture.components.get(address)
+        self.picture.take(gone)
         self.alarms.end(AlarmKind.UNSAFE, name, at_s)
         if component is None or component.state in LEAVING:
             self._forget(name)
             return
-        self._log.add(StoryEvent(at_s, "", "is lost", name, "", LogLevel.WARNING))
+        self.picture.take(StoryEvent(at_s, "", "is lost", name, "", LogLevel.WARNING))
         is_arc = name in self._arcs
         self._arcs.discard(name)
         if is_arc and is_console(component.requester):
@@ -432,11 +434,9 @@ class TeamModel:
             line = f"{who} is lost: it ended without a word"
             self.alarms.happened(AlarmKind.LOST, name, line, at_s, severity=Severity.NOTICE)
             return
-        self._lost[address] = at_s
+        self._lost[address] = at_s, component
         line = f"{name} ({component.type}) on {component.host} is lost"
         self.alarms.begin(AlarmKind.LOST, name, line, at_s)
-        if _is_in(Subsystem.MISSION_CONTROL, address):
-            self._components[address] = component  # its place in the tree is kept until it is back
 
     def _forget(self, name: str) -> None:
         """Forget what was known of one that left for good: consoles and their ARCs come and go all day."""
@@ -481,9 +481,9 @@ class TeamModel:
 
     def _is_there(self, author: Stopper) -> bool:
         """Return whether who stopped a robot is there; True as long as nothing was heard of who is."""
-        at = {author.console, *(screen.address for screen in self.screens_of(author.by))} & self._components.keys()
-        there = [at for at in at if self._components[at].state not in LEAVING and at not in self._lost]
-        return bool(there) or not self._components
+        there = self.picture.components
+        at = {author.console, *(screen.address for screen in self.screens_of(author.by))} & there.keys()
+        return any(there[one].state not in LEAVING for one in at) or not there
 
     # ------------------------------------------------------------------ what happened
     def _take_link(self, link: LinkHeard) -> None:
@@ -538,14 +538,6 @@ class TeamModel:
                 self._parameters[key] = replace(former, value=shown)
             elif former is None or former.value != shown:
                 self._parameters[key] = ParameterView(name, address, parameter, shown)
-
-
-def _is_older(one: ComponentState, other: ComponentState) -> bool:
-    """Say whether one was said before the other by the same process: its life only goes on.
-
-    Their times do not tell: the nameserver dates a readiness by when it saw it.
-    """
-    return _LIFE.index(one.state) < _LIFE.index(other.state)
 
 
 def _is_in(subsystem: Subsystem, address: str) -> bool:

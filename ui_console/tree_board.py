@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.naming import Subsystem, component_of
 from backbone.people import People
+from backbone.picture.words import because
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule
 from ui_console.views import NodeState, NodeView
@@ -112,11 +113,6 @@ class TreeBoard:
             return -self._priorities.get(component_of(node.address), 0), node.address
 
         return sorted(nodes, key=order)
-
-
-def because(request: RequestView, people: People) -> str:
-    """Return why a request runs or waits, without what its row says anyway, by the names of people."""
-    return people.named(request.because.removeprefix(f"{request.arc} {request.state}: "))
 
 
 def _priorities(requests: Iterable[RequestView]) -> dict[str, int]:

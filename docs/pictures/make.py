@@ -26,9 +26,9 @@ from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
-from backbone.mission_picture import look
-from backbone.mission_screen import live_screen
 from backbone.naming import Subsystem
+from backbone.picture.look import look
+from backbone.picture.screen import live_screen
 from mission_control.messages import MotionSeen
 from ui_console.console_events import ConsoleEvent, Granted
 from ui_console.observer import Observer

@@ -29,6 +29,7 @@ PLANTED = [
     ("core-services", "backbone/placer/planted.py", "from backbone.nameserver import service"),
     ("core-services", "backbone/rc_manager/planted.py", "import backbone.creator"),
     ("scheduling", "backbone/scheduling/planted.py", "import backbone.rc_manager.service"),
+    ("picture", "backbone/picture/planted.py", "import asyncio"),
     ("zenoh", "backbone/bus/planted.py", "import zenoh"),
     ("zenoh", "resource_pool/planted.py", "from zenoh.handlers import Callback"),
     ("mujoco", "resource_pool/planted.py", "import mujoco"),

@@ -111,7 +111,7 @@ STOP = StopState("scout1", True, 1, "anna", "child in the room", 11.0)
 def model(*events: ConsoleEvent, name: str = "console-1") -> ConsoleModel:
     """Return a model that heard these events."""
     made = ConsoleModel(name, user="anna")
-    made.team.mission = "iros2001"
+    made.team.picture.mission = "iros2001"
     for event in events:
         made.apply(event)
     return made

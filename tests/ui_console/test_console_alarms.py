@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import Absence
 from backbone.creator.messages import ProcessFell
-from backbone.health import HealthWord, MissionHealth
 from backbone.nameserver.messages import Disappeared
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule
 from ui_console.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause

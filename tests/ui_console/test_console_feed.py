@@ -13,11 +13,10 @@ from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.health import HealthWord, MissionHealth
 from backbone.keys import Conversation
-from backbone.mission_picture import LAUNCHER
-from backbone.naming import Subsystem
+from backbone.naming import LAUNCHER, Subsystem
 from backbone.operators import OperatorActed, OperatorAction
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.requests import Lease

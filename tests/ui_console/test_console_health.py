@@ -7,7 +7,7 @@ import json
 import pytest
 
 from backbone.component.messages import Absence
-from backbone.health import HealthWord, MissionHealth
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.printable import printable_all
 from ui_console.console_events import Heard, event_json
 from ui_console.console_model import ConsoleModel
@@ -69,7 +69,9 @@ def test_a_launcher_that_is_silent_makes_the_mission_degraded(last: list[Heard])
     view = shown.view(since_s + 2.1)
     assert view.health is not None
     assert view.health.word == "degraded"
-    assert view.health.lines[0] == "the launcher is silent for 2 s: what is shown may be old"
+    assert view.health.lines[0].startswith(
+        "launcher is absent for 2.1 s: it is silent, so what is shown may be old; Look"
+    )
     assert absent(shown, since_s + 2.1)["launcher"].is_active
     shown.apply(heard(since_s + 3.0))
     again = shown.view(since_s + 3.1).health

@@ -13,12 +13,13 @@ from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import Absence, AskTime, ComponentState, LifeState, MissionTime, StandingStop
 from backbone.creator.messages import ListProcesses, Processes, ProcessState, Spawn
 from backbone.errors import LinkError
-from backbone.health import HealthWord
-from backbone.mission_picture import LAUNCHER, MissionPicture, look, misses
-from backbone.mission_screen import live_screen, screen
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem
+from backbone.nameserver.messages import Components, Disappeared, ListComponents
+from backbone.naming import LAUNCHER, Subsystem
+from backbone.picture.health import HealthWord
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture, misses
+from backbone.picture.screen import live_screen, screen
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
@@ -225,3 +226,20 @@ def test_what_a_component_says_commands_no_terminal(text: str) -> None:
         assert plain.isprintable()
         assert len(shown) < 100_000
     assert "[/red]" not in text or "[/red]" in drawn(screen(picture))
+
+
+def test_it_is_the_same_picture_whether_all_is_asked_for_or_each_thing_is_heard() -> None:
+    asked, heard = MissionPicture("m"), MissionPicture("m")
+    early, ready = (component("resource_pool/scout1", state=state) for state in (LifeState.CONNECTING, LifeState.READY))
+    gone = component("resource_pool/scout2")
+    asked.take(Components([ready], True, 0.0))
+    for said in (gone, ready, early, Disappeared(gone.address), component(gone.address, state=LifeState.STOPPED)):
+        heard.take(said)
+    assert asked.components == heard.components == {ready.address: ready}
+
+
+def test_a_list_that_is_not_complete_proves_no_absence() -> None:
+    picture = MissionPicture("m")
+    picture.take(component("resource_pool/scout1"))
+    picture.take(Components([component("resource_pool/scout2")], False, 0.0))
+    assert sorted(picture.components) == ["resource_pool/scout1", "resource_pool/scout2"]

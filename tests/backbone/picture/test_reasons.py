@@ -22,7 +22,7 @@ from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.reasons import Asked, Reasons, Told, reasons_for, story_of
+from backbone.picture.reasons import Asked, Reasons, Told, reasons_for, story_of
 
 CAUSE = "backbone/rc_manager#112"
 SCOUT = ComponentState(

@@ -14,9 +14,9 @@ from rich.table import Table
 from rich.text import Text
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
-from backbone.health import HealthWord
-from backbone.mission_picture import MissionPicture
 from backbone.naming import Subsystem, component_of
+from backbone.picture.health import HealthWord
+from backbone.picture.mission import MissionPicture
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.spoken import counted

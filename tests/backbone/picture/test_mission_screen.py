@@ -8,8 +8,8 @@ import pytest
 from rich.console import Console
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
-from backbone.mission_picture import MissionPicture
-from backbone.mission_screen import live_screen, screen
+from backbone.picture.mission import MissionPicture
+from backbone.picture.screen import live_screen, screen
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 

@@ -17,6 +17,7 @@ from enum import StrEnum
 from typing import Annotated, Any
 
 from backbone.component.messages import Absence, ComponentState
+from backbone.picture.words import absence_line
 from backbone.ranges import MANY
 from backbone.wire import Message, plain
 
@@ -60,7 +61,7 @@ class Health:
 
     def lines(self, now_s: float) -> list[str]:
         """Return one line for each absent component, for people."""
-        return [line(absence, now_s) for absence in self.absent]
+        return [absence_line(absence, now_s) for absence in self.absent]
 
     def to_message(self) -> MissionHealth:
         """Return the message that says so."""
@@ -69,18 +70,6 @@ class Health:
     def to_json(self) -> dict[str, Any]:
         """Return ``health`` and ``absent`` as plain data."""
         return {"health": str(self.word), "absent": plain(self.absent)}
-
-
-def line(absence: Absence, now_s: float) -> str:
-    """Return one absence as a line for people.
-
-    Example:
-        >>> line(Absence("scout1", 2.0, "killed by SIGKILL", "starts again in 0.1 s"), 3.5)
-        'scout1 is absent for 1.5 s: killed by SIGKILL; starts again in 0.1 s'
-    """
-    parts = [f"{absence.name} is absent for {max(0.0, now_s - absence.since_s):.1f} s: {absence.cause}"]
-    parts += [part for part in (absence.doing, absence.remedy) if part]
-    return "; ".join(parts)
 
 
 def health(

@@ -13,14 +13,15 @@ from backbone.component.story import LENGTH as STORY_LENGTH
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
-from backbone.health import line
 from backbone.log_lines import event_json
 from backbone.mission_log import AskPeople, PeopleKnown
-from backbone.mission_picture import LAUNCHER, MissionPicture, look, stop_line
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.naming import component_of
+from backbone.naming import LAUNCHER, component_of
 from backbone.people import People, screens_of
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
+from backbone.picture.words import RULES, absence_line, stop_line
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
@@ -32,18 +33,6 @@ from backbone.spoken import counted
 from backbone.wire import plain
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
-
-RULES = {
-    "3": "each starts as early as it fits whole, and takes nothing from those before it",
-    "5": "a slice ends only if somebody entitled can use the RCs",
-    "6": "RCs are stopped and freed, then settle for the next one",
-    "8": "policy strict: none starts while a higher one of its group waits",
-    "9": "who is higher may keep others waiting for ever; that is allowed, and shown",
-    "11": "what is down or can give too little serves nobody",
-    "14": "who wants no time now keeps its request and frees its RCs",
-    "15": "a big group is not planned whole: each RC is reserved for the first in line",
-}
-"""The rules of scheduling that decide why something is as it is, by the numbers they have in the documentation."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +69,7 @@ class Reasons:
         return [self.people.named(line) for line in self._lines(now_s)]
 
     def _lines(self, now_s: float) -> list[str]:
-        lines = [*self.remarks] if self.absence is None else [line(self.absence, now_s), *self.remarks]
+        lines = [*self.remarks] if self.absence is None else [absence_line(self.absence, now_s), *self.remarks]
         if self.component is not None and self.component.stop is not None:
             lines.append(stop_line(self.name, self.component.stop, now_s))
         if self.why is not None:
@@ -192,7 +181,7 @@ def host_remarks(name: str, picture: MissionPicture) -> list[str]:
     lines = [
         f"{name} is a machine of the mission, with {counted(len(there), 'component')}: {', '.join(there) or 'none'}"
     ]
-    return lines + [line(absence, picture.at_s) for absence in missed]
+    return lines + [absence_line(absence, picture.at_s) for absence in missed]
 
 
 def person_remarks(name: str, picture: MissionPicture) -> list[str]:
