@@ -12,7 +12,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, Health, MissionHealth, health
+from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, MissionHealth, health
 from backbone.picture.look import LOOK_TIME_S, look
 from backbone.picture.mission import MissionPicture
 from backbone.printable import printable_all
@@ -71,14 +71,14 @@ class HealthWatch:
                 self._components = {state.address: state for state in printable_all(listed.components)}
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
 
-    def _health(self) -> Health:
+    def _health(self) -> MissionHealth:
         # The launcher's own state in the list is a look old: what it missed then may be back.
         others = {at: state for at, state in self._components.items() if at != self._bus.source}
         missed = [*self._own(), *self._picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 
-    def _say(self, found: Health) -> None:
-        now_s, said = self._clock.now_s(), found.to_message()
+    def _say(self, said: MissionHealth) -> None:
+        now_s = self._clock.now_s()
         if said != self._said or now_s - self._said_s >= SAY_EVERY_S * self._clock.rate:
             self._said, self._said_s = said, now_s
             self._bus.publish(self._bus.source, Conversation.HEALTH, said)

@@ -18,7 +18,7 @@ from typing import Annotated
 import msgspec
 
 from backbone.errors import Refusal
-from backbone.naming import Subsystem
+from backbone.people import is_console
 from backbone.ranges import Line, Mention
 from backbone.wire import Message
 
@@ -90,11 +90,6 @@ class NotAnOperator(Refusal):
 
     code = "consent.not_an_operator"
     remedy = "Claim the robot; the RC manager decides between programs."
-
-
-def is_console(address: str) -> bool:
-    """Return whether an operator sits at this address."""
-    return address.startswith(f"{Subsystem.UI_CONSOLE}/")
 
 
 def require_console(asked: str, asker: str) -> None:

@@ -14,6 +14,7 @@ from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal, code_of
 from backbone.naming import component_of
 from backbone.operators import OperatorAction
+from backbone.people import is_console
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
@@ -25,7 +26,6 @@ from ui_console.consent import (
     NobodyToAsk,
     Settled,
     Topic,
-    is_console,
     require_console,
 )
 from ui_console.console_events import (

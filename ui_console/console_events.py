@@ -310,7 +310,6 @@ TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
 _WORDS: dict[type[Any], str] = {
-    Asked: "asked",
     Lost: "suspended",
     CommandApplied: "applied",
     CommandRefused: "refused",
@@ -319,20 +318,15 @@ _WORDS: dict[type[Any], str] = {
     LetGoNeeded: "let_go",
     MomentBegan: "moment",
     PictureSeen: "picture",
-    Attention: "attention",
     ConsentAsked: "consent_asked",
     ConsentHeard: "consent_heard",
     Sought: "consent_sought",
     Settled: "consent_settled",
     LinkHeard: "link",
-    Schedule: "schedule",
-    Leases: "leases",
     StoryEvent: "story",
-    Log: "log",
     PeopleKnown: "people",
     OperatorActed: "operator",
     ComponentState: "component",
-    Components: "components",
     Disappeared: "gone",
     ProcessFell: "fell",
     HostLoad: "load",
@@ -340,9 +334,7 @@ _WORDS: dict[type[Any], str] = {
     MissionTime: "time",
     Statistics: "radio",
     MissionHealth: "health",
-    Parameters: "parameters",
     SetParameter: "set",
-    Why: "why",
 }
 
 
@@ -350,7 +342,8 @@ def event_word(event: ConsoleEvent) -> str:
     """Return the word of an event in JSON output: ``granted``, ``suspended``, ``resumed`` and so on."""
     if isinstance(event, Granted):
         return "resumed" if event.again else "granted"
-    return _WORDS[type(event.body if isinstance(event, Heard) else event)]
+    kind = type(event.body if isinstance(event, Heard) else event)
+    return _WORDS.get(kind, kind.__name__.lower())
 
 
 def event_json(event: ConsoleEvent) -> bytes:

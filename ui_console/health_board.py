@@ -7,7 +7,7 @@ is; a word that is too old counts no longer: then the mission is at best degrade
 from __future__ import annotations
 
 from backbone.component.messages import Absence
-from backbone.picture.health import SILENT_AFTER_S, Health, HealthWord, MissionHealth
+from backbone.picture.health import SILENT_AFTER_S, HealthWord, MissionHealth
 from ui_console.alarms import AlarmBook
 from ui_console.views import AlarmKind, HealthView, Severity
 
@@ -47,10 +47,10 @@ class HealthBoard:
         """Return the word and one line for each absence; None: the launcher had no time yet to say anything."""
         said, silence = self._said, self._silence(now_s)
         if silence is None:
-            return HealthView(str(said.word), Health(said.word, tuple(said.absent)).lines(now_s)) if said else None
+            return HealthView(str(said.word), said.lines(now_s)) if said else None
         is_failed = said is not None and said.word is HealthWord.FAILED
         word = HealthWord.FAILED if is_failed else HealthWord.DEGRADED
-        return HealthView(str(word), Health(word, (silence, *(said.absent if said else ()))).lines(now_s))
+        return HealthView(str(word), MissionHealth(word, [silence, *(said.absent if said else ())]).lines(now_s))
 
     def _silence(self, now_s: float) -> Absence | None:
         if self._said_s is None or now_s <= self._said_s + SILENT_AFTER_S * self.rate:

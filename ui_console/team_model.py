@@ -224,13 +224,11 @@ class TeamModel:
         by_user, *also = dict.fromkeys(map(author_name, authors(stop)))
         return StopView(
             number=stop.number,
-            by=stop.by,
             reason=stop.reason,
             age_s=max(0.0, now_s - stop.at_s),
             is_confirmed=stop.is_confirmed,
             by_user=by_user,
             also=also,
-            since_s=stop.at_s,
             is_mine=is_own(stop, user, console),
             lift_line=lift_line(stop, user, console, self._is_there),
         )
@@ -334,24 +332,12 @@ class TeamModel:
         component = self.picture.components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
         waiting = [self.person(requests[arc].owner) for arc in rc.next if arc in requests]
         free = RobotView(
-            robot=rc.rc,
-            number=number,
-            is_up=rc.state != "down" and not self._is_missing(rc.rc),
-            holder="",
-            arc="",
-            is_console=False,
-            is_mine=False,
-            priority="",
-            epoch=0,
-            since_s=NONE_S,
-            until_s=NONE_S,
-            lease_left_s=NONE_S,
-            lease_age_s=NONE_S,
-            because="",
-            waiting=waiting,
-            stop=self.stop_view(rc.rc, now_s),
-            video=None,
-            feedback=self.people.named(component.feedback) if component is not None else "",
+            rc.rc,
+            number,
+            rc.state != "down" and not self._is_missing(rc.rc),
+            waiting,
+            self.stop_view(rc.rc, now_s),
+            self.people.named(component.feedback) if component is not None else "",
         )
         if not rc.holders:
             return free

@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from msgspec.structs import replace
+
 from backbone.naming import component_of
 from backbone.people import is_console
 from backbone.scheduling.views import RcView, RequestView, Schedule
@@ -23,22 +25,12 @@ TURNS_KEPT = 400  # chosen: bounds the memory of a resource that changes hands t
 
 
 @dataclass(slots=True)
-class _Turn:
-    arc: str
-    owner: str
-    is_console: bool
-    epoch: int
-    from_s: float
-    to_s: float  # end of the slice while it runs
-
-
-@dataclass(slots=True)
 class _Row:
     kind: str
     is_sharable: bool
-    past: deque[_Turn] = field(default_factory=lambda: deque(maxlen=TURNS_KEPT))
-    now: dict[tuple[str, int], _Turn] = field(default_factory=dict)
-    following: list[_Turn] = field(default_factory=list)
+    past: deque[SliceView] = field(default_factory=lambda: deque(maxlen=TURNS_KEPT))
+    now: dict[tuple[str, int], SliceView] = field(default_factory=dict)
+    following: list[SliceView] = field(default_factory=list)
     free_since_s: float = 0.0
 
 
@@ -86,14 +78,11 @@ class Timeline:
         return TimelineView(from_s, now_s, to_s, rows)
 
     def _slices(self, row: _Row, from_s: float, now_s: float, to_s: float) -> list[SliceView]:
-        past = [self._slice(turn, Certainty.PAST, turn.to_s) for turn in row.past if turn.to_s >= from_s]
-        running = [self._slice(turn, Certainty.NOW, max(now_s, turn.to_s)) for turn in row.now.values()]
-        following = [self._slice(turn, Certainty.NEXT, turn.to_s) for turn in row.following if turn.from_s <= to_s]
-        return sorted([*past, *running, *following], key=lambda one: (one.from_s, one.to_s, one.arc))
-
-    def _slice(self, turn: _Turn, certainty: Certainty, to_s: float) -> SliceView:
-        who, to_s = self._person(turn.owner), max(turn.from_s, to_s)
-        return SliceView(who, turn.arc, turn.epoch, turn.from_s, to_s, certainty, turn.is_console)
+        past = [replace(turn, to_s=max(turn.from_s, turn.to_s)) for turn in row.past if turn.to_s >= from_s]
+        running = [replace(turn, to_s=max(turn.from_s, now_s, turn.to_s)) for turn in row.now.values()]
+        following = [turn for turn in row.following if turn.from_s <= to_s]
+        slices = [replace(turn, who=self._person(turn.who)) for turn in (*past, *running, *following)]
+        return sorted(slices, key=lambda one: (one.from_s, one.to_s, one.arc))
 
 
 def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float) -> None:
@@ -101,16 +90,15 @@ def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float
     for key in row.now.keys() - holders.keys():
         turn = row.now.pop(key)
         since_s = [holder.since_s for holder in rc.holders if not rc.sharable]
-        turn.to_s = max(turn.from_s, min([at_s, *since_s]))
-        row.past.append(turn)
-        row.free_since_s = max(row.free_since_s, turn.to_s)
+        ended_s = max(turn.from_s, min([at_s, *since_s]))
+        row.past.append(replace(turn, to_s=ended_s, certainty=Certainty.PAST))
+        row.free_since_s = max(row.free_since_s, ended_s)
     for number, (key, holder) in enumerate(holders.items()):
         until_s = rc.until_s[number] if number < len(rc.until_s) else -1.0
         turn = row.now.get(key) or _begun(row, rc, key, holder.since_s, requests, at_s)
-        turn.to_s = until_s
-        row.now[key] = turn
+        row.now[key] = replace(turn, to_s=until_s)
     row.following = [
-        _turn(arc, requests, 0, start_s, start_s + (requests[arc].minimum_runtime_s if arc in requests else 0.0))
+        _turn(arc, requests, 0, start_s, Certainty.NEXT)
         for arc, start_s in zip(rc.next, rc.next_s, strict=False)
         if start_s >= 0
     ]
@@ -118,13 +106,16 @@ def _update(row: _Row, rc: RcView, requests: dict[str, RequestView], at_s: float
 
 def _begun(
     row: _Row, rc: RcView, key: tuple[str, int], since_s: float, requests: dict[str, RequestView], at_s: float
-) -> _Turn:
+) -> SliceView:
     """Return a turn that was not known; it cannot have begun before the last one ended, nor after it was told."""
     arc, epoch = key
     earliest_s = 0.0 if rc.sharable else row.free_since_s
-    return _turn(arc, requests, epoch, min(max(since_s, earliest_s), max(at_s, earliest_s)), -1.0)
+    from_s = min(max(since_s, earliest_s), max(at_s, earliest_s))
+    return _turn(arc, requests, epoch, from_s, Certainty.NOW)
 
 
-def _turn(arc: str, requests: dict[str, RequestView], epoch: int, from_s: float, to_s: float) -> _Turn:
-    owner = requests[arc].owner if arc in requests else arc
-    return _Turn(arc, owner, is_console(owner), epoch, from_s, to_s)
+def _turn(arc: str, requests: dict[str, RequestView], epoch: int, from_s: float, certainty: Certainty) -> SliceView:
+    """Return a turn of the minimum run time; ``who`` is the owner's address until it is shown."""
+    request = requests.get(arc)
+    owner, lasts_s = (request.owner, request.minimum_runtime_s) if request is not None else (arc, 0.0)
+    return SliceView(owner, arc, epoch, from_s, from_s + lasts_s, certainty, is_console(owner))

@@ -53,25 +53,21 @@ class StopView(msgspec.Struct, frozen=True):
 
     Attributes:
         number: To lift it by.
-        by: Who stopped the robot first: a name, or the address of what stopped it.
         reason: As given.
         age_s: For how long.
         is_confirmed: False if the wheels may still turn for a moment.
         by_user: Who stopped it first, for people.
         also: Who else stopped it since, for people.
-        since_s: Since when.
         is_mine: True if this operator stopped it, and nobody else.
         lift_line: What lifting it needs, for people.
     """
 
     number: int
-    by: str
     reason: str
     age_s: float
     is_confirmed: bool
     by_user: str
     also: list[str]
-    since_s: float
     is_mine: bool
     lift_line: str
 
@@ -121,21 +117,21 @@ class RobotView(msgspec.Struct, frozen=True):
     robot: str
     number: int
     is_up: bool
-    holder: str
-    arc: str
-    is_console: bool
-    is_mine: bool
-    priority: str
-    epoch: int
-    since_s: float
-    until_s: float
-    lease_left_s: float
-    lease_age_s: float
-    because: str
     waiting: list[str]
     stop: StopView | None
-    video: VideoView | None
     feedback: str
+    holder: str = ""
+    arc: str = ""
+    is_console: bool = False
+    is_mine: bool = False
+    priority: str = ""
+    epoch: int = 0
+    since_s: float = NONE_S
+    until_s: float = NONE_S
+    lease_left_s: float = NONE_S
+    lease_age_s: float = NONE_S
+    because: str = ""
+    video: VideoView | None = None
 
 
 class NodeState(StrEnum):

@@ -12,7 +12,6 @@ wants and misses (``Component.absences``); this file joins these reports with wh
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -36,7 +35,7 @@ class HealthWord(StrEnum):
 
 
 class MissionHealth(Message, frozen=True):
-    """Published by the launcher on every change, and every ``SAY_EVERY_S`` so that its silence is noticed.
+    """How a mission is; published by the launcher on every change, and every ``SAY_EVERY_S``: its silence is noticed.
 
     Attributes:
         word: The verdict.
@@ -46,26 +45,9 @@ class MissionHealth(Message, frozen=True):
     word: HealthWord
     absent: Annotated[list[Absence], MANY] = []
 
-
-@dataclass(frozen=True, slots=True)
-class Health:
-    """How a mission is, and what it lacks.
-
-    Attributes:
-        word: The verdict.
-        absent: What is wanted and absent: vital components first, then by name.
-    """
-
-    word: HealthWord
-    absent: tuple[Absence, ...] = ()
-
     def lines(self, now_s: float) -> list[str]:
         """Return one line for each absent component, for people."""
         return [absence_line(absence, now_s) for absence in self.absent]
-
-    def to_message(self) -> MissionHealth:
-        """Return the message that says so."""
-        return MissionHealth(self.word, list(self.absent))
 
     def to_json(self) -> dict[str, Any]:
         """Return ``health`` and ``absent`` as plain data."""
@@ -74,7 +56,7 @@ class Health:
 
 def health(
     components: Mapping[str, ComponentState], missed: Iterable[Absence], now_s: float, rate: float = 1.0
-) -> Health:
+) -> MissionHealth:
     """Return the mission's health.
 
     Args:
@@ -88,8 +70,8 @@ def health(
         known = absent.get(absence.name)
         if known is None or absence.since_s < known.since_s:
             absent[absence.name] = absence
-    found = tuple(sorted(absent.values(), key=lambda each: (not each.vital, each.name)))
-    return Health(_word(found, now_s, rate), found)
+    found = sorted(absent.values(), key=lambda each: (not each.vital, each.name))
+    return MissionHealth(_word(found, now_s, rate), found)
 
 
 def _word(absent: Iterable[Absence], now_s: float, rate: float) -> HealthWord:

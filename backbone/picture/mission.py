@@ -17,7 +17,7 @@ from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.operators import OperatorActed
 from backbone.people import People
-from backbone.picture.health import Health, health
+from backbone.picture.health import MissionHealth, health
 from backbone.picture.words import stop_line
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
@@ -123,7 +123,7 @@ class MissionPicture:
 
     # ------------------------------------------------------------------ views out
     @property
-    def health(self) -> Health:
+    def health(self) -> MissionHealth:
         """How the mission is, and what it lacks."""
         return health(self.components, self.missed, self.at_s, self.rate)
 

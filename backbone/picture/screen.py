@@ -169,8 +169,8 @@ def _event_line(event: StoryEvent) -> Text:
     return Text.assemble((f"{event.at_s:8.2f} s  ", "dim"), f"{event.subject:22.22s} ", (event.what, style))
 
 
-def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> RenderableType:
-    """Return the whole picture: health and what is absent first, then components, holders, schedule, newest events."""
+def screen(picture: MissionPicture) -> RenderableType:
+    """Return the whole picture: health and what is absent first, then components, holders, schedule."""
     troubles = _troubles(picture)
     for line in troubles:
         line.no_wrap = False
@@ -179,9 +179,6 @@ def screen(picture: MissionPicture, events: Iterable[StoryEvent] = ()) -> Render
         parts.append(components_table(picture))
     if (schedule := picture.people.named_all(picture.schedule)) is not None:
         parts += [rcs_table(schedule), requests_table(schedule, picture.at_s)]
-    newest = list(events)
-    if newest:
-        parts.append(events_table(newest))
     return Group(*parts)
 
 
@@ -265,14 +262,6 @@ def _reason(request: RequestView) -> str:
     reason = f"{request.because} (rule {request.rule})" if request.rule else request.because
     starves = request.state is RequestState.WAITING and request.expected_start_s < 0
     return f"{reason}; until {request.would_change}" if starves and request.would_change else reason
-
-
-def events_table(events: list[StoryEvent]) -> Table:
-    """Return the newest events, newest last."""
-    table = Table(title="events", title_justify="left", show_header=False)
-    for event in events:
-        table.add_row(f"{event.at_s:8.2f} s", event.subject, event.what)
-    return table
 
 
 def _when(request: RequestView, now_s: float) -> str:

@@ -129,7 +129,7 @@ def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_ta
     mine, theirs = rows[0].stop, rows[1].stop
     assert mine is not None
     assert theirs is not None
-    assert (mine.by_user, mine.since_s, mine.is_mine, mine.lift_line) == ("anna", 11.0, True, "hold to lift")
+    assert (mine.by_user, mine.age_s, mine.is_mine, mine.lift_line) == ("anna", 1.0, True, "hold to lift")
     assert (theirs.by_user, theirs.also, theirs.is_mine) == ("ben", ["cleo"], False)
     assert theirs.lift_line == "asks ben and cleo first"
 

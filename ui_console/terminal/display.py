@@ -22,9 +22,9 @@ from ui_console.terminal.dialogs import Dialog, LiftQuestion
 from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, has, hints, robot_meant
-from ui_console.terminal.lines import Row
+from ui_console.terminal.lines import Row, table_rows
 from ui_console.terminal.log_search import FOUND_SHOWN, Found
-from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
+from ui_console.terminal.tables import FIXED, NOTHING, PanelName
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
 from ui_console.views import ConsoleView
