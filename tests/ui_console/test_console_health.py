@@ -9,11 +9,11 @@ import pytest
 from backbone.component.messages import Absence
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.printable import printable_all
-from ui_console.console_events import Heard, event_json
-from ui_console.console_model import ConsoleModel
-from ui_console.profile import Profile
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import Heard, event_json
+from ui_console.model.profile import Profile
+from ui_console.model.views import AlarmKind, AlarmView, view_json
 from ui_console.terminal.head import head
-from ui_console.views import AlarmKind, AlarmView, view_json
 
 GRABBER = Absence("grabber", 4.0, "killed by SIGKILL", "starts again in 0.1 s")
 PLACER = Absence("placer", 1.0, "no answer", "the launcher restarts it", "Nothing.", vital=True)

@@ -8,8 +8,8 @@ from screen_text import screen_text
 from written_session import WrittenSession
 
 from resource_pool.arc_client import Stopper, StopState
-from ui_console.consent import Consent, Settled, Sought, Topic
-from ui_console.console_events import (
+from ui_console.model.consent import Consent, Settled, Sought, Topic
+from ui_console.model.events import (
     GivenBack,
     Granted,
     Heard,
@@ -18,11 +18,11 @@ from ui_console.console_events import (
     Lost,
     MomentBegan,
 )
-from ui_console.feed import LINK_FRESH_S
-from ui_console.profile import Profile
+from ui_console.model.profile import Profile
+from ui_console.model.views import AlarmKind, LostView
+from ui_console.session.feed import LINK_FRESH_S
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.display import LINK_LOOK_S
-from ui_console.views import AlarmKind, LostView
 
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
 

@@ -17,8 +17,7 @@ from backbone.component.messages import ComponentState, StoryEvent
 from backbone.naming import component_of
 from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
-from ui_console.terminal.tables import PanelName
-from ui_console.views import (
+from ui_console.model.views import (
     AlarmView,
     Certainty,
     ConsoleView,
@@ -33,6 +32,7 @@ from ui_console.views import (
     StopView,
     TimelineView,
 )
+from ui_console.terminal.tables import PanelName
 
 NODE_MARKS = {
     NodeState.RUNNING: ("▶", "green"),

@@ -18,8 +18,8 @@ from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message
-from ui_console.feed import REPLY_TIME_S
-from ui_console.observer import Observer
+from ui_console.session.feed import REPLY_TIME_S
+from ui_console.session.observer import Observer
 
 
 class AskHandOver(Message, frozen=True):

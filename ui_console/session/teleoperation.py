@@ -38,10 +38,9 @@ from resource_pool.arc_client import (
     arc_name,
     claim_parameters,
 )
-from ui_console.consent import AskConsent, Consent
-from ui_console.consent_answers import ConsentAnswers
-from ui_console.consent_talk import Claim, ConsentTalk
-from ui_console.console_events import (
+from ui_console.model.consent import AskConsent, Consent
+from ui_console.model.driving import Command, Drive, Halt, Jump
+from ui_console.model.events import (
     Asked,
     CommandRefused,
     ConsoleEvent,
@@ -51,15 +50,16 @@ from ui_console.console_events import (
     Lost,
     PictureSeen,
 )
-from ui_console.controls import Controls
-from ui_console.driving import Command, Drive, Halt, Jump
-from ui_console.feed import REPLY_TIME_S
-from ui_console.hand_over import AskHandOver, HandOver
-from ui_console.lifting import AskLift
-from ui_console.observer import Observer
-from ui_console.presence import Presence
-from ui_console.stop_ear import StopEar
-from ui_console.team_model import ROBOT_KIND
+from ui_console.model.lifting import AskLift
+from ui_console.model.team import ROBOT_KIND
+from ui_console.session.consent_answers import ConsentAnswers
+from ui_console.session.consent_talk import Claim, ConsentTalk
+from ui_console.session.controls import Controls
+from ui_console.session.feed import REPLY_TIME_S
+from ui_console.session.hand_over import AskHandOver, HandOver
+from ui_console.session.observer import Observer
+from ui_console.session.presence import Presence
+from ui_console.session.stop_ear import StopEar
 
 log = logging.getLogger(__name__)
 

@@ -39,14 +39,14 @@ from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule, Why
 from backbone.spoken import counted, value_text
 from resource_pool.arc_client import Stopper, StopState
-from ui_console.alarms import AlarmBook, one_line_for_one_cause
-from ui_console.console_events import LinkHeard, Said, TeamEvent
-from ui_console.health_board import HealthBoard
-from ui_console.lifting import author_name, authors, is_own, lift_line
-from ui_console.needs import Needs
-from ui_console.timeline import Timeline
-from ui_console.tree_board import TreeBoard
-from ui_console.views import (
+from ui_console.model.alarms import AlarmBook, one_line_for_one_cause
+from ui_console.model.events import LinkHeard, Said, TeamEvent
+from ui_console.model.health_board import HealthBoard
+from ui_console.model.lifting import author_name, authors, is_own, lift_line
+from ui_console.model.needs import Needs
+from ui_console.model.timeline import Timeline
+from ui_console.model.tree_board import TreeBoard
+from ui_console.model.views import (
     NONE_S,
     AlarmKind,
     AlarmView,

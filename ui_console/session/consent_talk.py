@@ -18,7 +18,7 @@ from backbone.people import is_console
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
-from ui_console.consent import (
+from ui_console.model.consent import (
     CONSENT_WITHIN_S,
     MAX_WHY,
     AskConsent,
@@ -28,14 +28,14 @@ from ui_console.consent import (
     Topic,
     require_console,
 )
-from ui_console.console_events import (
+from ui_console.model.events import (
     CommandRefused,
     ConsentAsked,
     ConsentHeard,
     LinkTrouble,
 )
-from ui_console.feed import REPLY_TIME_S
-from ui_console.observer import Observer
+from ui_console.session.feed import REPLY_TIME_S
+from ui_console.session.observer import Observer
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,9 @@ from backbone.naming import Subsystem, component_of
 from backbone.picture.words import UNDECIDED, WANTED, why_lost
 from backbone.scheduling.views import Why
 from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
-from ui_console.alarms import AlarmBook
-from ui_console.consent import Settled, Sought, Topic
-from ui_console.console_events import (
+from ui_console.model.alarms import AlarmBook
+from ui_console.model.consent import Settled, Sought, Topic
+from ui_console.model.events import (
     Asked,
     Attention,
     CommandApplied,
@@ -39,9 +39,9 @@ from ui_console.console_events import (
     OwnEvent,
     PictureSeen,
 )
-from ui_console.lifting import question_line
-from ui_console.team_model import ROBOT_KIND, TeamModel
-from ui_console.views import (
+from ui_console.model.lifting import question_line
+from ui_console.model.team import ROBOT_KIND, TeamModel
+from ui_console.model.views import (
     NONE_S,
     AlarmKind,
     AlarmView,

@@ -45,8 +45,8 @@ from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
-from ui_console.console_events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
-from ui_console.team_model import ROBOT_KIND
+from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
+from ui_console.model.team import ROBOT_KIND
 
 log = logging.getLogger(__name__)
 

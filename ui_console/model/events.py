@@ -30,7 +30,7 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
 from resource_pool.arc_client import StopState
-from ui_console.consent import Settled, Sought, Topic
+from ui_console.model.consent import Settled, Sought, Topic
 
 
 # ---------------------------------------------------------------------- of its own robot

@@ -12,7 +12,7 @@ from backbone.errors import LinkError, Refusal
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
 
 if TYPE_CHECKING:
-    from ui_console.observer import Observer
+    from ui_console.session.observer import Observer
 
 log = logging.getLogger(__name__)
 

@@ -21,7 +21,7 @@ from backbone.cli import read_secret_option
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from backbone.visit import clock_elsewhere
-from ui_console.observer import Observer
+from ui_console.session.observer import Observer
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
 
@@ -92,7 +92,7 @@ async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joinin
         Subsystem.UI_CONSOLE,
         name,
         "console",
-        "ui_console.teleoperation:Teleoperation",
+        "ui_console.session.teleoperation:Teleoperation",
         host,
         endpoint,
         clock.origin_monotonic_s,

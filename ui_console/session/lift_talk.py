@@ -10,10 +10,19 @@ from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.operators import OperatorAction
 from resource_pool.arc_client import OtherStop, Stopper, StopState
-from ui_console.consent import CONSENT_WITHIN_S, Consent, Topic
-from ui_console.console_events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent
-from ui_console.feed import ConsoleFeed
-from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, answer_of, author_name, decide_lift, is_agreed
+from ui_console.model.consent import CONSENT_WITHIN_S, Consent, Topic
+from ui_console.model.events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent
+from ui_console.model.lifting import (
+    AskFirst,
+    AskLift,
+    LiftNow,
+    NotThatStop,
+    answer_of,
+    author_name,
+    decide_lift,
+    is_agreed,
+)
+from ui_console.session.feed import ConsoleFeed
 
 ANSWER_TIME_S = CONSENT_WITHIN_S + 1.0  # chosen: who is asked answers by itself before
 LOOK_AGAIN = "Look who stopped the robot and why, then lift that stop if it may move."

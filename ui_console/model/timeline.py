@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from backbone.naming import component_of
 from backbone.people import is_console
 from backbone.scheduling.views import RcView, RequestView, Schedule
-from ui_console.views import Certainty, SliceView, TimelineRow, TimelineView
+from ui_console.model.views import Certainty, SliceView, TimelineRow, TimelineView
 
 HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds
 TURNS_KEPT = 400  # chosen: bounds the memory of a resource that changes hands twice a second

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
-from ui_console.console_events import CommandApplied, CommandRefused, LetGoNeeded, LinkTrouble, MomentBegan
-from ui_console.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
+from ui_console.model.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
+from ui_console.model.events import CommandApplied, CommandRefused, LetGoNeeded, LinkTrouble, MomentBegan
 
 if TYPE_CHECKING:
     from resource_pool.arc_client import Applied, ArcClient
-    from ui_console.observer import Observer
+    from ui_console.session.observer import Observer
 
 
 class Controls:

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from msgspec.structs import replace
 
-from ui_console.views import NONE_S, AlarmKind, AlarmView, Severity
+from ui_console.model.views import NONE_S, AlarmKind, AlarmView, Severity
 
 ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the recording
 FADES_AFTER_S = {Severity.NOTICE: 20.0, Severity.WARNING: 60.0}  # chosen: read twice; a real alarm never fades

@@ -18,12 +18,12 @@ from backbone.printable import printable_all
 from backbone.scheduling.views import Schedule
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message
-from ui_console.consent import Consent, Topic, require_console
-from ui_console.consent_answers import ConsentAnswers
-from ui_console.console_events import ConsoleEvent, Heard, LinkHeard
-from ui_console.feed import ConsoleFeed, FeedEvent
-from ui_console.lift_talk import LiftTalk
-from ui_console.lifting import AskLift
+from ui_console.model.consent import Consent, Topic, require_console
+from ui_console.model.events import ConsoleEvent, Heard, LinkHeard
+from ui_console.model.lifting import AskLift
+from ui_console.session.consent_answers import ConsentAnswers
+from ui_console.session.feed import ConsoleFeed, FeedEvent
+from ui_console.session.lift_talk import LiftTalk
 
 P = TypeVar("P", bound=msgspec.Struct)
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from backbone.component.messages import Absence
 from backbone.picture.health import SILENT_AFTER_S, HealthWord, MissionHealth
-from ui_console.alarms import AlarmBook
-from ui_console.views import AlarmKind, HealthView, Severity
+from ui_console.model.alarms import AlarmBook
+from ui_console.model.views import AlarmKind, HealthView, Severity
 
 LAUNCHER_NAME = "launcher"
 REMEDY = "Look after the terminal of 'scout-backbone up'; 'scout-backbone down' ends the mission."

@@ -14,7 +14,7 @@ from backbone.people import People
 from backbone.picture.words import because
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule
-from ui_console.views import NodeState, NodeView
+from ui_console.model.views import NodeState, NodeView
 
 _STATE_OF_REQUEST = {
     RequestState.RUNNING: NodeState.RUNNING,

@@ -8,8 +8,8 @@ from typing import Protocol
 
 from backbone.bus.interface import Clock
 from backbone.operators import OperatorAction
-from ui_console.consent import CONSENT_WITHIN_S, Consent, ConsentDesk, Settled, Sought, Topic
-from ui_console.console_events import ConsoleEvent
+from ui_console.model.consent import CONSENT_WITHIN_S, Consent, ConsentDesk, Settled, Sought, Topic
+from ui_console.model.events import ConsoleEvent
 
 _ACTIONS = {
     (Topic.TAKE, True): OperatorAction.CONSENT,

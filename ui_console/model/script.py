@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.errors import Refusal
-from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
+from ui_console.model.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
 
 
 class WrongScript(Refusal):

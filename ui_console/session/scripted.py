@@ -11,7 +11,8 @@ from backbone.errors import Refusal, code_of
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import StopState, SwappedOut
-from ui_console.console_events import (
+from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
+from ui_console.model.events import (
     Asked,
     CommandApplied,
     CommandRefused,
@@ -24,9 +25,8 @@ from ui_console.console_events import (
     PictureSeen,
     event_json,
 )
-from ui_console.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
-from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
+from ui_console.session.teleoperation import Teleoperation
 
 DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times

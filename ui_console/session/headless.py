@@ -9,15 +9,15 @@ from typing import Any
 
 from backbone.component.component import NoParameters
 from backbone.endings import ExitCode, say
-from ui_console.console_events import ConsoleEvent, for_scripts
-from ui_console.console_model import ConsoleModel
-from ui_console.joining import Where, end_on_signals, join, write_line
-from ui_console.observer import Observer, nobody_here
-from ui_console.script import Step, WrongScript, read_script
-from ui_console.scripted import ScriptDriver, feed_from
-from ui_console.team_model import TeamModel
-from ui_console.teleoperation import Teleoperation
-from ui_console.views import view_json
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import ConsoleEvent, for_scripts
+from ui_console.model.script import Step, WrongScript, read_script
+from ui_console.model.team import TeamModel
+from ui_console.model.views import view_json
+from ui_console.session.joining import Where, end_on_signals, join, write_line
+from ui_console.session.observer import Observer, nobody_here
+from ui_console.session.scripted import ScriptDriver, feed_from
+from ui_console.session.teleoperation import Teleoperation
 
 STANDARD_INPUT = "-"
 

@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING, Any
 
-from ui_console.console_events import Attention
+from ui_console.model.events import Attention
 
 if TYPE_CHECKING:
-    from ui_console.observer import Observer
+    from ui_console.session.observer import Observer
 
 
 class Presence:

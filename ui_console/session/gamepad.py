@@ -16,7 +16,7 @@ from enum import StrEnum
 from typing import Any, Protocol
 
 from backbone.errors import Refusal
-from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
 
 log = logging.getLogger(__name__)
 

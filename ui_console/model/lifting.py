@@ -19,7 +19,7 @@ from backbone.naming import component_of
 from backbone.ranges import Mention
 from backbone.wire import Message
 from resource_pool.arc_client import Stopper, StopState
-from ui_console.consent import MAX_WHY, Consent
+from ui_console.model.consent import MAX_WHY, Consent
 
 
 class AskLift(Message, frozen=True):
