@@ -32,7 +32,7 @@ def test_wrong_options_are_refused_before_a_mission_is_looked_for(arguments: lis
 @pytest.mark.processes
 def test_other_commands_load_neither_the_server_nor_its_library() -> None:
     check = (
-        "import sys, ui_console.cli, ui_console.teleoperation, ui_console.scripted;"
+        "import sys, ui_console.cli, ui_console.session.teleoperation, ui_console.session.scripted;"
         "sys.exit(', '.join({'websockets', 'cv2', 'ui_console.web.server'} & set(sys.modules)) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", check], check=False, capture_output=True, text=True)
