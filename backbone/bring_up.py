@@ -51,10 +51,9 @@ from backbone.heaps import share_heaps
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
 from backbone.mission_log import AskLog, AskPeople, LogKeeper, PeopleKnown
-from backbone.mission_picture import LAUNCHER
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import Subsystem, address, component_of
+from backbone.naming import LAUNCHER, Subsystem, address, component_of
 from backbone.operators import OperatorAction, tell_acted
 from backbone.other_hosts import OtherHosts, endpoint_for_others
 from backbone.placer.messages import ADDRESS as PLACER

@@ -255,7 +255,7 @@ def why(
     """Explain why a request waits or runs, until when, and why a component is on its host."""
 
     async def work() -> int:
-        from backbone.reasons import reasons_for
+        from backbone.picture.reasons import reasons_for
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             reasons = await reasons_for(bus, name, clock)
@@ -277,7 +277,7 @@ def story(
 
     async def work() -> int:
         from backbone.log_lines import story_json, story_lines
-        from backbone.reasons import story_of
+        from backbone.picture.reasons import story_of
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             told = await story_of(bus, name, clock)
@@ -324,8 +324,8 @@ def log(
         from backbone.log_lines import log_json, log_lines
         from backbone.log_question import LogQuestion
         from backbone.mission_log import Log
-        from backbone.mission_picture import LAUNCHER
         from backbone.moments import Now
+        from backbone.naming import LAUNCHER
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)

@@ -13,9 +13,10 @@ from backbone.authentication import read_secret_file
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import BackboneError
 from backbone.mission_connection import connected
-from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
 from backbone.people import is_console
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
 
 WITHIN_S = 1.5  # chosen: a person does not wait longer after Tab
 

@@ -14,8 +14,7 @@ from backbone.component.launch import Launch
 from backbone.creator.messages import creator_name
 from backbone.creator.preload import arc_modules
 from backbone.mission.model import Host, MissionDescription
-from backbone.mission_picture import LAUNCHER
-from backbone.naming import Subsystem
+from backbone.naming import LAUNCHER, Subsystem
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,12 @@ from contextlib import suppress
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, ComponentState
 from backbone.errors import LinkError, Refusal
-from backbone.health import LOOK_EVERY_S, SAY_EVERY_S, Health, MissionHealth, health
 from backbone.keys import Conversation
-from backbone.mission_picture import LOOK_TIME_S, MissionPicture, look
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
+from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, MissionHealth, health
+from backbone.picture.look import LOOK_TIME_S, look
+from backbone.picture.mission import MissionPicture
 from backbone.printable import printable_all
 
 
@@ -31,7 +32,7 @@ class HealthWatch:
         self, bus: Bus, clock: Clock, changed: Callable[[], None], own: Callable[[], list[Absence]] = list
     ) -> None:
         self._bus, self._clock, self._changed, self._own = bus, clock, changed, own
-        self._picture = MissionPicture(bus.mission, clock.now_s(), {}, rate=clock.rate)
+        self._picture = MissionPicture(bus.mission, clock.now_s(), rate=clock.rate)
         self._components: Mapping[str, ComponentState] = {}
         self._said: MissionHealth | None = None
         self._said_s = 0.0
@@ -56,8 +57,8 @@ class HealthWatch:
 
     async def _look_again_and_again(self) -> None:
         while True:
-            missed = self.absences()
-            self._picture = await self._look()
+            missed, now_s, rate = self.absences(), self._clock.now_s(), self._clock.rate
+            await look(self._bus, now_s, before=self._picture, rate=rate, schedule=False)
             if self.absences() != missed:
                 self._changed()
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
@@ -70,18 +71,14 @@ class HealthWatch:
                 self._components = {state.address: state for state in printable_all(listed.components)}
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
 
-    async def _look(self) -> MissionPicture:
-        now_s, rate = self._clock.now_s(), self._clock.rate
-        return await look(self._bus, now_s, before=self._picture, rate=rate, schedule=False)
-
-    def _health(self) -> Health:
+    def _health(self) -> MissionHealth:
         # The launcher's own state in the list is one round old: its absences may have ended.
         others = {at: state for at, state in self._components.items() if at != self._bus.source}
         missed = [*self._own(), *self._picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 
-    def _say(self, found: Health) -> None:
-        now_s, said = self._clock.now_s(), found.to_message()
+    def _say(self, said: MissionHealth) -> None:
+        now_s = self._clock.now_s()
         if said != self._said or now_s - self._said_s >= SAY_EVERY_S * self._clock.rate:
             self._said, self._said_s = said, now_s
             self._bus.publish(self._bus.source, Conversation.HEALTH, said)

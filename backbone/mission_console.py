@@ -5,12 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections import deque
 from typing import IO, Any
 
 from rich.console import Console
 from rich.live import Live
-from rich.text import Text
 
 from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
@@ -18,14 +16,15 @@ from backbone.component.messages import ComponentState, StoryEvent
 from backbone.core_launches import UpOptions
 from backbone.endings import ExitCode, complaint_of
 from backbone.errors import BackboneError, LinkError, Refusal
-from backbone.health import HealthWord, MissionHealth, line
 from backbone.keys import Conversation
 from backbone.mission.model import MissionDescription
-from backbone.mission_picture import LAUNCHER, MissionPicture, holders_line, look
-from backbone.mission_screen import live_screen
-from backbone.naming import Subsystem
+from backbone.naming import LAUNCHER, Subsystem
 from backbone.operators import OperatorActed
-from backbone.people import People
+from backbone.picture.health import HealthWord, MissionHealth
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture, Said, holders_line
+from backbone.picture.screen import live_screen
+from backbone.picture.words import absence_line
 from backbone.printable import printable_all, printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.scheduling.requests import RequestState
@@ -50,8 +49,7 @@ class ConsoleObserver:
 
     def __init__(self, console: Console, *, live: bool, verdict: VerdictPipe | None = None) -> None:
         self._console, self._live, self._verdict = console, live, verdict
-        self._events: deque[StoryEvent] = deque(maxlen=EVENTS_KEPT)
-        self._people = People()
+        self._picture = MissionPicture("")
         self._told = self._health_told = ""
         self._is_up, self._last_progress_s = False, 0.0
 
@@ -68,11 +66,12 @@ class ConsoleObserver:
 
     def connected(self, bus: Bus) -> None:
         """Listen to what components tell people, and to the mission's health."""
+        self._picture.mission = bus.mission
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard_health, latest=True)
         consoles = f"{Subsystem.UI_CONSOLE}/*"
-        bus.subscribe(consoles, Conversation.STATUS, ComponentState, self._heard_console, latest=True)
-        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
-        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
+        bus.subscribe(consoles, Conversation.STATUS, ComponentState, self._heard, latest=True)
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
 
     def tell(self, line: str) -> None:
         """Print one line, also for the command that waits until all is ready."""
@@ -100,15 +99,11 @@ class ConsoleObserver:
             await asyncio.Event().wait()
 
     async def _show_live(self, bus: Bus, clock: Clock) -> None:
-        console = self._console
-        picture: MissionPicture | None = None
+        console, picture = self._console, self._picture
         with Live(console=console, auto_refresh=False, screen=True, vertical_overflow="crop") as live:
             while True:
-                try:
-                    picture = await look(bus, clock.now_s(), before=picture, rate=clock.rate)
-                    live.update(live_screen(picture, self._events, console.height), refresh=True)
-                except LinkError as error:
-                    live.update(Text(f"the nameserver does not answer: {error}"), refresh=True)
+                await look(bus, clock.now_s(), before=picture, rate=clock.rate)
+                live.update(live_screen(picture, picture.log.newest(EVENTS_KEPT), console.height), refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
     def _heard_health(self, envelope: Envelope[Any]) -> None:
@@ -125,36 +120,27 @@ class ConsoleObserver:
             return
         self._print(f"{envelope.stamp_s:9.2f} s  health {heard.word}")
         for absence in heard.absent:
-            self._print(f"{'':9}    {line(absence, envelope.stamp_s)}")
+            self._print(f"{'':9}    {absence_line(absence, envelope.stamp_s)}")
 
     def _heard_while_coming_up(self, heard: MissionHealth, at_s: float) -> None:
         """Say every now and then what a start that takes long waits for."""
         if at_s - self._last_progress_s >= PROGRESS_EVERY_S:
             self._last_progress_s = at_s
             for absence in heard.absent:
-                self.tell(f"  … {line(absence, at_s)}")
+                self.tell(f"  … {absence_line(absence, at_s)}")
 
-    def _heard_act(self, envelope: Envelope[Any]) -> None:
-        act: OperatorActed = printable_all(envelope.body)
-        self._show_event(act.event(envelope.source, envelope.cause))
-
-    def _heard_event(self, envelope: Envelope[Any]) -> None:
-        self._show_event(printable_all(envelope.body))
-
-    def _heard_console(self, envelope: Envelope[Any]) -> None:
-        self._people.heard(printable_all(envelope.body))
-
-    def _show_event(self, told: StoryEvent) -> None:
-        event = self._people.named_event(told)
-        self._events.append(event)
-        if not self._live:
+    def _heard(self, envelope: Envelope[Any]) -> None:
+        said: Said = printable_all(envelope.body)
+        self._picture.take(said, envelope.source)
+        if not self._live and not isinstance(said, ComponentState):
+            [event] = self._picture.log.newest(1)
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
 
     def _heard_schedule(self, envelope: Envelope[Any]) -> None:
         schedule: Schedule = envelope.body
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
             return
-        line = self._people.named(holders_line(schedule))
+        line = self._picture.people.named(holders_line(schedule))
         if line != self._told:
             self._told = line
             self._print(f"{schedule.at_s:9.2f} s  {line}")

@@ -8,7 +8,8 @@ consoles.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import islice
 from typing import Annotated, Any
 
 import msgspec
@@ -118,6 +119,17 @@ class MissionLog:
         if len(self._events) == self._events.maxlen:
             self._since_s = self._events[1].at_s
         self._events.append(event)
+
+    def recall(self, events: Sequence[StoryEvent]) -> None:
+        """Keep earlier events, too; an event that is kept already is in it once."""
+        known = {(event.at_s, event.where) for event in events}
+        own = [event for event in self._events if (event.at_s, event.where) not in known]
+        self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=self._events.maxlen)
+
+    def newest(self, count: int) -> list[StoryEvent]:
+        """Return the newest, oldest first, by the names of people."""
+        newest = list(islice(reversed(self._events), count))
+        return [self.people.named_event(event) for event in reversed(newest)]
 
     def answer(self, asked: AskLog) -> Log:
         """Return the events that match, with the names of people."""

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar, cast
+from typing import TypeVar
 
 import msgspec
 
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.naming import Subsystem, component_of
+from backbone.printable import with_texts
 
 CONSOLES_KEPT = 1_000  # chosen: the consoles of a busy day
 _NAME = re.compile(r"(?<![\w/#-])(?:(?:ui_console|resource_pool)/)?([a-z][a-z0-9_-]*)(?![\w/#-])")
@@ -100,24 +101,11 @@ class People:
 
     def named_all(self, value: Value) -> Value:
         """Return the message, list or dictionary with ``named`` applied to every text in it."""
-        return cast(Value, self._named(value)) if self._called else value
+        return with_texts(value, self.named) if self._called else value
 
     def _name_of(self, found: re.Match[str]) -> str:
         person = self.person(found[1])
         return found[0] if person == found[1] else person
-
-    def _named(self, value: Any) -> Any:
-        match value:
-            case str():
-                return self.named(value) if type(value) is str else value  # texts of an enumeration are safe
-            case msgspec.Struct():
-                found = {name: self._named(getattr(value, name)) for name in value.__struct_fields__}
-                return msgspec.structs.replace(value, **found)
-            case list():
-                return [self._named(each) for each in value]
-            case dict():
-                return {key: self._named(each) for key, each in value.items()}
-        return value
 
 
 def is_console(address: str) -> bool:

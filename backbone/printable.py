@@ -11,7 +11,7 @@ the feed of the consoles. Code behind these trusts its texts.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar, cast
 
 import msgspec
@@ -53,35 +53,40 @@ def printable_lines(text: str, most: int = MOST_CHARACTERS) -> str:
 
 def printable_all(value: Value) -> Value:
     """Return the message, dataclass, list or dictionary with every text in it one printable line; itself if all are."""
-    return cast(Value, _clean(value))
+    return with_texts(value, printable)
 
 
-def _clean(value: Any) -> Any:
+def with_texts(value: Value, change: Callable[[str], str]) -> Value:
+    """Return the message, dataclass, list or dictionary with every text in it changed; itself if none is."""
+    return cast(Value, _with_texts(value, change))
+
+
+def _with_texts(value: Any, change: Callable[[str], str]) -> Any:
     match value:
         case str():
-            return printable(value) if type(value) is str else value  # texts of an enumeration come from this project
+            return change(value) if type(value) is str else value  # texts of an enumeration come from this project
         case msgspec.Struct():
-            changes = _changes(value, value.__struct_fields__)
+            changes = _changes(value, value.__struct_fields__, change)
             return msgspec.structs.replace(value, **changes) if changes else value
         case list() | tuple():
-            cleaned = [_clean(each) for each in value]
-            same = all(each is old for each, old in zip(cleaned, value, strict=True))
-            return value if same else tuple(cleaned) if isinstance(value, tuple) else cleaned
+            changed = [_with_texts(each, change) for each in value]
+            same = all(each is old for each, old in zip(changed, value, strict=True))
+            return value if same else tuple(changed) if isinstance(value, tuple) else changed
         case Mapping():
-            pairs = [(_clean(key), _clean(each)) for key, each in value.items()]
+            pairs = [(_with_texts(key, change), _with_texts(each, change)) for key, each in value.items()]
             same = all(key is old and each is value[old] for (key, each), old in zip(pairs, value, strict=True))
             return value if same else dict(pairs)
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        changes = _changes(value, (field.name for field in dataclasses.fields(value)))
+        changes = _changes(value, (field.name for field in dataclasses.fields(value)), change)
         return dataclasses.replace(value, **changes) if changes else value
     return value
 
 
-def _changes(value: Any, names: Any) -> dict[str, Any]:
+def _changes(value: Any, names: Iterable[str], change: Callable[[str], str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name in names:
         before = getattr(value, name)
-        if (after := _clean(before)) is not before:
+        if (after := _with_texts(before, change)) is not before:
             found[name] = after
     return found
 

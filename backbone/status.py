@@ -17,10 +17,11 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence
 from backbone.endings import ExitCode
 from backbone.errors import HubUnreachable, LinkError
-from backbone.health import HealthWord
 from backbone.mission_connection import connected
-from backbone.mission_picture import MissionPicture, look
-from backbone.mission_screen import live_screen, screen
+from backbone.picture.health import HealthWord
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
+from backbone.picture.screen import live_screen, screen
 
 EVERY_S = 1.0  # chosen: programs that watch want one line a second
 REDRAW_EVERY_S = 0.5  # chosen: people see slices of seconds

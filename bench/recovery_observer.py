@@ -22,8 +22,9 @@ from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
 from resource_pool.messages import Frame
 
 LOOK_EVERY_S = 0.05

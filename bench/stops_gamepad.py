@@ -11,7 +11,8 @@ from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from ui_console import cli, gamepad
+from ui_console import cli
+from ui_console.session import gamepad
 
 RANGES = {gamepad.ABS_X: (-100, 100), gamepad.ABS_Y: (-100, 100)}
 

@@ -19,8 +19,8 @@ from stops_link import Relay
 from stops_places import KINDS, ROBOT, Gesture, Place
 from stops_world import TURN, NotSeen, until
 
-from ui_console.driving import KEYS_LET_GO_S
-from ui_console.gamepad import ABS_X, BTN_EAST, BTN_NORTH, BTN_TR, EV_ABS, EV_KEY
+from ui_console.model.driving import KEYS_LET_GO_S
+from ui_console.session.gamepad import ABS_X, BTN_EAST, BTN_NORTH, BTN_TR, EV_ABS, EV_KEY
 
 BIN = Path(sys.executable).parent
 HERE = Path(__file__).parent

@@ -26,8 +26,8 @@ from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from resource_pool.messages import AskPose, Pose
-from ui_console.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, Drive
+from ui_console.session.teleoperation import Teleoperation
 
 ROBOTS = (*OTHERS, ROBOT)
 TURN = Drive(3.0, -3.0)  # on the spot, so that no wall is in the way

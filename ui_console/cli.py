@@ -11,10 +11,10 @@ import typer
 from backbone.cli import run
 from backbone.cli_options import CommandTable, SecretFile, Version, complete_mission, finite, hub_endpoint, picture_for
 from backbone.endings import ExitCode, say
-from ui_console.profile import Profile
+from ui_console.model.profile import Profile
 
 if TYPE_CHECKING:
-    from ui_console.joining import Where
+    from ui_console.session.joining import Where
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
@@ -43,7 +43,7 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
     if not rcs:
         return []
-    from ui_console.team_model import ROBOT_KIND
+    from ui_console.model.team import ROBOT_KIND
 
     return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
 
@@ -124,7 +124,7 @@ def attach(
         "minimum_runtime_s": minimum_runtime,
     }
     if script:
-        from ui_console.headless import drive_by_script
+        from ui_console.session.headless import drive_by_script
 
         run(lambda: drive_by_script(where, wished, user, script, within))
     _need_a_terminal("attach", "--script FILE or --json")
@@ -147,7 +147,7 @@ def monitor(
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
     where, user = _where(mission, connect, secret_file), user or _user()
     if once:
-        from ui_console.headless import look_once
+        from ui_console.session.headless import look_once
 
         run(lambda: look_once(where, user))
     _watch(where, user, as_json=as_json)
@@ -241,7 +241,7 @@ def main() -> None:
 
 def _watch(where: Where, user: str, *, as_json: bool) -> None:
     if as_json:
-        from ui_console.headless import watch_as_json
+        from ui_console.session.headless import watch_as_json
 
         run(lambda: watch_as_json(where, user))
     _need_a_terminal("monitor", "--json")
@@ -251,7 +251,7 @@ def _watch(where: Where, user: str, *, as_json: bool) -> None:
 
 
 def _where(mission: str | None, connect: str | None, secret_file: Path | None) -> Where:
-    from ui_console.joining import Where
+    from ui_console.session.joining import Where
 
     if connect is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")

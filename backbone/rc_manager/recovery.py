@@ -1,4 +1,4 @@
-"""Roll call: who is there, what each RC says who holds it, and what each ARC asks for.
+"""Recovery: which components there are, who holds each RC by its own word, and what each ARC asks for.
 
 Rule of this file: it asks and listens; what follows from the answers, others decide.
 
@@ -14,12 +14,14 @@ from dataclasses import dataclass
 
 from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.messages import ComponentState
+from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.context_switch import RC_REPLY_S
 from backbone.rc_manager.messages import AskRc, AskRequest, CurrentRequest, RcState
+from backbone.scheduling.events import Adopted, RcKnown
 from backbone.wire import Message
 
 log = logging.getLogger(__name__)
@@ -58,6 +60,36 @@ class Found:
             for holder in rc.holders
             if not self.holds_rightly(holder.arc)
         ]
+
+    def adopted(self, resources: Mapping[str, Resource], now_s: float) -> list[tuple[float, Adopted]]:
+        """Return since when each ARC that rightly holds RCs is connected to them, in the order in which they began."""
+        found = []
+        for arc, current in self.arcs.items():
+            if self.holds_rightly(arc):
+                granted_s = current.granted_s if 0.0 <= current.granted_s <= now_s else now_s
+                settle_s = max(resources[rc].connect_s for rc in current.epochs)
+                event = Adopted(current.request, current.epochs, granted_s)
+                found.append((max(0.0, granted_s - settle_s), event))
+        return sorted(found, key=lambda one: one[0])
+
+
+def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
+    """Return the event that makes an RC known.
+
+    Args:
+        resource: As the mission file has it.
+        state: As the RC says; None: it is not up.
+    """
+    return RcKnown(
+        rc=resource.name,
+        kind=resource.type,
+        sharable=resource.sharable,
+        capacity=resource.capacity if state is None else state.capacity,
+        connect_s=resource.connect_s,
+        disconnect_s=resource.disconnect_s,
+        up=state is not None,
+        last_epoch=0 if state is None else state.last_epoch,
+    )
 
 
 class Recovery:

@@ -14,7 +14,7 @@ import asyncio
 import contextlib
 import logging
 from collections import Counter, deque
-from collections.abc import Callable, Coroutine, Iterable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, assert_never
 
@@ -27,17 +27,13 @@ from backbone.dependency_database.messages import AskResources, Resource, Resour
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import Appeared, Disappeared, NameTaken
+from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
-from backbone.placer.messages import ADDRESS as PLACER
-from backbone.placer.messages import Start, Started
-from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
-from backbone.rc_manager.credibility import contradiction
+from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.messages import (
     BEAT_MISSED_S,
     RENEW_EVERY_S,
     AskAttributes,
-    AskRc,
     AskRequest,
     AskSchedule,
     AskWhy,
@@ -57,10 +53,10 @@ from backbone.rc_manager.messages import (
     TraceLine,
     Withdraw,
 )
-from backbone.rc_manager.recovery import Found, Recovery
+from backbone.rc_manager.rc_watch import RcWatch
+from backbone.rc_manager.recovery import Found, Recovery, rc_known
 from backbone.rc_manager.trace_file import TraceFile
 from backbone.scheduling.events import (
-    Adopted,
     CapacityChanged,
     ConnectArc,
     Departed,
@@ -74,7 +70,6 @@ from backbone.scheduling.events import (
     OpenFailed,
     PriorityChanged,
     RcCameBack,
-    RcKnown,
     RcWentDown,
     Record,
     RenewLeases,
@@ -89,13 +84,11 @@ from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
-from backbone.wire import Envelope, MalformedMessage, Message
+from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
 
 ARC_REPLY_S = 1.0  # chosen: an ARC answers in milliseconds; after this it hangs or is gone
-START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
-MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: what keeps an RC from connecting is mostly an old hold
 SWITCHES_KEPT = 10_000  # chosen: half a day of 5 s slices, 80 kB
 TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: reaction and timer tolerance of real processes
 
@@ -133,19 +126,15 @@ class RcManager(Component[RcManagerParameters]):
         )
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
-        self._running_rcs: set[str] = set()
         self._beats: dict[str, float] = {}
         self._requesting: Counter[str] = Counter()
-        self._failing_rcs: set[str] = set()
-        self._faults: dict[str, str] = {}
-        self._doubted: set[str] = set()
-        self._starts: dict[str, asyncio.Task[None]] = {}
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
         self._wake_at_s: float | None = None
         self._trace = TraceFile("")
         self._context_switch = ContextSwitch(bus, clock, self.story.note, self._may_leave)
         self._recovery = Recovery(bus, clock)
+        self._rcs = RcWatch(self, self._context_switch, self._recovery)
         self._found = Found({}, {})
         self._revoked: dict[str, tuple[float, str]] = {}
         self._switch_times_s: deque[float] = deque(maxlen=SWITCHES_KEPT)
@@ -159,8 +148,8 @@ class RcManager(Component[RcManagerParameters]):
         for record in self.manager.opening_lines():
             self._record(record)
         found = await self._recovery.until_answered(DEPENDENCY_DATABASE, AskResources(), Resources)
-        self._resources = {resource.name: resource for resource in found.resources}
-        self._found = self._believed(await self._recovery.find(self._resources))
+        self._resources = self._rcs.resources = {resource.name: resource for resource in found.resources}
+        self._found = self._rcs.believed(await self._recovery.find(self._resources))
         await self._context_switch.disconnect(self._found.orphans(), "not adopted after a restart")
 
     async def serve(self) -> None:
@@ -185,9 +174,10 @@ class RcManager(Component[RcManagerParameters]):
 
     async def drain(self) -> None:
         """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
-        for task in [*self._switches.values(), *self._starts.values()]:
+        tasks = [*self._switches.values(), *self._rcs.starts]
+        for task in tasks:
             task.cancel()
-        await asyncio.gather(*self._switches.values(), *self._starts.values(), return_exceptions=True)
+        await asyncio.gather(*tasks, return_exceptions=True)
         self._trace.write({"ev": "end", "t": round(self.clock.now_s(), 6)})
         self._trace.close()
 
@@ -238,7 +228,7 @@ class RcManager(Component[RcManagerParameters]):
         self._requesting[request.arc] += 1
         try:
             rcs = self.manager.choose(request)
-            await self._have_running(rcs)
+            await self._rcs.have_running(rcs)
             self._admit(request, rcs)
         finally:
             self._requesting[request.arc] -= 1
@@ -327,27 +317,20 @@ class RcManager(Component[RcManagerParameters]):
             self._measure_switch(order)
             self.happened(Opened(order.arc))
             return
-        self._running_rcs.discard(failed)
+        self._rcs.failed(failed)
         self.happened(OpenFailed(order.arc, failed))
         if failed:
-            self._meet_in_a_while(failed)
+            self._rcs.meet_in_a_while(failed)
 
     async def _revoke(self, order: RevokeArc) -> None:
         release_s = max(self._resources[rc].disconnect_s for rc in order.epochs)
         for rc in await self._context_switch.revoke(order, self.parameters.grace_s + release_s):
-            self._does_not_answer(rc)
+            self._rcs.does_not_answer(rc)
         self.happened(Freed(order.arc))
 
     def _may_leave(self, rc: str, arc: str) -> bool:
         """Say whether nobody but this ARC would lose anything if the RC were down."""
-        return rc not in self._running_rcs or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
-
-    def _does_not_answer(self, rc: str) -> None:
-        """Count the RC as down from now on, until it answers and is cleared."""
-        if rc in self._running_rcs:
-            self._running_rcs.discard(rc)
-            self.happened(RcWentDown(rc))
-            self.start_task(self._meet_again(rc), f"meet {rc}")
+        return rc not in self._rcs.up or all(lease.rc != rc or lease.arc == arc for lease in self.manager.leases())
 
     def _measure_switch(self, order: ConnectArc) -> None:
         """Keep the time since these RCs were revoked from another ARC, settling not counted."""
@@ -356,134 +339,20 @@ class RcManager(Component[RcManagerParameters]):
         if from_others:
             self._switch_times_s.append(self.clock.now_s() - min(from_others) - order.settle_s)
 
-    # ------------------------------------------------------------------ RCs that do not run yet
-    async def _have_running(self, rcs: Iterable[str]) -> None:
-        """Start those RCs through the placer that do not run; return when all answer, or the placer works on them.
-
-        Raises:
-            Refusal: One of them cannot be started.
-        """
-        missing = [rc for rc in rcs if rc not in self._running_rcs and rc not in self._faults]
-        for rc in missing:
-            if rc not in self._starts:
-                self._starts[rc] = asyncio.create_task(self._start_rc(self._resources[rc]), name=f"start {rc}")
-        await asyncio.gather(*(asyncio.shield(self._starts[rc]) for rc in missing))
-
-    async def _start_rc(self, resource: Resource) -> None:
-        self.story.note(resource.name, "is claimed but does not run: asks the placer to start it")
-        order = Start(resource.type, resource.name, resource.rc_parameters(), resource.host, process=resource.process)
-        try:
-            await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
-        except NameTaken:  # it was started before and is missing now: a request waits until it is back
-            self.story.note(resource.name, "is being started by the placer")
-        except Refusal:
-            if not await self._meet_rc(resource.name):
-                raise
-        finally:
-            del self._starts[resource.name]
-        await self._meet_rc(resource.name)
-
-    async def _meet_rc(self, rc: str) -> bool:
-        """Ask the RC how it is and let the schedule manager know; return whether it is up.
-
-        It was counted as down, so whoever holds it still does so by an earlier grant: that ends first.
-        """
-        if rc in self._running_rcs:
-            return True
-        state = await self._ask_rc(rc)
-        if state is None:
-            return False
-        holds = [(rc, holder.arc, holder.epoch) for holder in state.holders]
-        if rc not in self._running_rcs and not await self._context_switch.clear(rc, holds):
-            return False
-        if rc not in self._running_rcs:
-            if self._faults.pop(rc, ""):
-                self.story.note(rc, "makes sense again")
-            self._running_rcs.add(rc)
-            self.happened(RcCameBack(rc, state.last_epoch))
-            if state.capacity != self._resources[rc].capacity:
-                self.happened(CapacityChanged(rc, state.capacity))
-        return True
-
-    # ------------------------------------------------------------------ RCs that cannot be believed
-    async def _ask_rc(self, rc: str, given: int | None = None) -> RcState | None:
-        """Return how the RC is by its own answer; None if there is none, or one that cannot be, and it is put aside."""
-        try:
-            state = await self.bus.ask(_rc(rc), AskRc(), RcState, within_s=RC_REPLY_S)
-        except MalformedMessage as nonsense:
-            self._put_aside(rc, f"its answer cannot be read: {nonsense.detail}")
-            return None
-        except (Refusal, LinkError) as error:
-            log.warning("%s does not say how it is: %s", rc, error)
-            return None
-        fault = contradiction(state, self._resources[rc], self.clock.now_s(), given)
-        if fault:
-            self._put_aside(rc, fault)
-            return None
-        return state
-
-    def _put_aside(self, rc: str, fault: str) -> None:
-        """Plan nothing on this RC until it makes sense, and go on with the others."""
-        self._running_rcs.discard(rc)
-        if self._faults.get(rc) != fault:
-            self._faults[rc] = fault
-            log.warning("%s is put aside: %s", rc, fault)
-            self.tell(rc, f"is put aside: {fault}", LogLevel.WARNING)
-            self.happened(RcWentDown(rc, fault))
-        self._meet_in_a_while(rc)
-
-    async def _ask_doubted(self, rc: str) -> None:
-        """Ask an RC itself about which something was published that cannot be: anybody may publish in its name."""
-        self._doubted.add(rc)
-        try:
-            await self._ask_rc(rc, self.manager.epoch_of(rc))
-        finally:
-            self._doubted.discard(rc)
-
-    def _believed(self, found: Found) -> Found:
-        """Return what was found without the RCs that cannot be as they say; they are met once this one serves."""
-        now_s = self.clock.now_s()
-        believed = {rc: s for rc, s in found.rcs.items() if not contradiction(s, self._resources[rc], now_s)}
-        return Found(believed, found.arcs)
-
     # ------------------------------------------------------------------ who is there
     def _take_over(self, found: Found) -> None:
-        """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait.
-
-        Slices that go on are told in the order and at the times in which they began.
-        """
-        adopted = sorted(map(self._adopted, filter(found.holds_rightly, found.arcs)), key=lambda one: one[0])
+        """Tell the schedule manager of all hardware, of the ARCs that hold it and of those that wait."""
+        adopted = found.adopted(self._resources, self.clock.now_s())
         began_s = min((at_s for at_s, _ in adopted), default=self.clock.now_s())
+        self._rcs.up.update(found.rcs)
         for resource in self._resources.values():
-            state = found.rcs.get(resource.name)
-            if state is not None:
-                self._running_rcs.add(resource.name)
-            self.happened(
-                RcKnown(
-                    rc=resource.name,
-                    kind=resource.type,
-                    sharable=resource.sharable,
-                    capacity=state.capacity if state is not None else resource.capacity,
-                    connect_s=resource.connect_s,
-                    disconnect_s=resource.disconnect_s,
-                    up=state is not None,
-                    last_epoch=state.last_epoch if state is not None else 0,
-                ),
-                began_s,
-            )
+            self.happened(rc_known(resource, found.rcs.get(resource.name)), began_s)
         for at_s, event in adopted:
             self._remember(event.request, tuple(event.epochs))
             self.happened(event, at_s)
         for arc, current in found.arcs.items():
             if current.rcs and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
-
-    def _adopted(self, arc: str) -> tuple[float, Adopted]:
-        """Return since when the ARC is connected to its RCs, and what it was granted."""
-        current, now_s = self._found.arcs[arc], self.clock.now_s()
-        granted_s = current.granted_s if 0.0 <= current.granted_s <= now_s else now_s
-        settle_s = max(self._resources[rc].connect_s for rc in current.epochs)
-        return max(0.0, granted_s - settle_s), Adopted(current.request, current.epochs, granted_s)
 
     def _heard_from_nameserver(self, envelope: Envelope[Any]) -> None:
         match envelope.body:
@@ -494,39 +363,13 @@ class RcManager(Component[RcManagerParameters]):
 
     def _appeared(self, name: str, at: str) -> None:
         if name in self._resources and at.startswith("resource_pool/"):
-            self.start_task(self._meet_again(name), f"meet {name}")
-
-    def _meet_in_a_while(self, rc: str) -> None:
-        if rc not in self._failing_rcs:
-            self._failing_rcs.add(rc)
-            self.start_task(self._meet_later(rc), f"meet {rc}")
-
-    async def _meet_later(self, rc: str) -> None:
-        """Ask a failed RC how it is; not at once, or it and the schedule would try each other without end."""
-        try:
-            await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
-            while not await self._meet_rc(rc) and rc in await self._recovery.present():
-                await self.clock.sleep_s(MEET_AGAIN_S * self.clock.rate)
-        finally:
-            self._failing_rcs.discard(rc)
-
-    async def _meet_again(self, rc: str) -> None:
-        if not await self._meet_rc(rc):
-            self._meet_in_a_while(rc)
+            self._rcs.meet_again(name)
 
     def _heard_rc(self, envelope: Envelope[Any]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
         state: RcState = envelope.body
         rc = state.name
-        if rc not in self._resources:
-            return
-        if rc not in self._running_rcs:
-            if rc not in self._failing_rcs:
-                self.start_task(self._meet_again(rc), f"meet {rc}")
-            return
-        if contradiction(state, self._resources[rc], self.clock.now_s(), self.manager.epoch_of(rc)):
-            if rc not in self._doubted:
-                self.start_task(self._ask_doubted(rc), f"ask {rc}")
+        if not self._rcs.believes(state):
             return
         self.happened(CapacityChanged(rc, state.capacity))
         holds = {(holder.arc, holder.epoch) for holder in state.holders}
@@ -543,8 +386,7 @@ class RcManager(Component[RcManagerParameters]):
         return [lease for lease in self.manager.leases() if not self._context_switch.gives_back(lease.arc)]
 
     def _disappeared(self, name: str) -> None:
-        if name in self._running_rcs or self._faults.pop(name, ""):
-            self._running_rcs.discard(name)
+        if self._rcs.forget(name):
             self.happened(RcWentDown(name))
         elif name in self._uses:
             self._uses.pop(name)
@@ -558,11 +400,11 @@ class RcManager(Component[RcManagerParameters]):
     async def _compare_with_nameserver(self) -> None:
         """Catch up with what happened while this process had no link."""
         names = await self._recovery.present()
-        for name in [*sorted(self._running_rcs), *self._uses]:
+        for name in [*sorted(self._rcs.up), *self._uses]:
             if name not in names:
                 self._disappeared(name)
         for rc in sorted(names & set(self._resources)):
-            await self._meet_rc(rc)
+            await self._rcs.meet(rc)
 
     # ------------------------------------------------------------------ loops
     async def _wake_when_due(self) -> None:
@@ -594,8 +436,7 @@ class RcManager(Component[RcManagerParameters]):
             await self.clock.sleep_s(RENEW_EVERY_S * rate)
 
     def _publish_leases(self) -> None:
-        missing = sorted(self._resources.keys() - self._running_rcs - self._failing_rcs)
-        leases = Leases(self._leases(), LEASE_S * self.clock.rate, missing)
+        leases = Leases(self._leases(), LEASE_S * self.clock.rate, self._rcs.missing())
         self.bus.publish(self.address, Conversation.LEASES, leases)
 
     def publish_news(self) -> None:

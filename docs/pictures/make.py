@@ -26,13 +26,13 @@ from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
-from backbone.mission_picture import look
-from backbone.mission_screen import live_screen
 from backbone.naming import Subsystem
+from backbone.picture.look import look
+from backbone.picture.screen import live_screen
 from mission_control.messages import MotionSeen
-from ui_console.console_events import ConsoleEvent, Granted
-from ui_console.observer import Observer
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.events import ConsoleEvent, Granted
+from ui_console.session.observer import Observer
+from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession
 
 HERE = Path(__file__).parent
@@ -62,7 +62,7 @@ async def main() -> None:
         Subsystem.UI_CONSOLE,
         "console-1",
         "console",
-        "ui_console.teleoperation:Teleoperation",
+        "ui_console.session.teleoperation:Teleoperation",
         found.host,
         found.endpoint,
         found.clock_origin_monotonic_s,

@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, LifeState
 from backbone.creator.messages import creator_name
-from backbone.health import SILENT_AFTER_S, HealthWord, MissionHealth
 from backbone.keys import Conversation
-from backbone.mission_picture import LAUNCHER
+from backbone.naming import LAUNCHER
+from backbone.picture.health import SILENT_AFTER_S, HealthWord, MissionHealth
 from backbone.wire import Envelope
 from resource_pool.simulation.audit import Audit, Happening
 from resource_pool.simulation.audited_pool import AuditedRcManager

@@ -19,8 +19,7 @@ from backbone.core_launches import UpOptions
 from backbone.creator.messages import ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.keys import Conversation
-from backbone.mission_picture import LAUNCHER
-from backbone.naming import Subsystem
+from backbone.naming import LAUNCHER, Subsystem
 from backbone.wire import Envelope
 from resource_pool.simulation.audit import Audit, current_audit
 from resource_pool.simulation.hostile_numbers import hostile_message, say_hostile

@@ -29,6 +29,10 @@ PLANTED = [
     ("core-services", "backbone/placer/planted.py", "from backbone.nameserver import service"),
     ("core-services", "backbone/rc_manager/planted.py", "import backbone.creator"),
     ("scheduling", "backbone/scheduling/planted.py", "import backbone.rc_manager.service"),
+    ("picture", "backbone/picture/planted.py", "import asyncio"),
+    ("console-rooms", "ui_console/model/planted.py", "import ui_console.session.feed"),
+    ("console-rooms", "ui_console/web/planted.py", "from ui_console.terminal import app"),
+    ("console-model", "ui_console/model/planted.py", "import asyncio"),
     ("zenoh", "backbone/bus/planted.py", "import zenoh"),
     ("zenoh", "resource_pool/planted.py", "from zenoh.handlers import Callback"),
     ("mujoco", "resource_pool/planted.py", "import mujoco"),
@@ -93,10 +97,12 @@ def test_what_is_allowed_is_not_complained_about(
     assert broken_with(edges, tmp_path, file, line) == {}
 
 
+@pytest.mark.processes
 def test_import_linter_finds_the_walls_standing() -> None:
     assert "0 broken" in lint_imports(TOP)
 
 
+@pytest.mark.processes
 def test_import_linter_finds_a_violation_of_each_wall_in_a_copy_of_the_tree(tmp_path: Path) -> None:
     shutil.copy(TOP / "pyproject.toml", tmp_path)
     for package in PACKAGES:

@@ -72,8 +72,8 @@ def _against_layers(contract: dict[str, Any], importer: str, imported: str) -> b
     layer = {
         package: number for number, line in enumerate(contract["layers"]) for package in re.split(r"\s*[|:]\s*", line)
     }
-    above, below = (module.partition(".")[0] for module in (importer, imported))
-    return above != below and below in layer and layer[above] >= layer[below]
+    above, below = (next((room for room in layer if _within(module, [room])), "") for module in (importer, imported))
+    return above != below and above in layer and below in layer and layer[above] >= layer[below]
 
 
 def _forbidden(contract: dict[str, Any], importer: str, imported: str) -> bool:

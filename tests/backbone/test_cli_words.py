@@ -15,8 +15,8 @@ from backbone.completion import names_of, people_of, resources_of
 from backbone.component.messages import ComponentState, LifeState
 from backbone.endings import ExitCode, complaint_of
 from backbone.errors import HubUnreachable
-from backbone.mission_picture import MissionPicture
 from backbone.moments import NoMoment
+from backbone.picture.mission import MissionPicture
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from ui_console.cli import app as console_app

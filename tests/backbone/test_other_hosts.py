@@ -6,9 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from backbone.cli import app
-from backbone.health import HealthWord, health
 from backbone.mission.model import Host, MissionDescription
 from backbone.other_hosts import OtherHosts, command_on, endpoint_for_others
+from backbone.picture.health import HealthWord, health
 
 BASE, FAR, ATTIC = (
     Host(name="base", address="192.0.2.1"),

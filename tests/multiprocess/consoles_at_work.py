@@ -16,9 +16,9 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.naming import Subsystem
-from ui_console.console_events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
-from ui_console.driving import Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.driving import Drive
+from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
+from ui_console.session.teleoperation import Teleoperation
 
 WAIT_S = 10.0
 
@@ -41,7 +41,7 @@ class Console:
             Subsystem.UI_CONSOLE,
             name,
             "console",
-            "ui_console.teleoperation:Teleoperation",
+            "ui_console.session.teleoperation:Teleoperation",
             found.host,
             found.endpoint,
             found.clock_origin_monotonic_s,

@@ -11,9 +11,9 @@ from running_mission import RunningMission, mission_up
 from backbone.component.messages import AskStory, Story
 from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
-from ui_console.consent import Sought
-from ui_console.console_events import ConsentHeard, GivenBack, Granted, Lost
-from ui_console.driving import Drive
+from ui_console.model.consent import Sought
+from ui_console.model.driving import Drive
+from ui_console.model.events import ConsentHeard, GivenBack, Granted, Lost
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 

@@ -14,9 +14,9 @@ import pytest
 from running_mission import RunningMission, mission_up
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
-from backbone.health import MissionHealth
 from backbone.keys import Conversation
-from backbone.mission_picture import LAUNCHER
+from backbone.naming import LAUNCHER
+from backbone.picture.health import MissionHealth
 from resource_pool.arc_client import ask_stop, lift_stop, stop_robot
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(180)]

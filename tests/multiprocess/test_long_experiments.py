@@ -46,9 +46,9 @@ from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope
 from resource_pool.messages import RadioPacket
 from scout_model import radio_link
-from ui_console.console_events import CommandApplied, ConsoleEvent, Granted, Lost
-from ui_console.driving import Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.driving import Drive
+from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, Lost
+from ui_console.session.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.slow]
 
@@ -400,7 +400,7 @@ async def console(
         Subsystem.UI_CONSOLE,
         name,
         "console",
-        "ui_console.teleoperation:Teleoperation",
+        "ui_console.session.teleoperation:Teleoperation",
         found.host,
         found.endpoint,
         found.clock_origin_monotonic_s,

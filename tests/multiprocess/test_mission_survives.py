@@ -14,7 +14,7 @@ from running_mission import RunningMission, mission_up, wait_gone
 
 from backbone.bus.interface import Bus
 from backbone.errors import LinkError, Refusal
-from backbone.mission_picture import look
+from backbone.picture.look import look
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 

@@ -15,10 +15,10 @@ from running_mission import BIN, RunningMission, mission_up
 from backbone.bus.interface import Bus
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
 from resource_pool.messages import AskPose, Pose
-from ui_console.consent import Sought
-from ui_console.console_events import Granted
-from ui_console.driving import KEYS_LET_GO_S, Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.consent import Sought
+from ui_console.model.driving import KEYS_LET_GO_S, Drive
+from ui_console.model.events import Granted
+from ui_console.session.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 

@@ -28,9 +28,9 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
 from resource_pool.messages import Applied, AskPose, CommandScout, Drive, Pose
-from ui_console.console_events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
-from ui_console.driving import Drive as DriveKey
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.driving import Drive as DriveKey
+from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
+from ui_console.session.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -91,7 +91,7 @@ async def take_over(mission: RunningMission, bus: Bus, number: int) -> Turn:
         Subsystem.UI_CONSOLE,
         f"console-{number}",
         "console",
-        "ui_console.teleoperation:Teleoperation",
+        "ui_console.session.teleoperation:Teleoperation",
         found.host,
         found.endpoint,
         found.clock_origin_monotonic_s,

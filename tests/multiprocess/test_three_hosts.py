@@ -19,7 +19,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, ComponentState
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
-from backbone.mission_picture import LAUNCHER
+from backbone.naming import LAUNCHER
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 

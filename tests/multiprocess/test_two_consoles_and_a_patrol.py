@@ -20,8 +20,8 @@ from backbone.component.messages import AskStatistics, ComponentState, Parameter
 from backbone.keys import Conversation
 from backbone.wire import Envelope
 from mission_control.messages import WaypointReached
-from ui_console.console_events import Lost
-from ui_console.driving import Drive
+from ui_console.model.driving import Drive
+from ui_console.model.events import Lost
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 

@@ -28,10 +28,10 @@ from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, St
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, watch_stops
 from scout_model.radio_link import encode_drive
-from ui_console.consent import CONSENT_WITHIN_S
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import STICK_LASTS_S, Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.consent import CONSENT_WITHIN_S
+from ui_console.model.console import ConsoleModel
+from ui_console.model.driving import STICK_LASTS_S, Drive
+from ui_console.session.teleoperation import Teleoperation
 
 PEOPLE = ("anna", "ben", "cleo")
 RCS = ["scout1", "radio"]

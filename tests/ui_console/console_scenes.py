@@ -9,8 +9,8 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import Holder, Lease, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from resource_pool.arc_client import StopState
-from ui_console.console_events import Asked, ConsoleEvent, Granted, Heard, LinkHeard, PictureSeen
-from ui_console.console_model import ConsoleModel
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import Asked, ConsoleEvent, Granted, Heard, LinkHeard, PictureSeen
 
 GRANT = Granted(10.0, {"scout": "scout1", "command_radio": "radio"}, {"scout1": 7, "radio": 3}, 15.0, 9.95, False)
 ASK = Asked(9.95, "scout1", "capture", 100)
@@ -111,7 +111,7 @@ STOP = StopState("scout1", True, 1, "anna", "child in the room", 11.0)
 def model(*events: ConsoleEvent, name: str = "console-1") -> ConsoleModel:
     """Return a model that heard these events."""
     made = ConsoleModel(name, user="anna")
-    made.team.mission = "iros2001"
+    made.team.picture.mission = "iros2001"
     for event in events:
         made.apply(event)
     return made

@@ -19,10 +19,10 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule
 from backbone.wire import Envelope, Message
-from ui_console.consent import CONSENT_WITHIN_S, AskConsent, Consent, NotAnOperator
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.consent import CONSENT_WITHIN_S, AskConsent, Consent, NotAnOperator
+from ui_console.model.console import ConsoleModel
+from ui_console.model.driving import Drive
+from ui_console.session.teleoperation import Teleoperation
 
 CONSENTS = (OperatorAction.ASK_CONSENT, OperatorAction.CONSENT, OperatorAction.DECLINE)
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.consent import CONSENT_WITHIN_S, MOST_OPEN, AskConsent, AskedAlready, ConsentDesk, TooManyAsk
+from ui_console.model.consent import CONSENT_WITHIN_S, MOST_OPEN, AskConsent, AskedAlready, ConsentDesk, TooManyAsk
 
 ASK = AskConsent("scout1", "ben", "my robot is stuck")
 steps = st.lists(

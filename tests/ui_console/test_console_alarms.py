@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import Absence
 from backbone.creator.messages import ProcessFell
-from backbone.health import HealthWord, MissionHealth
 from backbone.nameserver.messages import Disappeared
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule
-from ui_console.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause
-from ui_console.console_events import CommandRefused, ConsoleEvent, GivenBack, Granted, Heard, LinkTrouble, Lost
-from ui_console.views import AlarmKind, AlarmView, Severity
+from ui_console.model.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause
+from ui_console.model.events import CommandRefused, ConsoleEvent, GivenBack, Granted, Heard, LinkTrouble, Lost
+from ui_console.model.views import AlarmKind, AlarmView, Severity
 
 KIND = AlarmKind.LOST
 STEPS = st.lists(

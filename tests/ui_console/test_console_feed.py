@@ -13,11 +13,10 @@ from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.health import HealthWord, MissionHealth
 from backbone.keys import Conversation
-from backbone.mission_picture import LAUNCHER
-from backbone.naming import Subsystem
+from backbone.naming import LAUNCHER, Subsystem
 from backbone.operators import OperatorActed, OperatorAction
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.requests import Lease
@@ -25,11 +24,11 @@ from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.stop_latch import StopLatch
-from ui_console.console_events import ConsoleEvent, event_json, event_word
-from ui_console.console_model import ConsoleModel
-from ui_console.feed import PULSE_S
-from ui_console.observer import Observer
-from ui_console.views import AlarmKind, view_json
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import ConsoleEvent, event_json, event_word
+from ui_console.model.views import AlarmKind, view_json
+from ui_console.session.feed import PULSE_S
+from ui_console.session.observer import Observer
 
 Scene = Callable[["Stage"], Awaitable[None]]
 

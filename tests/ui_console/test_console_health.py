@@ -7,13 +7,13 @@ import json
 import pytest
 
 from backbone.component.messages import Absence
-from backbone.health import HealthWord, MissionHealth
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.printable import printable_all
-from ui_console.console_events import Heard, event_json
-from ui_console.console_model import ConsoleModel
-from ui_console.profile import Profile
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import Heard, event_json
+from ui_console.model.profile import Profile
+from ui_console.model.views import AlarmKind, AlarmView, view_json
 from ui_console.terminal.head import head
-from ui_console.views import AlarmKind, AlarmView, view_json
 
 GRABBER = Absence("grabber", 4.0, "killed by SIGKILL", "starts again in 0.1 s")
 PLACER = Absence("placer", 1.0, "no answer", "the launcher restarts it", "Nothing.", vital=True)
@@ -69,7 +69,9 @@ def test_a_launcher_that_is_silent_makes_the_mission_degraded(last: list[Heard])
     view = shown.view(since_s + 2.1)
     assert view.health is not None
     assert view.health.word == "degraded"
-    assert view.health.lines[0] == "the launcher is silent for 2 s: what is shown may be old"
+    assert view.health.lines[0].startswith(
+        "launcher is absent for 2.1 s: it is silent, so what is shown may be old; Look"
+    )
     assert absent(shown, since_s + 2.1)["launcher"].is_active
     shown.apply(heard(since_s + 3.0))
     again = shown.view(since_s + 3.1).health

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.mission_log import AskLog, Log, PeopleKnown
 from backbone.operators import OperatorActed, OperatorAction
-from ui_console.console_events import Heard
-from ui_console.log_board import LOG_KEPT
+from backbone.picture.mission import LOG_KEPT
+from ui_console.model.events import Heard
 
 CONSOLE = "ui_console/console-9"
 DROVE = OperatorActed("ben", OperatorAction.DRIVE_BEGIN, "scout2", "left +4.0, right +4.0 rad/s", 10.0)

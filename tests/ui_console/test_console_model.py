@@ -25,14 +25,15 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import LifeState, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.health import HealthWord, MissionHealth
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.operators import OperatorActed, OperatorAction
+from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
 from resource_pool.arc_client import StopState
-from ui_console.console_events import (
+from ui_console.model.console import SILENT_S, STALE_S, ConsoleModel
+from ui_console.model.events import (
     Asked,
     Attention,
     CommandApplied,
@@ -47,9 +48,8 @@ from ui_console.console_events import (
     PictureSeen,
     event_json,
 )
-from ui_console.console_model import SILENT_S, STALE_S, ConsoleModel
-from ui_console.team_model import STARVING_S
-from ui_console.views import AlarmKind, NodeState, Severity, view_json
+from ui_console.model.team import STARVING_S
+from ui_console.model.views import AlarmKind, NodeState, Severity, view_json
 
 
 def alarm_lines(shown: ConsoleModel, now_s: float = 50.0) -> list[str]:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule
-from ui_console.timeline import HISTORY_S, Timeline
-from ui_console.views import Certainty, SliceView
+from ui_console.model.timeline import HISTORY_S, Timeline
+from ui_console.model.views import Certainty, SliceView
 
 
 def schedule(at_s: float, holder: tuple[str, int, float] | None, *, sharable: bool = False) -> Schedule:

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.driving import FIRST_HOLD_S, REPEAT_EVERY_S, DeadMan, Drive, DriveSpan, Halt, Jump, drive_towards
+from ui_console.model.driving import FIRST_HOLD_S, REPEAT_EVERY_S, DeadMan, Drive, DriveSpan, Halt, Jump, drive_towards
 
 FORWARD = drive_towards("forward", 4.0)
 TICK_S = 0.01

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from ui_console.driving import STICK_LASTS_S, DeadMan, Drive
-from ui_console.gamepad import (
+from ui_console.model.driving import STICK_LASTS_S, DeadMan, Drive
+from ui_console.session.gamepad import (
     ABS_X,
     ABS_Y,
     BTN_EAST,

@@ -23,10 +23,10 @@ from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
 from resource_pool.messages import Jump as ArcJump
 from resource_pool.stop_latch import StopLatch
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, Drive, Halt, drive_towards
-from ui_console.scripted import ScriptDriver
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.console import ConsoleModel
+from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, Drive, Halt, drive_towards
+from ui_console.session.scripted import ScriptDriver
+from ui_console.session.teleoperation import Teleoperation
 
 FORWARD = drive_towards("forward", 4.0)
 REPEAT_S = 0.05

@@ -21,10 +21,10 @@ from backbone.operators import OperatorActed, OperatorAction
 from backbone.wire import Envelope
 from resource_pool.arc_client import Stopper, StopState
 from resource_pool.stop_latch import StopLatch
-from ui_console.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
-from ui_console.console_model import ConsoleModel
-from ui_console.lifting import AskFirst, AskLift, LiftNow, NotThatStop, decide_lift, is_agreed, lift_line
-from ui_console.observer import Observer, nobody_here
+from ui_console.model.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
+from ui_console.model.console import ConsoleModel
+from ui_console.model.lifting import AskFirst, AskLift, LiftNow, NotThatStop, decide_lift, is_agreed, lift_line
+from ui_console.session.observer import Observer, nobody_here
 
 PEOPLE = ["anna", "ben", "cleo"]
 

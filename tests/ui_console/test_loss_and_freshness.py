@@ -8,8 +8,8 @@ from screen_text import screen_text
 from written_session import WrittenSession
 
 from resource_pool.arc_client import Stopper, StopState
-from ui_console.consent import Consent, Settled, Sought, Topic
-from ui_console.console_events import (
+from ui_console.model.consent import Consent, Settled, Sought, Topic
+from ui_console.model.events import (
     GivenBack,
     Granted,
     Heard,
@@ -18,11 +18,11 @@ from ui_console.console_events import (
     Lost,
     MomentBegan,
 )
-from ui_console.feed import LINK_FRESH_S
-from ui_console.profile import Profile
+from ui_console.model.profile import Profile
+from ui_console.model.views import AlarmKind, LostView
+from ui_console.session.feed import LINK_FRESH_S
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.display import LINK_LOOK_S
-from ui_console.views import AlarmKind, LostView
 
 AWAY = GivenBack(20.0, "anna is away", True, wanted=False)
 
@@ -129,7 +129,7 @@ def test_each_robots_row_says_whose_stop_it_is_since_when_and_what_lifting_it_ta
     mine, theirs = rows[0].stop, rows[1].stop
     assert mine is not None
     assert theirs is not None
-    assert (mine.by_user, mine.since_s, mine.is_mine, mine.lift_line) == ("anna", 11.0, True, "hold to lift")
+    assert (mine.by_user, mine.age_s, mine.is_mine, mine.lift_line) == ("anna", 1.0, True, "hold to lift")
     assert (theirs.by_user, theirs.also, theirs.is_mine) == ("ben", ["cleo"], False)
     assert theirs.lift_line == "asks ben and cleo first"
 

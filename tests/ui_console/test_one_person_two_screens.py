@@ -22,10 +22,10 @@ from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope, Message
-from ui_console.console_events import Heard, Lost
-from ui_console.console_model import ConsoleModel
-from ui_console.hand_over import AskHandOver, Outcome, decide
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import Heard, Lost
+from ui_console.session.hand_over import AskHandOver, Outcome, decide
+from ui_console.session.teleoperation import Teleoperation
 
 TIMES = st.floats(0, 100)
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui_console.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
-from ui_console.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
+from ui_console.model.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
+from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript, read_script
 
 EXAMPLE = '{"at_s":0.5,"left_rad_s":4,"right_rad_s":4}\n{"at_s":3,"release":true}\n'
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ui_console.console_events import CommandApplied, ConsoleEvent, Granted, LinkTrouble, Lost
-from ui_console.script import read_script
-from ui_console.scripted import ScriptDriver
+from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, LinkTrouble, Lost
+from ui_console.model.script import read_script
+from ui_console.session.scripted import ScriptDriver
 
 DRIVE = '{"at_s": 0, "left_rad_s": 4, "right_rad_s": 4}\n{"at_s": 2, "left_rad_s": 2, "right_rad_s": 2}'
 UNANSWERED = LinkTrouble(2.0, "nobody answered Drive at resource_pool/console-1-drive", "drive")

@@ -17,9 +17,9 @@ from resource_pool.arc_client import EmergencyStopped, StopState
 from resource_pool.messages import OtherStop
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
-from ui_console.consent import ConsentDesk, Sought, Topic
-from ui_console.driving import STICK_LASTS_S, DeadMan, Drive
-from ui_console.lifting import AskFirst, LiftNow, NotThatStop, decide_lift
+from ui_console.model.consent import ConsentDesk, Sought, Topic
+from ui_console.model.driving import STICK_LASTS_S, DeadMan, Drive
+from ui_console.model.lifting import AskFirst, LiftNow, NotThatStop, decide_lift
 
 SEQUENCES, STEPS = 1000, 50
 TICK_S = 0.05  # keys repeat that often

@@ -22,11 +22,11 @@ from backbone.placer.messages import NoHost
 from resource_pool.arc_client import NoSuchAction
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
-from ui_console.console_events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
-from ui_console.driving import drive_towards
-from ui_console.script import read_script
-from ui_console.scripted import ScriptDriver
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.driving import drive_towards
+from ui_console.model.events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.model.script import read_script
+from ui_console.session.scripted import ScriptDriver
+from ui_console.session.teleoperation import Teleoperation
 
 Scene = Callable[[FakePlacer], Awaitable[None]]
 FORWARD = drive_towards("forward", 4.0)

@@ -19,8 +19,9 @@ from written_session import WrittenSession, settle
 from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
 from backbone.mission_log import AskLog, Log
-from ui_console.consent import Consent, Settled, Sought
-from ui_console.console_events import (
+from ui_console.model.consent import Consent, Settled, Sought
+from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.events import (
     Attention,
     ConsentAsked,
     ConsentHeard,
@@ -31,9 +32,8 @@ from ui_console.console_events import (
     LinkTrouble,
     Lost,
 )
-from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
-from ui_console.feed import LogAway
-from ui_console.profile import Profile
+from ui_console.model.profile import Profile
+from ui_console.session.feed import LogAway
 from ui_console.terminal.app import SPEED_MOST_RAD_S, ConsoleApp, read_value
 from ui_console.terminal.keys import DRIVES
 from ui_console.terminal.keys import KEYS as KEYS_OF_THE_CONSOLE

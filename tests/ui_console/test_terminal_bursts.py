@@ -14,8 +14,8 @@ from textual.app import App
 from textual.pilot import Pilot
 from written_session import WrittenSession, settle
 
-from ui_console.console_events import Heard
-from ui_console.profile import Profile
+from ui_console.model.events import Heard
+from ui_console.model.profile import Profile
 from ui_console.terminal import display
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.tables import PanelName

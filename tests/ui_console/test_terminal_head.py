@@ -6,11 +6,11 @@ import msgspec
 import pytest
 from console_scenes import SCHEDULE, STOP, TEAM_EVENTS, held_model, model
 
-from ui_console.console_events import Heard, LinkTrouble
-from ui_console.profile import Profile
+from ui_console.model.events import Heard, LinkTrouble
+from ui_console.model.profile import Profile
+from ui_console.model.views import ConsentView, ConsoleView, HealthView, LostView
 from ui_console.terminal.head import Head, head
 from ui_console.terminal.keys import has, hints, key_lines, keys_help
-from ui_console.views import ConsentView, ConsoleView, HealthView, LostView
 
 WIDTHS = [20, 40, 50, 80, 120, 200]
 NOW_S = 12.0

@@ -15,9 +15,9 @@ from textual.pilot import Pilot
 from backbone.bus.clock import MissionClock
 from backbone.component.messages import LifeState
 from backbone.endings import ExitCode
-from ui_console.console_events import Heard
-from ui_console.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
-from ui_console.observer import Observer
+from ui_console.model.events import Heard
+from ui_console.session.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
+from ui_console.session.observer import Observer
 from ui_console.terminal.dialogs import LiftQuestion
 from ui_console.terminal.keys import KEYS
 from ui_console.terminal.session import TerminalSession

@@ -12,9 +12,9 @@ from textual.pilot import Pilot
 from textual.widgets import Input
 from written_session import WrittenSession, settle
 
-from ui_console.console_events import Heard
-from ui_console.console_model import ConsoleModel
-from ui_console.profile import Profile
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import Heard
+from ui_console.model.profile import Profile
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.dialogs import READ_S
 from ui_console.terminal.keys import robot_meant, stop_meant

@@ -14,9 +14,9 @@ from backbone.errors import Refusal
 from backbone.log_question import LogQuestion
 from backbone.mission_log import AskLog, Log
 from backbone.moments import Now
-from ui_console.console_events import ConsoleEvent
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import Drive
+from ui_console.model.console import ConsoleModel
+from ui_console.model.driving import Drive
+from ui_console.model.events import ConsoleEvent
 from ui_console.terminal.verbs import Session
 
 

@@ -10,7 +10,7 @@ from backbone.mission.reader import MissionInvalid
 from ui_console.design.look_up import look_up
 from ui_console.design.room import DesignRoom
 from ui_console.design.server import DesignServer, begin
-from ui_console.joining import end_server_on_signals
+from ui_console.session.joining import end_server_on_signals
 from ui_console.web.door import Doorkeeper, Pass
 from ui_console.web.serving import Site
 from ui_console.web.token_file import TokenFile

@@ -13,8 +13,9 @@ from textual.widgets import Input
 
 from backbone.endings import ExitCode
 from backbone.errors import Refusal
-from ui_console.driving import Direction, drive_towards
-from ui_console.gamepad import buttons_help
+from ui_console.model.driving import Direction, drive_towards
+from ui_console.model.views import AlarmView
+from ui_console.session.gamepad import buttons_help
 from ui_console.terminal.dialogs import Dialog, LiftQuestion, Question, Reading, RobotPicker
 from ui_console.terminal.display import ConsoleDisplay
 from ui_console.terminal.keys import keys_help, stop_meant
@@ -22,7 +23,6 @@ from ui_console.terminal.lines import robot_rows
 from ui_console.terminal.log_search import SEARCH_HELP, Found, read_search
 from ui_console.terminal.tables import FIXED, PanelName
 from ui_console.terminal.widgets import DrivePad, Panel
-from ui_console.views import AlarmView
 
 SPEED_STEP_RAD_S, SPEED_MOST_RAD_S = 1.0, 15.0  # chosen: fine steps, a Scout's most
 A = TypeVar("A")

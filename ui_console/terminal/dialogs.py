@@ -18,9 +18,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
+from ui_console.model.views import StopView
 from ui_console.terminal.keys import STOP_KEYS
 from ui_console.terminal.lines import Row, lift_lines
-from ui_console.views import StopView
 
 T = TypeVar("T")
 CSS = """

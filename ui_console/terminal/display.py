@@ -16,18 +16,18 @@ from textual.events import Resize, Unmount
 from textual.screen import Screen
 from textual.widgets import Static
 
-from ui_console.profile import Profile
+from ui_console.model.profile import Profile
+from ui_console.model.views import ConsoleView
 from ui_console.terminal.dialogs import CSS as DIALOG_CSS
 from ui_console.terminal.dialogs import Dialog, LiftQuestion
 from ui_console.terminal.ending import EndingApp
 from ui_console.terminal.head import head
 from ui_console.terminal.keys import KEYS, has, hints, robot_meant
-from ui_console.terminal.lines import Row
+from ui_console.terminal.lines import Row, table_rows
 from ui_console.terminal.log_search import FOUND_SHOWN, Found
-from ui_console.terminal.tables import FIXED, NOTHING, PanelName, table_rows
+from ui_console.terminal.tables import FIXED, NOTHING, PanelName
 from ui_console.terminal.verbs import Session
 from ui_console.terminal.widgets import DrivePad, KeyLine, Panel, Video
-from ui_console.views import ConsoleView
 
 REDRAW_EVERY_S = 0.1  # chosen: 10 pictures a second are enough to drive by and leave the CPU to the mission
 TABLES_EVERY_S = 0.3  # chosen: people read no faster, and tables cost more than pictures

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from backbone.spoken import counted
-from ui_console.profile import Profile
+from ui_console.model.profile import Profile
+from ui_console.model.views import ConsoleView, HealthView, LostView, VideoView
 from ui_console.terminal.keys import has
 from ui_console.terminal.lines import ALARM_STYLES
-from ui_console.views import ConsoleView, HealthView, LostView, VideoView
 
 BETWEEN = " · "
 ALARMING, ASKING = "bold white on red", "bold yellow"

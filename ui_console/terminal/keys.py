@@ -12,8 +12,8 @@ from rich.style import Style
 from rich.text import Text
 from textual.binding import Binding
 
-from ui_console.profile import Profile
-from ui_console.views import ConsoleView
+from ui_console.model.profile import Profile
+from ui_console.model.views import ConsoleView
 
 MOST_PICKED_BY_KEY = 9
 STOP_KEYS = frozenset({"x", "X"})

@@ -17,9 +17,10 @@ from backbone.component.messages import ComponentState, StoryEvent
 from backbone.naming import component_of
 from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
-from ui_console.views import (
+from ui_console.model.views import (
     AlarmView,
     Certainty,
+    ConsoleView,
     HostView,
     LinkView,
     NodeState,
@@ -31,6 +32,7 @@ from ui_console.views import (
     StopView,
     TimelineView,
 )
+from ui_console.terminal.tables import PanelName
 
 NODE_MARKS = {
     NodeState.RUNNING: ("▶", "green"),
@@ -106,6 +108,38 @@ def _cut(text: Text, columns: int) -> list[Text]:
 
 
 # ---------------------------------------------------------------------- views as rows
+def table_rows(name: PanelName, view: ConsoleView, columns: int) -> list[Row]:
+    """Return the rows of a table.
+
+    Args:
+        name: Which.
+        view: What the console shows.
+        columns: How wide the table is, for what is drawn to scale.
+    """
+    now_s = view.now_s
+    match name:
+        case PanelName.ROBOTS:
+            return robot_rows(view.robots, now_s)
+        case PanelName.TREE:
+            return [Row(f"node:{one.name}", one.name, _node(one, now_s)) for one in view.tree]
+        case PanelName.SCHEDULE:
+            return [Row(f"request:{one.arc}", one.arc, _request(one, now_s)) for one in view.requests]
+        case PanelName.TIMELINE:
+            return _timeline_rows(view.timeline, columns)
+        case PanelName.ALARMS:
+            return [Row(one.key, one.subject, _alarm(one, now_s)) for one in view.alarms]
+        case PanelName.LINKS:
+            links = [Row(f"link:{one.name}", "", _link(one)) for one in view.links]
+            return links + [Row(f"host:{one.load.host}", "", _host(one)) for one in view.hosts]
+        case PanelName.PARAMETERS:
+            return [Row(f"parameter:{o.component}.{o.name}", o.component, _parameter(o)) for o in view.parameters]
+        case PanelName.COMPONENTS:
+            return [Row(f"component:{o.address}", component_of(o.address), _component(o)) for o in view.components]
+        case PanelName.LOG:
+            rows = [Row(f"log:{number}", one.subject, _event(one)) for number, one in enumerate(view.log)]
+            return rows[::-1]
+
+
 def robot_rows(robots: list[RobotView], now_s: float) -> list[Row]:
     """Return two lines for each robot: who has it, and for how long, who comes next."""
     wide = max((len(robot.robot) for robot in robots), default=0)
@@ -120,56 +154,7 @@ def lift_lines(stop: StopView) -> list[str]:
     return [f"set by {'you' if stop.is_mine else stop.by_user}, {stop.age_s:.0f} s ago{also}", *reason, *takes]
 
 
-def tree_rows(nodes: list[NodeView], now_s: float) -> list[Row]:
-    """Return one line for each node of the behavior tree, with its feedback below it."""
-    return [Row(f"node:{node.name}", node.name, _node(node, now_s)) for node in nodes]
-
-
-def request_rows(requests: list[RequestView], now_s: float) -> list[Row]:
-    """Return one line for each request: who runs until when, who waits why."""
-    return [Row(f"request:{request.arc}", request.arc, _request(request, now_s)) for request in requests]
-
-
-def alarm_rows(alarms: list[AlarmView], now_s: float) -> list[Row]:
-    """Return one line for each alarm, with its remedy below it."""
-    return [Row(alarm.key, alarm.subject, _alarm(alarm, now_s)) for alarm in alarms]
-
-
-def link_rows(links: list[LinkView], hosts: list[HostView]) -> list[Row]:
-    """Return one line for each link and each host."""
-    rows = [Row(f"link:{link.name}", "", _link(link)) for link in links]
-    return rows + [Row(f"host:{host.load.host}", "", _host(host)) for host in hosts]
-
-
-def parameter_rows(parameters: list[ParameterView]) -> list[Row]:
-    """Return one line for each parameter that was asked for."""
-    return [
-        Row(f"parameter:{parameter.component}.{parameter.name}", parameter.component, _parameter(parameter))
-        for parameter in parameters
-    ]
-
-
-def component_rows(components: list[ComponentState]) -> list[Row]:
-    """Return one line for each component."""
-    return [
-        Row(f"component:{component.address}", component_of(component.address), _component(component))
-        for component in components
-    ]
-
-
-def log_rows(log: list[StoryEvent]) -> list[Row]:
-    """Return one line for each thing that happened, newest first."""
-    return [
-        Row(
-            f"log:{number}",
-            row.subject,
-            Text.assemble((f"{row.at_s:8.1f} ", "dim"), (f"{row.subject} ", "bold"), row.what),
-        )
-        for number, row in reversed(list(enumerate(log)))
-    ]
-
-
-def timeline_rows(timeline: TimelineView, columns: int) -> list[Row]:
+def _timeline_rows(timeline: TimelineView, columns: int) -> list[Row]:
     """Return one bar for each resource: filled who had it and has it, shaded who comes next; ``│`` is now."""
     people = sorted({one.who for row in timeline.rows for one in row.slices})
     colors = {who: SLICE_COLORS[number % len(SLICE_COLORS)] for number, who in enumerate(people)}
@@ -189,6 +174,10 @@ def timeline_rows(timeline: TimelineView, columns: int) -> list[Row]:
     past_s, next_s = timeline.now_s - timeline.from_s, timeline.to_s - timeline.now_s
     scale = Text(f"−{past_s:.0f} s … │ now … +{next_s:.0f} s", style="dim")
     return [*rows, Row("timeline:legend", "", Text("\n").join([legend, scale]))]
+
+
+def _event(event: StoryEvent) -> Text:
+    return Text.assemble((f"{event.at_s:8.1f} ", "dim"), (f"{event.subject} ", "bold"), event.what)
 
 
 def _robot(robot: RobotView, now_s: float, wide: int) -> Text:

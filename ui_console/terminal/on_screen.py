@@ -7,11 +7,11 @@ from typing import Any
 
 from backbone.component.component import NoParameters
 from backbone.endings import ExitCode
-from ui_console.gamepad import find_gamepad
-from ui_console.joining import Where, end_on_signals, join
-from ui_console.observer import Observer
-from ui_console.profile import Profile
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.profile import Profile
+from ui_console.session.gamepad import find_gamepad
+from ui_console.session.joining import Where, end_on_signals, join
+from ui_console.session.observer import Observer
+from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession
 
 

@@ -12,13 +12,13 @@ from textual import pilot as textual_pilot
 
 from backbone.endings import ExitCode
 from resource_pool.arc_client import Frame
-from ui_console.console_events import ConsoleEvent
-from ui_console.console_model import ConsoleModel
-from ui_console.gamepad import Gamepad, PadWish, Stick, play_gamepad
-from ui_console.observer import Observer
-from ui_console.profile import Profile
-from ui_console.team_model import TeamModel
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import ConsoleEvent
+from ui_console.model.profile import Profile
+from ui_console.model.team import TeamModel
+from ui_console.session.gamepad import Gamepad, PadWish, Stick, play_gamepad
+from ui_console.session.observer import Observer
+from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
 from ui_console.terminal.pixels import can_show_pixels

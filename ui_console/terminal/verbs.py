@@ -14,10 +14,10 @@ from backbone.log_question import LogQuestion
 from backbone.mission_log import AskLog, Log
 from backbone.moments import Now
 from resource_pool.arc_client import Frame
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import Drive
-from ui_console.observer import Observer
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.console import ConsoleModel
+from ui_console.model.driving import Drive
+from ui_console.session.observer import Observer
+from ui_console.session.teleoperation import Teleoperation
 
 
 class Session:

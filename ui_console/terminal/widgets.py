@@ -17,7 +17,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from backbone.spoken import counted
-from ui_console.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.terminal.keys import Hint, key_lines
 from ui_console.terminal.lines import Row, laid_out
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send

@@ -24,13 +24,13 @@ from backbone.operators import OperatorAction
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
-from ui_console.consent_answers import ConsentAnswers
-from ui_console.console_events import ConsoleEvent, Heard
-from ui_console.console_model import ConsoleModel
-from ui_console.observer import Observer
-from ui_console.team_model import ROBOT_KIND, TeamModel
-from ui_console.teleoperation import Teleoperation
-from ui_console.views import AlarmKind
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import ConsoleEvent, Heard
+from ui_console.model.team import ROBOT_KIND, TeamModel
+from ui_console.model.views import AlarmKind
+from ui_console.session.consent_answers import ConsentAnswers
+from ui_console.session.observer import Observer
+from ui_console.session.teleoperation import Teleoperation
 from ui_console.web.door import Fault, Offence, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
@@ -152,7 +152,7 @@ class WebHub:
         launch = msgspec.structs.replace(
             self._launch,
             name=f"{_name_from(welcome.user)}-{os.getpid()}-{number}",
-            class_path="ui_console.teleoperation:Teleoperation",
+            class_path="ui_console.session.teleoperation:Teleoperation",
             parameters=wished,
         )
         bus = await self._join(launch)

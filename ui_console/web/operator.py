@@ -15,8 +15,9 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.log_question import LogQuestion
 from backbone.moments import Now
 from backbone.printable import printable_all
-from ui_console.consent_answers import ConsentAnswers
-from ui_console.console_events import (
+from ui_console.model.console import ConsoleModel
+from ui_console.model.driving import STICK_LASTS_S, Halt, drive_by_stick
+from ui_console.model.events import (
     Attention,
     CommandApplied,
     CommandRefused,
@@ -24,12 +25,11 @@ from ui_console.console_events import (
     LinkTrouble,
     PictureSeen,
 )
-from ui_console.console_model import ConsoleModel
-from ui_console.driving import STICK_LASTS_S, Halt, drive_by_stick
-from ui_console.observer import Observer
-from ui_console.team_model import TeamModel
-from ui_console.teleoperation import Teleoperation
-from ui_console.views import view_json
+from ui_console.model.team import TeamModel
+from ui_console.model.views import view_json
+from ui_console.session.consent_answers import ConsentAnswers
+from ui_console.session.observer import Observer
+from ui_console.session.teleoperation import Teleoperation
 from ui_console.web.door import Welcome
 from ui_console.web.found_log import FoundLog
 from ui_console.web.outbox import Outbox

@@ -15,7 +15,7 @@ from msgspec import inspect
 
 from backbone.component.messages import ComponentState
 from backbone.scheduling.views import RequestView
-from ui_console.views import (
+from ui_console.model.views import (
     AlarmView,
     HealthView,
     HostView,

@@ -11,7 +11,7 @@ import msgspec
 
 from backbone.log_question import LONGEST_WORDS
 from backbone.ranges import EXACT
-from ui_console.consent import MAX_WHY
+from ui_console.model.consent import MAX_WHY
 from ui_console.web.door import Beat, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows

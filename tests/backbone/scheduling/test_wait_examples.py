@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from simulated_switches import Bench, ask, load, manager, sharable, unit
 
-from backbone.reasons import Reasons
+from backbone.picture.reasons import Reasons
 from backbone.scheduling.events import CapacityChanged, Departed, Idled, RcCameBack, RcKnown, RcWentDown
 from backbone.scheduling.requests import RcUse, RequestState
 from backbone.scheduling.views import Why

@@ -19,8 +19,8 @@ from backbone.placer.messages import Start
 from backbone.wire import Message
 from resource_pool.messages import AskPose, Pose
 from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
-from ui_console.driving import Drive
-from ui_console.teleoperation import Teleoperation
+from ui_console.model.driving import Drive
+from ui_console.session.teleoperation import Teleoperation
 
 FEW_MOMENTS = settings(max_examples=2, phases=[Phase.generate], derandomize=True, deadline=None)
 MANY_MOMENTS = settings(max_examples=30, phases=[Phase.generate], derandomize=True, deadline=None)

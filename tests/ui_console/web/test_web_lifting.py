@@ -14,9 +14,9 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
-from ui_console.console_model import ConsoleModel
-from ui_console.observer import Observer
-from ui_console.views import AlarmKind, AlarmView
+from ui_console.model.console import ConsoleModel
+from ui_console.model.views import AlarmKind, AlarmView
+from ui_console.session.observer import Observer
 from ui_console.web.door import Welcome
 from ui_console.web.hub import WebHub
 from ui_console.web.operator import Operator

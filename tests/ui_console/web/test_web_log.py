@@ -15,8 +15,8 @@ from backbone.component.messages import LogLevel, StoryEvent
 from backbone.log_question import WrongSearch
 from backbone.mission_log import EVENTS_KEPT, MOST_EVENTS, Log
 from backbone.moments import NoMoment, Now
-from ui_console import feed
-from ui_console.feed import LogAway
+from ui_console.session import feed
+from ui_console.session.feed import LogAway
 from ui_console.web.found_log import PART_BYTES, PART_EVENTS, FoundLog
 
 NOW = Now(1000.0, datetime(2026, 5, 4, 14, 10))

@@ -6,7 +6,7 @@ import pytest
 from web_page import page_at, take
 from web_stage import Stage
 
-from ui_console.views import AlarmKind
+from ui_console.model.views import AlarmKind
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(120)]
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ui_console.console_events import Asked, Granted, PictureSeen
-from ui_console.console_model import SILENT_S, STALE_S, ConsoleModel
-from ui_console.team_model import TeamModel
-from ui_console.views import AlarmKind
+from ui_console.model.console import SILENT_S, STALE_S, ConsoleModel
+from ui_console.model.events import Asked, Granted, PictureSeen
+from ui_console.model.team import TeamModel
+from ui_console.model.views import AlarmKind
 
 
 def holding(team: TeamModel, name: str, robot: str) -> ConsoleModel:

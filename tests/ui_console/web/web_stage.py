@@ -20,8 +20,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
 from backbone.mission_log import AskLog, AskPeople, MissionLog, PeopleKnown
-from backbone.mission_picture import LAUNCHER
-from backbone.naming import Subsystem, address
+from backbone.naming import LAUNCHER, Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import Holder, RequestState

@@ -205,7 +205,7 @@ class Card {
     this.root.classList.toggle("is-stopped", stop !== null);
     this.standing.hidden = stop === null;
     if (stop === null) return;
-    const whom = stop.is_mine ? "you" : stop.by_user || stop.by;
+    const whom = stop.is_mine ? "you" : stop.by_user;
     const unsure = stop.is_confirmed ? "" : "; the wheels may turn for a moment more";
     set(this.whose, `STOPPED by ${whom}${lasting(stop.age_s)}${stop.reason ? `: ${stop.reason}` : ""}${unsure}`);
     set(this.needs, stop.lift_line === HOLD ? "" : stop.lift_line);

@@ -244,6 +244,9 @@ export interface RobotView {
   robot: string;
   number: number;
   is_up: boolean;
+  waiting: string[];
+  stop: StopView | null;
+  feedback: string;
   holder: string;
   arc: string;
   is_console: boolean;
@@ -255,10 +258,7 @@ export interface RobotView {
   lease_left_s: number;
   lease_age_s: number;
   because: string;
-  waiting: string[];
-  stop: StopView | null;
   video: VideoView | null;
-  feedback: string;
 }
 
 export interface SetAnswer {
@@ -292,13 +292,11 @@ export interface StandingStop {
 
 export interface StopView {
   number: number;
-  by: string;
   reason: string;
   age_s: number;
   is_confirmed: boolean;
   by_user: string;
   also: string[];
-  since_s: number;
   is_mine: boolean;
   lift_line: string;
 }

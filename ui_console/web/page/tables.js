@@ -163,7 +163,7 @@ export class Tables {
       heads,
       rows.map((row) => [
         row.robot,
-        row.stop ? span("alarm", `STOPPED by ${row.stop.by_user || row.stop.by}`) : "",
+        row.stop ? span("alarm", `STOPPED by ${row.stop.by_user}`) : "",
         row.is_mine ? "you" : row.holder || "–",
         row.priority,
         seconds(row.since_s),

@@ -1,0 +1,84 @@
+"""Health of a mission in one word, with its absent components.
+
+Rules of this file: pure; observations go in, the verdict comes out. Each owner reports its absent components
+(``Component.absences``); this file joins these reports with the absences that the observer found itself.
+
+* ``ok``: no wanted component is absent.
+* ``degraded``: a wanted component is absent, and its owner is restarting it.
+* ``failed``: a vital component has been absent for longer than ``FAILED_AFTER_S``, or the owner of an absent
+  component has no further attempt to make.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from enum import StrEnum
+from typing import Annotated, Any
+
+from backbone.component.messages import Absence, ComponentState
+from backbone.picture.words import absence_line
+from backbone.ranges import MANY
+from backbone.wire import Message, plain
+
+LOOK_EVERY_S = 0.5  # chosen: an absence appears within two rounds; machine seconds
+SAY_EVERY_S = 1.0  # chosen: one small message a second from one process; machine seconds
+SILENT_AFTER_S = 2.0  # chosen: two messages of the launcher were missed; machine seconds
+FAILED_AFTER_S = 10.0  # chosen: twice the longest recovery that is an aim (a killed creator, 5 s)
+
+
+class HealthWord(StrEnum):
+    """The health of a mission."""
+
+    OK = "ok"
+    DEGRADED = "degraded"
+    FAILED = "failed"
+
+
+class MissionHealth(Message, frozen=True):
+    """How a mission is; published by the launcher on every change, and every ``SAY_EVERY_S``: its silence is noticed.
+
+    Attributes:
+        word: The verdict.
+        absent: Absent components: vital ones first, then by name.
+    """
+
+    word: HealthWord
+    absent: Annotated[list[Absence], MANY] = []
+
+    def lines(self, now_s: float) -> list[str]:
+        """Return one line for each absent component, for people."""
+        return [absence_line(absence, now_s) for absence in self.absent]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return ``health`` and ``absent`` as plain data."""
+        return {"health": str(self.word), "absent": plain(self.absent)}
+
+
+def health(
+    components: Mapping[str, ComponentState], missed: Iterable[Absence], now_s: float, rate: float = 1.0
+) -> MissionHealth:
+    """Return the mission's health.
+
+    Args:
+        components: State of each registered component, by address.
+        missed: Absences that the observer found: services that are not registered or did not answer.
+        now_s: Mission time.
+        rate: Mission seconds per second of the machine.
+    """
+    absent: dict[str, Absence] = {}
+    for absence in (*missed, *(each for state in components.values() for each in state.absent)):
+        known = absent.get(absence.name)
+        if known is None or absence.since_s < known.since_s:
+            absent[absence.name] = absence
+    found = sorted(absent.values(), key=lambda each: (not each.vital, each.name))
+    return MissionHealth(_word(found, now_s, rate), found)
+
+
+def _word(absent: Iterable[Absence], now_s: float, rate: float) -> HealthWord:
+    word = HealthWord.OK
+    for absence in absent:
+        too_long = absence.vital and now_s - absence.since_s > FAILED_AFTER_S * rate
+        if too_long or not absence.doing:
+            return HealthWord.FAILED
+        word = HealthWord.DEGRADED
+    return word

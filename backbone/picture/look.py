@@ -1,0 +1,124 @@
+"""Looks at a mission from outside: asks the core services, and takes what they say into a picture.
+
+A question without an answer never makes the picture look whole: the service that did not answer is absent, and what
+the picture lacks because of it stands in its ``problems``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+
+from backbone.bus.interface import Bus
+from backbone.component.messages import Absence, AskTime, MissionTime
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.creator.messages import ListProcesses, Processes, ProcessState
+from backbone.errors import LinkError, Refusal
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Components, ListComponents
+from backbone.naming import LAUNCHER, component_of
+from backbone.picture.mission import MissionPicture, misses
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.printable import printable_all
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
+from backbone.spoken import counted
+
+LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
+NAMES_SHOWN = 8  # chosen: a line of a terminal
+
+
+async def look(
+    bus: Bus, now_s: float, *, before: MissionPicture | None = None, rate: float = 1.0, schedule: bool = True
+) -> MissionPicture:
+    """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of what they say.
+
+    Args:
+        bus: To ask on.
+        now_s: Mission time.
+        before: The picture to take it into: an absence keeps its beginning, and a nameserver that does not answer
+            leaves it as it was, marked as stale. None: a new one.
+        rate: Mission seconds per second of the machine.
+        schedule: False: ask the RC manager only whether it lives.
+
+    Raises:
+        LinkError: The nameserver did not answer, and there is no earlier picture.
+    """
+    try:
+        listing = printable_all(await bus.ask(NAMESERVER, ListComponents(), Components, within_s=LOOK_TIME_S))
+    except (LinkError, Refusal) as error:
+        if before is None:
+            raise
+        silence = Absence("nameserver", now_s, f"no answer: {error}", "the launcher restarts it", vital=True)
+        _gone_stale(before, printable_all(silence), now_s)
+        return before
+    picture = before or MissionPicture(bus.mission, rate=rate)
+    keepers = sorted({LAUNCHER, *(one.address for one in listing.components if one.type == CREATOR)})
+    question, answer = (AskSchedule(), Schedule) if schedule else (AskTime(), MissionTime)
+    answers = await asyncio.gather(
+        _ask_or_absence(bus, now_s, RC_MANAGER, question, answer),
+        _ask_or_absence(bus, now_s, PLACER, AskTime(), MissionTime),
+        *(_ask_or_absence(bus, now_s, keeper, ListProcesses(), Processes) for keeper in keepers),
+    )
+    picture.at_s, picture.schedule, picture.processes, picture.stale_since_s = now_s, None, {}, None
+    for said in (listing, *answers):
+        if not isinstance(said, Absence | MissionTime):
+            picture.take(said)
+    silent = [said for said in answers if isinstance(said, Absence)]
+    kept = picture.processes.values()
+    lacks = _lacks(listing, kept)
+    picture.problems = (*(f"{absence.name}: {absence.cause}" for absence in silent), *lacks)
+    missed = [*silent, *misses(picture.components.values(), kept, now_s, rate)]
+    picture.missed = _remembered(missed, picture.missed)
+    return picture
+
+
+def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None:
+    """Leave the picture as it was, but for the time and for the nameserver that is missed."""
+    picture.stale_since_s = picture.at_s if picture.stale_since_s is None else picture.stale_since_s
+    others = (absence for absence in picture.missed if absence.name != silence.name)
+    picture.missed = (*_remembered([silence], picture.missed), *others)
+    picture.problems = tuple(f"{absence.name}: {absence.cause}" for absence in picture.missed)
+    picture.at_s = now_s
+
+
+async def _ask_or_absence(bus: Bus, now_s: float, address: str, question: Any, reply: type[Any]) -> Any:
+    """Return the answer, or that the one who should have answered is absent."""
+    try:
+        return printable_all(await bus.ask(address, question, reply, within_s=LOOK_TIME_S))
+    except (Refusal, LinkError) as error:
+        launched = address != LAUNCHER
+        doing = "the launcher restarts it" if launched else "it may answer again; nothing restarts a launcher"
+        remedy = "" if launched else "If it stays silent: 'scout-backbone down', then 'up' again."
+        return Absence(component_of(address), now_s, f"no answer: {error}", doing, remedy, vital=True)
+
+
+def _remembered(missed: Iterable[Absence], before: Iterable[Absence]) -> tuple[Absence, ...]:
+    """Return the absences, each since it was first missed."""
+    since_s = {absence.name: absence.since_s for absence in before}
+    return tuple(msgspec.structs.replace(each, since_s=since_s.get(each.name, each.since_s)) for each in missed)
+
+
+def _lacks(listing: Components, processes: Iterable[ProcessState]) -> list[str]:
+    """Return why the list of components is not whole, one line for each reason."""
+    listed = {component_of(component.address) for component in listing.components}
+    unknown = {component_of(address) for address in listing.unknown}
+    running = {process.spawn.name for process in processes if process.pid} - listed - unknown
+    lines = []
+    if unknown:
+        lines.append(f"the list is incomplete: no word yet from {_count(unknown)}")
+    if running:
+        lines.append(f"the list is incomplete: running and not registered yet: {_count(running)}")
+    elif not listing.complete and not unknown:
+        lines.append("the list may be incomplete: the nameserver began a moment ago and components still come back")
+    return lines
+
+
+def _count(names: Iterable[str]) -> str:
+    found = sorted(names)
+    more = f" and {len(found) - NAMES_SHOWN} more" if len(found) > NAMES_SHOWN else ""
+    return f"{counted(len(found), 'component')} ({', '.join(found[:NAMES_SHOWN])}{more})"

@@ -1,0 +1,250 @@
+"""A mission as its observers know it: messages in; lines, tables and plain data out.
+
+Rules of this file: no bus, no clock, no screen; times are mission seconds and arguments. Command line, launcher and
+consoles keep the same picture: some ask for all of it now and then (``look``), others hear what is published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, assert_never
+
+from backbone.component.messages import Absence, ComponentState, LifeState, MissionTime, StandingStop, StoryEvent
+from backbone.creator.messages import Processes, ProcessState
+from backbone.mission_log import Log, MissionLog, PeopleKnown
+from backbone.nameserver.messages import Components, Disappeared
+from backbone.naming import Subsystem, component_of
+from backbone.operators import OperatorActed
+from backbone.people import People
+from backbone.picture.health import MissionHealth, health
+from backbone.picture.words import stop_line
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import Schedule
+from backbone.wire import plain
+
+LOG_KEPT = 500  # chosen: some minutes of a busy mission; the launcher keeps more
+HUNG_AFTER_S = 1.0  # chosen: the aim for noticing a component that hangs; machine seconds
+_RESTARTS = "its creator restarts it"
+_LIFE = list(LifeState)
+
+
+Said = (
+    Schedule
+    | StoryEvent
+    | Log
+    | PeopleKnown
+    | OperatorActed
+    | ComponentState
+    | Components
+    | Disappeared
+    | Processes
+    | MissionTime
+)
+"""Messages of which a picture is made."""
+
+
+@dataclass
+class MissionPicture:
+    """A mission as far as it was heard of.
+
+    Attributes:
+        mission: Its name.
+        at_s: Mission time of the last look.
+        components: Who is there, by address.
+        processes: What creators and launcher say of their processes, by component name.
+        schedule: The RC manager's; None if it did not answer.
+        problems: Services that did not answer, and what the picture lacks.
+        missed: What this observer misses: services that did not answer, components that failed, hang or ended.
+        stale_since_s: Mission time at which the rest of the picture was true; None: now.
+        rate: Mission seconds per second of the machine.
+        log: The newest of what happened, and who sits at which console.
+    """
+
+    mission: str
+    at_s: float = 0.0
+    components: dict[str, ComponentState] = field(default_factory=dict)
+    processes: dict[str, ProcessState] = field(default_factory=dict)
+    schedule: Schedule | None = None
+    problems: tuple[str, ...] = ()
+    missed: tuple[Absence, ...] = ()
+    stale_since_s: float | None = None
+    rate: float = 1.0
+    log: MissionLog = field(default_factory=lambda: MissionLog(LOG_KEPT))
+
+    def __post_init__(self) -> None:
+        for component in self.components.values():
+            self.people.heard(component)
+
+    # ------------------------------------------------------------------ messages in
+    def take(self, said: Said, source: str = "") -> None:
+        """Take a message in.
+
+        Args:
+            said: The message.
+            source: Address of the component that said it.
+        """
+        match said:
+            case Schedule():
+                self.schedule = said
+            case StoryEvent():
+                self.log.add(said)
+            case OperatorActed():
+                self.log.add(said.event(source))
+            case Log():
+                self.log.recall(said.events)
+            case PeopleKnown():
+                self.people.remember(said.consoles)
+            case ComponentState():
+                self._meet(said)
+            case Components():
+                for one in self.changes(said):
+                    self.take(one)
+            case Disappeared():
+                self.components.pop(said.address, None)
+            case Processes():
+                self.processes |= {process.spawn.name: process for process in said.processes}
+            case MissionTime():
+                self.rate = said.rate
+            case _:
+                assert_never(said)
+
+    def changes(self, listed: Components) -> list[ComponentState | Disappeared]:
+        """Return what a list says: who is there and, if it is complete, who is not any more."""
+        gone = self.components.keys() - {component.address for component in listed.components}
+        return [*listed.components, *(Disappeared(address) for address in sorted(gone) if listed.complete)]
+
+    def _meet(self, component: ComponentState) -> None:
+        self.people.heard(component)
+        known = self.components.get(component.address)
+        is_over = known is None and component.state is LifeState.STOPPED  # said after the word that it is gone
+        if not is_over and (known is None or not is_older(component, known)):
+            self.components[component.address] = component
+
+    # ------------------------------------------------------------------ views out
+    @property
+    def health(self) -> MissionHealth:
+        """How the mission is, and what it lacks."""
+        return health(self.components, self.missed, self.at_s, self.rate)
+
+    @property
+    def stops(self) -> dict[str, StandingStop]:
+        """The emergency stops in force, by the name of the component that was stopped."""
+        return {component_of(at): c.stop for at, c in sorted(self.components.items()) if c.stop is not None}
+
+    @property
+    def people(self) -> People:
+        """Who sits at which console."""
+        return self.log.people
+
+    def stop_lines(self) -> list[str]:
+        """Return one line for each emergency stop in force, for people."""
+        return [self.people.named(stop_line(name, stop, self.at_s)) for name, stop in self.stops.items()]
+
+    def remarks(self) -> list[str]:
+        """Return the problems that are no absence, one line each."""
+        told = tuple(f"{absence.name}: " for absence in self.health.absent)
+        return [problem for problem in self.problems if not problem.startswith(told)]
+
+    def of_subsystem(self, subsystem: Subsystem) -> list[ComponentState]:
+        """Return the components of one of the four subsystems, sorted by name."""
+        return [c for at, c in sorted(self.components.items()) if at.startswith(f"{subsystem}/")]
+
+    def restarts(self, component: ComponentState) -> int:
+        """Return how often the component was restarted."""
+        process = self.processes.get(component_of(component.address))
+        return process.restarts if process else 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the whole picture as plain data."""
+        components = [
+            {
+                "name": component_of(c.address),
+                "subsystem": c.address.partition("/")[0],
+                "type": c.type,
+                "host": c.host,
+                "pid": c.pid,
+                "state": str(c.state),
+                "since_s": c.since_s,
+                "restarts": self.restarts(c),
+                "feedback": c.feedback,
+                "requester": c.requester,
+                "person": c.user,
+            }
+            for _, c in sorted(self.components.items())
+        ]
+        schedule = plain(self.schedule) if self.schedule else {"rcs": [], "requests": [], "groups": []}
+        return {
+            "mission": self.mission,
+            "at_s": self.at_s,
+            **self.health.to_json(),
+            "stale_since_s": self.stale_since_s,
+            "stops": [{"name": name, **plain(stop)} for name, stop in self.stops.items()],
+            "components": components,
+            "rcs": schedule["rcs"],
+            "requests": schedule["requests"],
+            "groups": schedule["groups"],
+            "problems": list(self.problems),
+        }
+
+
+def misses(
+    components: Iterable[ComponentState], processes: Iterable[ProcessState], now_s: float, rate: float = 1.0
+) -> list[Absence]:
+    """Return what an observer misses by what nameserver, launcher and creators say: what failed, hangs or fell.
+
+    Args:
+        components: Who is registered.
+        processes: What is kept by launcher and creators.
+        now_s: Mission time.
+        rate: Mission seconds per second of the machine.
+    """
+    found = {
+        component_of(c.address): Absence(component_of(c.address), c.since_s, c.feedback or "it failed", _RESTARTS)
+        for c in components
+        if c.state is LifeState.FAILED
+    }
+    listed = {component_of(c.address) for c in components}
+    for process in processes:
+        absence = _fallen(process, now_s, rate, listed)
+        if absence is not None:
+            found[absence.name] = absence
+    return list(found.values())
+
+
+def _fallen(process: ProcessState, now_s: float, rate: float, listed: set[str]) -> Absence | None:
+    """Return what is wrong with a process; None: nothing is."""
+    name, is_core = process.spawn.name, process.spawn.subsystem == Subsystem.BACKBONE
+    if process.silent_s >= HUNG_AFTER_S:
+        cause = f"it hangs: its event loop did not run for {process.silent_s:.1f} s"
+        doing = "its creator ends and restarts it if it stays silent"
+        return Absence(name, now_s - process.silent_s * rate, cause, doing, vital=is_core)
+    if not process.pid and process.last_end:  # without an end before, it is being started for the first time
+        return Absence(name, now_s, process.last_end, _RESTARTS, vital=is_core)
+    if is_core and name not in listed:  # other components come and go; one that starts is no absence
+        return Absence(
+            name, now_s, f"its process {process.pid} is not registered", process.doing or "it starts", vital=True
+        )
+    return None
+
+
+def is_older(one: ComponentState, other: ComponentState) -> bool:
+    """Say whether one was said before the other by the same process: its life only goes on.
+
+    Their times do not tell: the nameserver dates a readiness by when it saw it.
+    """
+    return one.pid == other.pid and _LIFE.index(one.state) < _LIFE.index(other.state)
+
+
+def holders_line(schedule: Schedule) -> str:
+    """Return one line for a terminal that shows only lines: who runs, who waits.
+
+    Example:
+        >>> holders_line(Schedule(0.0, [], [], []))
+        'nobody asks for anything'
+    """
+    running = [request.arc for request in schedule.requests if request.state is RequestState.RUNNING]
+    waiting = [request.arc for request in schedule.requests if request.state is RequestState.WAITING]
+    if not schedule.requests:
+        return "nobody asks for anything"
+    return f"runs: {', '.join(running) or 'nobody'}; waits: {', '.join(waiting) or 'nobody'}"

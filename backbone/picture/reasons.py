@@ -1,0 +1,277 @@
+"""``why`` and ``story``: ask whoever knows, and put their answers in order."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import Absence, AskStory, ComponentState, Story, StoryEvent
+from backbone.component.story import LENGTH as STORY_LENGTH
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.creator.messages import creator_name
+from backbone.errors import LinkError, Refusal
+from backbone.log_lines import event_json
+from backbone.mission_log import AskPeople, PeopleKnown
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.naming import LAUNCHER, component_of
+from backbone.people import People, screens_of
+from backbone.picture.look import look
+from backbone.picture.mission import MissionPicture
+from backbone.picture.words import RULES, absence_line, stop_line
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import AskPlacement, NotPlaced, Placement
+from backbone.printable import printable_all
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskWhy
+from backbone.scheduling.requests import RequestState, UnknownRequest
+from backbone.scheduling.views import Why
+from backbone.spoken import counted
+from backbone.wire import plain
+
+REPLY_TIME_S = 1.0  # chosen: a person waits this long
+
+
+@dataclass(frozen=True)
+class Reasons:
+    """Why something is as it is: its schedule, its place, its own words; at least one of them.
+
+    Attributes:
+        name: What was asked about.
+        why: The RC manager's answer, if it knows the name.
+        placement: The placer's answer, if it placed it.
+        component: What the component says of itself, if there is one.
+        absence: That it is wanted and absent, if it is.
+        led_to: If the name is a message's: the events that the message led to.
+        remarks: What else is known of the name: of a host, of a person, of a message that led to nothing.
+        people: Who sits at which console; they are called by their names.
+    """
+
+    name: str
+    why: Why | None
+    placement: Placement | None
+    component: ComponentState | None
+    absence: Absence | None = None
+    led_to: Sequence[StoryEvent] = ()
+    remarks: Sequence[str] = ()
+    people: People = field(default_factory=People)
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is anything to tell."""
+        return any((self.why, self.placement, self.component, self.absence, self.led_to, self.remarks))
+
+    def lines(self, now_s: float) -> list[str]:
+        """Return the reasons for people."""
+        return [self.people.named(line) for line in self._lines(now_s)]
+
+    def _lines(self, now_s: float) -> list[str]:
+        lines = [*self.remarks] if self.absence is None else [absence_line(self.absence, now_s), *self.remarks]
+        if self.component is not None and self.component.stop is not None:
+            lines.append(stop_line(self.name, self.component.stop, now_s))
+        if self.why is not None:
+            lines += [f"{self.name}: {self.why.state}", *(f"  {line}" for line in self.why.lines)]
+            if self.why.expected_start_s >= 0:
+                lines.append(f"  expected to start in {max(0.0, self.why.expected_start_s - now_s):.1f} s")
+            if self.why.would_change:
+                changes = "it starts as soon as" if self.why.state == RequestState.WAITING else "this changes when"
+                lines.append(f"  {changes} {self.why.would_change}")
+            lines.append(f"  rule {self.why.rule}: {RULES.get(self.why.rule, 'see the documentation')}")
+        if self.component is not None:
+            doing = f": {self.component.feedback}" if self.component.feedback else ""
+            lines.append(f"{self.name} is {self.component.state} on {self.component.host}{doing}")
+        if self.placement is not None:
+            where = (
+                f"was placed on {self.placement.host}" if self.placement.host else "waits for a host that can take it"
+            )
+            lines.append(f"{self.name} {where}, wanted by {self.placement.requester}")
+            lines += [f"  {reason}" for reason in self.placement.reasons]
+        if self.led_to:
+            lines.append("this message led to:")
+            lines += [f"  {event.at_s:.3f} s  {event.where}  {event.subject}: {event.what}" for event in self.led_to]
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the reasons as plain data."""
+        return {
+            "name": self.name,
+            "why": plain(self.why),
+            "placement": plain(self.placement),
+            "stop": plain(self.component.stop) if self.component else None,
+            "absent": plain(self.absence),
+            "led_to": [event_json(event) for event in self.led_to],
+            "remarks": list(self.remarks),
+        }
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a name that a person types means.
+
+    Attributes:
+        name: Name of the component, request or resource.
+        message: The message meant, ``<address>#<number>``; empty: none.
+    """
+
+    name: str
+    message: str = ""
+
+    @classmethod
+    def of(cls, text: str) -> Asked:
+        """Return what is meant by a name, an address, an alarm, or the id of a message, with its subsystem or without.
+
+        Example:
+            >>> Asked.of("rc_manager").name, Asked.of("backbone/rc_manager").name, Asked.of("lost:scout1").name
+            ('rc_manager', 'rc_manager', 'scout1')
+            >>> Asked.of("rc_manager#112")
+            Asked(name='rc_manager', message='rc_manager#112')
+        """
+        address, number, _ = text.rpartition(":")[2].partition("#")
+        return cls(component_of(address), text if number else "")
+
+
+async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
+    """Ask RC manager, placer and nameserver about a name, an address or a message.
+
+    Raises:
+        UnknownName: None of them knows it.
+        LinkError: None of them answered.
+    """
+    asked = Asked.of(text)
+    name = asked.name
+    why, placement, resolved, picture, told, known = await asyncio.gather(
+        _or_error(bus, RC_MANAGER, AskWhy(name), Why),
+        _or_error(bus, PLACER, AskPlacement(name), Placement),
+        _or_error(bus, NAMESERVER, Resolve(name), Resolved),
+        _look_or_none(bus, clock),
+        story_of(bus, text, clock) if asked.message else _nothing_told(),
+        _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown),
+    )
+    absent = picture.health.absent if picture is not None else ()
+    remarks = [*host_remarks(name, picture), *person_remarks(name, picture)] if picture is not None else []
+    if asked.message and not told.events:
+        remarks.append(
+            f"nobody tells that {asked.message} led to anything; each tells of its newest {STORY_LENGTH} events"
+        )
+    reasons = Reasons(
+        name,
+        why if isinstance(why, Why) else None,
+        placement if isinstance(placement, Placement) else None,
+        resolved.component if isinstance(resolved, Resolved) else None,
+        next((absence for absence in absent if absence.name == name), None),
+        told.events,
+        remarks,
+        _people(picture, known),
+    )
+    if not reasons.is_known:
+        errors = (why, placement, resolved)
+        raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), resolved)
+    return printable_all(reasons)
+
+
+def host_remarks(name: str, picture: MissionPicture) -> list[str]:
+    """Return what is known of a machine of the mission; nothing if the name is none's."""
+    there = [component_of(at) for at, component in sorted(picture.components.items()) if component.host == name]
+    missed = [absence for absence in picture.health.absent if absence.name == creator_name(name)]
+    if not missed and not any(c.host == name and c.type == CREATOR for c in picture.components.values()):
+        return []
+    lines = [
+        f"{name} is a machine of the mission, with {counted(len(there), 'component')}: {', '.join(there) or 'none'}"
+    ]
+    return lines + [absence_line(absence, picture.at_s) for absence in missed]
+
+
+def person_remarks(name: str, picture: MissionPicture) -> list[str]:
+    """Return at which consoles a person sits, and what comes of it; nothing if the name is none's."""
+    screens = screens_of(name, picture.components.values())
+    if not screens:
+        return []
+    lines = [f"{name} sits at {counted(len(screens), 'console')}"]
+    for screen in screens:
+        lines.append(f"  on {screen.host}: {screen.feedback or screen.state}")
+        lines += [
+            f"  {request.because.removeprefix(f'{request.arc} ')}"
+            for request in (picture.schedule.requests if picture.schedule is not None else [])
+            if request.owner == screen.address
+        ]
+    return lines
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the components of a mission tell.
+
+    Attributes:
+        events: In the order of their times.
+        missing: Components that did not tell, and why: the events are not all there are.
+        people: Who sits at the consoles that are spoken of, or sat there.
+    """
+
+    events: Sequence[StoryEvent]
+    missing: Sequence[str] = ()
+    people: People = field(default_factory=People)
+
+
+async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
+    """Ask every component for the events about a name, an address or a message.
+
+    Raises:
+        LinkError: The nameserver did not answer: nobody is known who could be asked.
+    """
+    asked = Asked.of(text)
+    listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
+    picture, known, *stories = await asyncio.gather(
+        _look_or_none(bus, clock),
+        _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown),
+        *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
+    )
+    events = [event for story in stories if isinstance(story, Story) for event in story.events]
+    missing = [
+        f"{component.address}: {story}"
+        for component, story in zip(listing.components, stories, strict=True)
+        if not isinstance(story, Story)
+    ]
+    missing += [f"{address}: it did not say yet who it is" for address in listing.unknown]
+    named = {component_of(missed.partition(": ")[0]) for missed in missing}
+    absent = picture.health.absent if picture is not None else ()
+    missing += [f"{each.name}: it is absent, {each.cause}" for each in absent if each.name not in named]
+    if not listing.complete:
+        missing.append("the nameserver began a moment ago: components may be missing in its list")
+    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing, _people(picture, known)))
+
+
+def _people(picture: MissionPicture | None, known: Any) -> People:
+    """Return who sits at the consoles there are, and who sat at those that have left as far as the launcher knows."""
+    people = picture.people if picture is not None else People()
+    if isinstance(known, PeopleKnown):
+        people.remember(known.consoles)
+    return people
+
+
+async def _nothing_told() -> Told:
+    return Told(())
+
+
+async def _look_or_none(bus: Bus, clock: Clock) -> MissionPicture | None:
+    """Return how the mission is; None if the nameserver does not answer, which the other questions tell of."""
+    try:
+        return await look(bus, clock.now_s(), rate=clock.rate)
+    except (Refusal, LinkError):
+        return None
+
+
+def _question(address: str, asked: Asked) -> AskStory:
+    """Ask the component itself for all it knows, the others for what is about it; of a message all for its effects."""
+    if asked.message:
+        return AskStory(asked.message)
+    return AskStory() if component_of(address) == asked.name else AskStory(asked.name)
+
+
+async def _or_error(bus: Bus, address: str, question: Any, reply: type[Any]) -> Any:
+    try:
+        return await bus.ask(address, question, reply, within_s=REPLY_TIME_S)
+    except (Refusal, LinkError) as error:
+        return error

@@ -1,0 +1,88 @@
+"""The words for what a picture shows, for command line, terminal and page: one sentence for one fact. Pure."""
+
+from __future__ import annotations
+
+from backbone.component.messages import Absence, StandingStop
+from backbone.people import People
+from backbone.scheduling.views import RequestView
+
+WANTED = "self"
+"""The word for what a console gave away of its own will."""
+
+UNDECIDED = ("lost", "lease")
+"""The words for a loss that nobody decided: the console was cut off, or paused."""
+
+_SENTENCES = {
+    "slice": "it is the turn of {by}",
+    "higher": "{by} has the higher priority",
+    "rc": "{by} does not answer",
+    "capacity": "{by} can give less than before",
+    "order": "{by} could not serve everybody in time",
+    "failed": "it could not be made ready",
+    WANTED: "no time was wanted",
+    "silent": "this console gave no sign of life",
+    "lease": "nothing was heard of the RC manager for too long",
+    "lost": "what held it for this console has ended",
+}
+"""The words of ``Suspended.reason``."""
+
+RULES = {
+    "3": "each starts as early as it fits whole, and takes nothing from those before it",
+    "5": "a slice ends only if somebody entitled can use the RCs",
+    "6": "RCs are stopped and freed, then settle for the next one",
+    "8": "policy strict: none starts while a higher one of its group waits",
+    "9": "who is higher may keep others waiting for ever; that is allowed, and shown",
+    "11": "what is down or can give too little serves nobody",
+    "14": "who wants no time now keeps its request and frees its RCs",
+    "15": "a big group is not planned whole: each RC is reserved for the first in line",
+}
+"""The rules of scheduling that decide why something is as it is, by the numbers they have in the documentation."""
+
+
+def why_lost(reason: str, by: str) -> str:
+    """Return why something was taken from a console, or is kept from it, as part of a sentence.
+
+    Args:
+        reason: The scheduler's word, or any text.
+        by: Because of whom, as people call them; empty: nobody.
+
+    Example:
+        >>> why_lost("slice", "ben"), why_lost("silent", ""), why_lost("a fuse blew", "")
+        ('it is the turn of ben', 'this console gave no sign of life', 'a fuse blew')
+    """
+    sentence = _SENTENCES.get(reason)
+    if sentence is not None:
+        return sentence.format(by=by or "somebody else")
+    return f"{reason}, because of {by}" if by else reason
+
+
+def because(request: RequestView, people: People) -> str:
+    """Return why a request runs or waits, without what its row says anyway, by the names of people."""
+    return people.named(request.because.removeprefix(f"{request.arc} {request.state}: "))
+
+
+def absence_line(absence: Absence, now_s: float) -> str:
+    """Return one absence as a line for people.
+
+    Example:
+        >>> absence_line(Absence("scout1", 2.0, "killed by SIGKILL", "starts again in 0.1 s"), 3.5)
+        'scout1 is absent for 1.5 s: killed by SIGKILL; starts again in 0.1 s'
+    """
+    parts = [f"{absence.name} is absent for {max(0.0, now_s - absence.since_s):.1f} s: {absence.cause}"]
+    parts += [part for part in (absence.doing, absence.remedy) if part]
+    return "; ".join(parts)
+
+
+def stop_line(name: str, stop: StandingStop, now_s: float) -> str:
+    """Return an emergency stop in force as a line for people.
+
+    Example:
+        >>> stop_line("scout1", StandingStop(1, "anna", "child in the room", 2.0), 5.0)
+        'scout1 is STOPPED by anna for 3.0 s: child in the room; lift the stop at a console when it may move'
+    """
+    why = f": {stop.reason}" if stop.reason else ""
+    unsure = "" if stop.is_confirmed else "; its radio did not confirm the stop"
+    lasts_s = max(0.0, now_s - stop.since_s)
+    return (
+        f"{name} is STOPPED by {stop.by} for {lasts_s:.1f} s{why}{unsure}; lift the stop at a console when it may move"
+    )

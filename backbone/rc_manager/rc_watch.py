@@ -1,0 +1,234 @@
+"""Which RCs can be planned on: those that run, are as they say, and hold nothing from before.
+
+An RC that is missing, does not answer or contradicts itself is down for the schedule manager, alone; it is asked again
+until it makes sense and has confirmed that it holds nothing any more.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Coroutine, Iterable
+from typing import Any, Protocol
+
+from backbone.bus.interface import Bus, Clock
+from backbone.component.messages import LogLevel
+from backbone.component.story import StoryBook
+from backbone.dependency_database.messages import Resource
+from backbone.errors import LinkError, Refusal
+from backbone.nameserver.messages import NameTaken
+from backbone.naming import Subsystem
+from backbone.placer.messages import ADDRESS as PLACER
+from backbone.placer.messages import Start, Started
+from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
+from backbone.rc_manager.credibility import contradiction
+from backbone.rc_manager.messages import AskRc, RcState
+from backbone.rc_manager.recovery import Found, Recovery
+from backbone.scheduling.events import CapacityChanged, Event, RcCameBack, RcWentDown
+from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.wire import MalformedMessage
+
+log = logging.getLogger(__name__)
+
+START_TIME_S = 30.0  # chosen: a framegrabber opens a renderer before it is ready
+MEET_AGAIN_S = 0.5  # chosen: a quarter of a lease: what keeps an RC from connecting is mostly an old hold
+
+
+class Service(Protocol):
+    """The RC manager, as the watch needs it."""
+
+    bus: Bus
+    clock: Clock
+    story: StoryBook
+    manager: ScheduleManager
+
+    def happened(self, event: Event) -> None:
+        """Have the schedule manager decide on the event."""
+
+    def tell(self, subject: str, what: str, level: LogLevel) -> None:
+        """Put an event about the subject into the mission's log."""
+
+    def start_task(self, work: Coroutine[Any, Any, None], name: str) -> object:
+        """Run the coroutine until the component ends."""
+
+
+class RcWatch:
+    """Meets RCs that appear, and those that failed again and again.
+
+    Attributes:
+        resources: RC → its resource; set before anything else is asked.
+        up: RCs that count as up.
+    """
+
+    def __init__(self, service: Service, context_switch: ContextSwitch, recovery: Recovery) -> None:
+        """Count no RC as up.
+
+        Args:
+            service: The RC manager.
+            context_switch: Ends what an RC still holds.
+            recovery: Knows which components there are.
+        """
+        self._service = service
+        self._context_switch = context_switch
+        self._recovery = recovery
+        self.resources: dict[str, Resource] = {}
+        self.up: set[str] = set()
+        self._failing: set[str] = set()
+        self._faults: dict[str, str] = {}
+        self._doubted: set[str] = set()
+        self._starts: dict[str, asyncio.Task[None]] = {}
+
+    @property
+    def starts(self) -> list[asyncio.Task[None]]:
+        """Starts through the placer that are under way."""
+        return [*self._starts.values()]
+
+    def missing(self) -> list[str]:
+        """Return the RCs that do not run, sorted."""
+        return sorted(self.resources.keys() - self.up - self._failing)
+
+    async def have_running(self, rcs: Iterable[str]) -> None:
+        """Start those RCs through the placer that do not run; return when all answer, or the placer works on them.
+
+        Raises:
+            Refusal: One of them cannot be started.
+        """
+        missing = [rc for rc in rcs if rc not in self.up and rc not in self._faults]
+        for rc in missing:
+            if rc not in self._starts:
+                self._starts[rc] = asyncio.create_task(self._start(self.resources[rc]), name=f"start {rc}")
+        await asyncio.gather(*(asyncio.shield(self._starts[rc]) for rc in missing))
+
+    async def meet(self, rc: str) -> bool:
+        """Ask the RC how it is and let the schedule manager know; return whether it is up.
+
+        It counted as down, so whoever holds it still does so by an earlier grant: that ends first.
+        """
+        if rc in self.up:
+            return True
+        state = await self._ask(rc)
+        if state is None:
+            return False
+        holds = [(rc, holder.arc, holder.epoch) for holder in state.holders]
+        if rc not in self.up and not await self._context_switch.clear(rc, holds):
+            return False
+        if rc not in self.up:
+            if self._faults.pop(rc, ""):
+                self._service.story.note(rc, "makes sense again")
+            self.up.add(rc)
+            self._service.happened(RcCameBack(rc, state.last_epoch))
+            if state.capacity != self.resources[rc].capacity:
+                self._service.happened(CapacityChanged(rc, state.capacity))
+        return True
+
+    def meet_again(self, rc: str) -> None:
+        """Meet an RC that appeared or spoke; if it is not up then, in a while."""
+
+        async def again() -> None:
+            if not await self.meet(rc):
+                self.meet_in_a_while(rc)
+
+        self._service.start_task(again(), f"meet {rc}")
+
+    def meet_in_a_while(self, rc: str) -> None:
+        """Meet an RC that failed until it is up; not at once, or it and the schedule would try each other for ever."""
+        if rc not in self._failing:
+            self._failing.add(rc)
+            self._service.start_task(self._meet_later(rc), f"meet {rc}")
+
+    def failed(self, rc: str) -> None:
+        """Count the RC as down; the schedule manager knows."""
+        self.up.discard(rc)
+
+    def forget(self, rc: str) -> bool:
+        """Count an RC that is gone as down; return whether it was up or put aside."""
+        was_known = rc in self.up or bool(self._faults.pop(rc, ""))
+        self.up.discard(rc)
+        return was_known
+
+    def does_not_answer(self, rc: str) -> None:
+        """Count the RC as down from now on, until it answers and is cleared."""
+        if rc in self.up:
+            self.up.discard(rc)
+            self._service.happened(RcWentDown(rc))
+            self.meet_again(rc)
+
+    def believes(self, state: RcState) -> bool:
+        """Return whether what an RC published of itself can be taken over; if not, the RC itself is asked."""
+        rc, service = state.name, self._service
+        if rc not in self.resources:
+            return False
+        if rc not in self.up:
+            if rc not in self._failing:
+                self.meet_again(rc)
+            return False
+        if contradiction(state, self.resources[rc], service.clock.now_s(), service.manager.epoch_of(rc)):
+            if rc not in self._doubted:
+                service.start_task(self._ask_doubted(rc), f"ask {rc}")
+            return False
+        return True
+
+    def believed(self, found: Found) -> Found:
+        """Return what was found without the RCs that cannot be as they say; they are met once this one serves."""
+        now_s = self._service.clock.now_s()
+        believed = {rc: s for rc, s in found.rcs.items() if not contradiction(s, self.resources[rc], now_s)}
+        return Found(believed, found.arcs)
+
+    async def _start(self, resource: Resource) -> None:
+        service, rc = self._service, resource.name
+        service.story.note(rc, "is claimed but does not run: asks the placer to start it")
+        order = Start(resource.type, rc, resource.rc_parameters(), resource.host, process=resource.process)
+        try:
+            await service.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
+        except NameTaken:  # it was started before and is missing now: a request waits until it is back
+            service.story.note(rc, "is being started by the placer")
+        except Refusal:
+            if not await self.meet(rc):
+                raise
+        finally:
+            del self._starts[rc]
+        await self.meet(rc)
+
+    async def _meet_later(self, rc: str) -> None:
+        clock = self._service.clock
+        try:
+            await clock.sleep_s(MEET_AGAIN_S * clock.rate)
+            while not await self.meet(rc) and rc in await self._recovery.present():
+                await clock.sleep_s(MEET_AGAIN_S * clock.rate)
+        finally:
+            self._failing.discard(rc)
+
+    async def _ask(self, rc: str, given: int | None = None) -> RcState | None:
+        """Return how the RC is by its own answer; None if there is none, or one that cannot be, and it is put aside."""
+        bus, clock = self._service.bus, self._service.clock
+        try:
+            state = await bus.ask(f"{Subsystem.RESOURCE_POOL}/{rc}", AskRc(), RcState, within_s=RC_REPLY_S)
+        except MalformedMessage as nonsense:
+            self._put_aside(rc, f"its answer cannot be read: {nonsense.detail}")
+            return None
+        except (Refusal, LinkError) as error:
+            log.warning("%s does not say how it is: %s", rc, error)
+            return None
+        fault = contradiction(state, self.resources[rc], clock.now_s(), given)
+        if fault:
+            self._put_aside(rc, fault)
+            return None
+        return state
+
+    async def _ask_doubted(self, rc: str) -> None:
+        """Ask an RC itself about which something was published that cannot be: anybody may publish in its name."""
+        self._doubted.add(rc)
+        try:
+            await self._ask(rc, self._service.manager.epoch_of(rc))
+        finally:
+            self._doubted.discard(rc)
+
+    def _put_aside(self, rc: str, fault: str) -> None:
+        """Plan nothing on this RC until it makes sense, and go on with the others."""
+        self.up.discard(rc)
+        if self._faults.get(rc) != fault:
+            self._faults[rc] = fault
+            log.warning("%s is put aside: %s", rc, fault)
+            self._service.tell(rc, f"is put aside: {fault}", LogLevel.WARNING)
+            self._service.happened(RcWentDown(rc, fault))
+        self.meet_in_a_while(rc)

@@ -1,0 +1,165 @@
+"""``why`` and ``story`` name whoever did not answer, and understand what causes look like."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from backbone.bus.clock import VirtualClock, run_virtual
+from backbone.bus.interface import Bus, current_cause
+from backbone.bus.local_bus import LocalNetwork
+from backbone.component.messages import (
+    Absence,
+    AskStory,
+    ComponentState,
+    LifeState,
+    StandingStop,
+    Story,
+    StoryEvent,
+)
+from backbone.component.story import StoryBook, is_about
+from backbone.errors import LinkError
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
+from backbone.picture.reasons import Asked, Reasons, Told, reasons_for, story_of
+
+CAUSE = "backbone/rc_manager#112"
+SCOUT = ComponentState(
+    "resource_pool/scout1",
+    "scout",
+    "base",
+    4711,
+    LifeState.READY,
+    1.0,
+    stop=StandingStop(1, "anna", "child in the room", 2.0),
+    absent=[Absence("radio", 3.0, "killed by SIGKILL", "starts again in 0.1 s", "Nothing.")],
+)
+SILENT = ComponentState("resource_pool/scout2", "scout", "base", 4712, LifeState.READY, 1.0)
+CREATOR = ComponentState("backbone/creator-base", "creator", "base", 4713, LifeState.READY, 1.0)
+ANNA = ComponentState(
+    "ui_console/console-7",
+    "console",
+    "base",
+    4714,
+    LifeState.READY,
+    1.0,
+    "drives scout1, not console-7-drive",
+    user="anna",
+)
+EVENTS = [
+    StoryEvent(1.0, SCOUT.address, "connected", "scout1", CAUSE),
+    StoryEvent(2.0, SCOUT.address, "disconnected", "scout1", "backbone/rc_manager#113"),
+]
+
+
+def mission(complete: bool = True, unknown: tuple[str, ...] = ()) -> Bus:
+    """Return a bus to a mission with a nameserver, a Scout that answers and one that does not."""
+    network = LocalNetwork("m")
+    states = {state.address.partition("/")[2]: state for state in (SCOUT, SILENT, CREATOR, ANNA)}
+
+    async def names(asked: Any) -> Any:
+        match asked.body:
+            case ListComponents():
+                return Components(list(states.values()), complete, 0.0, list(unknown))
+            case Resolve(name=name) if name in states:
+                return Resolved(states[name])
+            case Resolve(name=name):
+                raise UnknownName(f"no component is registered as {name!r}")
+
+    async def tells(asked: Any) -> Story:
+        of = asked.body.subject
+        return Story([event for event in EVENTS if not of or is_about(event, of)])
+
+    network.join(NAMESERVER, VirtualClock()).serve(NAMESERVER, ListComponents | Resolve, names)
+    network.join(SCOUT.address, VirtualClock()).serve(SCOUT.address, AskStory, tells)
+    return network.join("ui_console/asker", VirtualClock())
+
+
+def story(text: str, **listing: Any) -> Told:
+    async def main() -> Told:
+        return await story_of(mission(**listing), text, VirtualClock())
+
+    return run_virtual(main())
+
+
+def why(text: str) -> Reasons:
+    async def main() -> Reasons:
+        return await reasons_for(mission(), text, VirtualClock())
+
+    return run_virtual(main())
+
+
+@pytest.mark.parametrize("text", ["scout1", "resource_pool/scout1", CAUSE])
+def test_a_story_names_every_component_that_did_not_tell_its_part(text: str) -> None:
+    told = story(text, complete=False, unknown=("mission_control/watch",))
+    missing = "\n".join(told.missing)
+    assert told.events[0].what == "connected"
+    for name in ("resource_pool/scout2: ", "mission_control/watch: ", "radio: it is absent", "nameserver began"):
+        assert name in missing
+
+
+def test_a_cause_has_the_events_that_it_led_to_and_no_others() -> None:
+    assert story(CAUSE).events == EVENTS[:1]
+    reasons = why(CAUSE)
+    assert reasons.name == "rc_manager"
+    assert reasons.lines(5.0)[-1] == "  1.000 s  resource_pool/scout1  scout1: connected"
+
+
+def test_an_address_means_its_component() -> None:
+    assert Asked.of("resource_pool/scout1") == Asked("scout1")
+    assert why("resource_pool/scout1").component == SCOUT
+
+
+def test_why_shows_a_standing_stop_and_an_absence() -> None:
+    assert why("scout1").lines(5.0)[0].startswith("scout1 is STOPPED by anna for 3.0 s: child in the room")
+    assert why("scout1").to_json()["stop"]["by"] == "anna"
+    reasons = why("radio")
+    assert reasons.lines(5.0) == [
+        "radio is absent for 2.0 s: killed by SIGKILL; starts again in 0.1 s; Nothing.",
+    ]
+    assert reasons.to_json()["absent"]["cause"] == "killed by SIGKILL"
+
+
+def test_while_the_rc_manager_is_silent_no_name_is_called_unknown() -> None:
+    with pytest.raises(LinkError):
+        why("nobody")
+
+
+def test_a_story_book_finds_what_a_message_led_to() -> None:
+    book = StoryBook("resource_pool/scout1", VirtualClock())
+
+    async def main() -> None:
+        book.note("scout1", "was started")
+        current_cause.set(CAUSE)
+        book.note("scout1", "connected")
+
+    run_virtual(main())
+    assert [event.what for event in book.of(CAUSE)] == ["connected"]
+    assert len(book.of("scout1")) == 2
+
+
+@pytest.mark.parametrize("text", ["rc_manager#112", "backbone/rc_manager#112"])
+def test_an_events_cause_may_be_typed_with_or_without_its_subsystem(text: str) -> None:
+    assert story(text).events == EVENTS[:1]
+    assert "  1.000 s  resource_pool/scout1  scout1: connected" in why(text).lines(5.0)
+
+
+def test_a_message_that_led_to_nothing_says_so() -> None:
+    assert why("scout1#7").lines(5.0)[0].startswith("nobody tells that scout1#7 led to anything")
+
+
+def test_an_alarm_means_what_it_is_about() -> None:
+    assert why("lost:scout1").component == SCOUT
+    assert why("deadline:radio1:scout1").component == SCOUT
+
+
+def test_a_machine_is_known_with_what_runs_there() -> None:
+    here, absent = why("base").lines(5.0)
+    assert here == "base is a machine of the mission, with 4 components: creator-base, scout1, scout2, anna"
+    assert absent.startswith("creator-base is absent for 0.0 s: no answer")
+
+
+def test_a_person_is_known_with_every_screen_and_called_by_name() -> None:
+    assert why("anna").lines(5.0) == ["anna sits at 1 console", "  on base: drives scout1, not anna"]
+    assert why("console-7").lines(5.0) == ["anna is ready on base: drives scout1, not anna"]

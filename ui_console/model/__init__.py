@@ -1,0 +1,1 @@
+"""What a console knows and shows: messages in, views out. Pure."""

@@ -1,0 +1,262 @@
+"""Alarms: what an operator must know now, few enough to be read.
+
+Rules of this file: no bus, no clock, no screen; times are arguments.
+
+* An alarm is told apart by its key. The same one again counts up and has to be seen again; a condition that goes on
+  is one alarm.
+* What is over is none any more: the log has it. What merely happened fades, the sooner the less it matters.
+* While the operator was away nothing goes and nothing fades: it is marked, until somebody has seen it.
+* One cause is one line: what follows from another alarm is told below that one, and seen with it.
+* What nobody has acknowledged is never forgotten for what somebody has, nor what is so now for what is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from msgspec.structs import replace
+
+from ui_console.model.views import NONE_S, AlarmKind, AlarmView, Severity
+
+ALARMS_KEPT = 200  # chosen: more than a person reads; all of them are in the recording
+FADES_AFTER_S = {Severity.NOTICE: 20.0, Severity.WARNING: 60.0}  # chosen: read twice; a real alarm never fades
+
+AT_ONCE_S = 5.0  # chosen: a lease, and the time in which a component is back; what happens later has its own cause
+
+SEVERITIES: dict[AlarmKind, Severity] = {
+    AlarmKind.STOPPED: Severity.ALARM,
+    AlarmKind.LOST: Severity.ALARM,
+    AlarmKind.ABSENT: Severity.ALARM,
+    AlarmKind.UNSAFE: Severity.ALARM,
+    AlarmKind.RC_DOWN: Severity.ALARM,
+    AlarmKind.LINK: Severity.ALARM,
+    AlarmKind.STALE_VIDEO: Severity.WARNING,
+    AlarmKind.STARVING: Severity.WARNING,
+    AlarmKind.DEADLINE: Severity.WARNING,
+    AlarmKind.OVERLOAD: Severity.WARNING,
+    AlarmKind.TAKEN: Severity.NOTICE,
+    AlarmKind.REFUSED: Severity.NOTICE,
+    AlarmKind.NO_ANSWER: Severity.WARNING,
+    AlarmKind.NOT_RECORDED: Severity.WARNING,
+    AlarmKind.VISITOR: Severity.WARNING,
+}
+"""How much an alarm of a kind matters, unless it says otherwise itself."""
+_WEIGHT = {Severity.ALARM: 0, Severity.WARNING: 1, Severity.NOTICE: 2}
+_CAUSES = (AlarmKind.LINK, AlarmKind.ABSENT, AlarmKind.LOST, AlarmKind.RC_DOWN)
+"""Kinds from which others follow, the one that says most first."""
+_RANKS = len(_CAUSES) + 1
+
+
+class AlarmBook:
+    """The alarms of one console, or of all who share one model.
+
+    Args:
+        beside: A book whose operators' attention counts here too; None: this one has its own.
+    """
+
+    def __init__(self, beside: AlarmBook | None = None) -> None:
+        self._alarms: dict[str, AlarmView] = {}
+        self._over: set[str] = set()
+        self._beside = beside
+        self._own_away_since_s = NONE_S
+        self._now_s = NONE_S
+        self.forgotten = 0
+        """How many were dropped because there are too many."""
+
+    @property
+    def away_since_s(self) -> float:
+        """Since when nobody looks; negative: somebody does."""
+        return self._beside.away_since_s if self._beside is not None else self._own_away_since_s
+
+    def happened(
+        self,
+        kind: AlarmKind,
+        subject: str,
+        line: str,
+        at_s: float,
+        remedy: str = "",
+        key: str = "",
+        severity: Severity | None = None,
+        *,
+        lasts: bool = False,
+    ) -> None:
+        """Something happened, and with ``lasts`` is so until ``end``; told again it counts up."""
+        key, severity = key or alarm_key(kind, subject), severity or SEVERITIES[kind]
+        former = self._alarms.pop(key, None)
+        first_s, count = (former.first_s, former.count + 1) if former is not None else (at_s, 1)
+        self._alarms[key] = AlarmView(
+            key,
+            kind,
+            severity,
+            subject,
+            line,
+            remedy,
+            first_s,
+            at_s,
+            count,
+            lasts,
+            "",
+            self.away_since_s >= 0,
+            keys=[key],
+        )
+        self._over.discard(key)
+        if len(self._alarms) > ALARMS_KEPT:
+            self._forget_one()
+
+    def begin(
+        self,
+        kind: AlarmKind,
+        subject: str,
+        line: str,
+        at_s: float,
+        remedy: str = "",
+        severity: Severity | None = None,
+    ) -> None:
+        """Something is so from now on until ``end``; told again while it is so, only the words may change."""
+        key = alarm_key(kind, subject)
+        alarm = self._alarms.get(key)
+        if alarm is not None and alarm.is_active:
+            self._alarms[key] = replace(alarm, line=line, remedy=remedy, severity=severity or SEVERITIES[kind])
+        else:
+            self.happened(kind, subject, line, at_s, remedy, severity=severity, lasts=True)
+
+    def end(self, kind: AlarmKind, subject: str, at_s: float) -> None:
+        """It is no longer so: nothing is to be done about it any more."""
+        key = alarm_key(kind, subject)
+        alarm = self._alarms.get(key)
+        if alarm is not None and alarm.is_active:
+            self._alarms[key] = replace(alarm, is_active=False, last_s=at_s, remedy="")
+            self._over.add(key)
+
+    def hold(self, is_so: bool, kind: AlarmKind, subject: str, line: str, at_s: float, remedy: str = "") -> None:
+        """Begin the alarm of a condition that is so, else end it."""
+        if is_so:
+            self.begin(kind, subject, line, at_s, remedy)
+        else:
+            self.end(kind, subject, at_s)
+
+    def mended(self, kinds: Sequence[AlarmKind]) -> None:
+        """What happened of these kinds matters no longer: what was wanted has come about since."""
+        for key, alarm in self._alarms.items():
+            if alarm.kind in kinds and not alarm.is_active:
+                self._alarms[key] = replace(alarm, remedy="")
+                self._over.add(key)
+
+    def retract(self, kind: AlarmKind, subject: str) -> None:
+        """It was none: what explains it was heard later."""
+        self._alarms.pop(alarm_key(kind, subject), None)
+        self._over.discard(alarm_key(kind, subject))
+
+    def acknowledge(self, user: str, keys: Sequence[str] = ()) -> int:
+        """Note that the user has seen these alarms, or without a key all; return how many that were new to people."""
+        seen = [alarm for key, alarm in self._alarms.items() if not keys or key in keys]
+        seen = [alarm for alarm in seen if not alarm.acknowledged_by and self._is_shown(alarm)]
+        for alarm in seen:
+            self._alarms[alarm.key] = replace(alarm, acknowledged_by=user, while_away=False)
+        return len(seen)
+
+    def attention(self, is_there: bool, at_s: float) -> None:
+        """The operator came, or went."""
+        if not is_there and self._own_away_since_s < 0:
+            self._own_away_since_s = at_s
+        elif is_there:
+            self._own_away_since_s = NONE_S
+
+    def look(self, now_s: float) -> None:
+        """Let fade what time has passed over."""
+        self._now_s = max(self._now_s, now_s)
+
+    def views(self) -> list[AlarmView]:
+        """Return what is to be known: unseen ones first, then by weight, newest first."""
+        return in_order(filter(self._is_shown, self._alarms.values()))
+
+    def _is_shown(self, alarm: AlarmView) -> bool:
+        if alarm.is_active or alarm.while_away:
+            return True
+        fades_after_s = FADES_AFTER_S.get(alarm.severity)
+        is_faded = fades_after_s is not None and self._now_s - alarm.last_s > fades_after_s
+        return not (alarm.key in self._over or alarm.acknowledged_by or is_faded)
+
+    def _forget_one(self) -> None:
+        """Forget the oldest of those that matter least: seen, or over before anybody looked; then what is over."""
+
+        def weight(key: str) -> tuple[bool, bool]:
+            alarm = self._alarms[key]
+            is_unseen = not alarm.acknowledged_by and (alarm.while_away or key not in self._over)
+            return is_unseen, alarm.is_active
+
+        alarm = self._alarms.pop(min(self._alarms, key=weight))  # of equals the first, which is the oldest
+        if self._is_shown(alarm) and not alarm.acknowledged_by:
+            self.forgotten += 1
+        self._over.discard(alarm.key)
+
+
+def alarm_key(kind: AlarmKind, subject: str) -> str:
+    """Return what an alarm is known by.
+
+    Example:
+        >>> alarm_key(AlarmKind.LOST, "scout1")
+        'lost:scout1'
+    """
+    return f"{kind}:{subject}"
+
+
+def in_order(alarms: Iterable[AlarmView]) -> list[AlarmView]:
+    """Return the alarms as people read them: unseen ones first, then by weight, newest first."""
+    return sorted(alarms, key=lambda one: (bool(one.acknowledged_by), _WEIGHT[one.severity], -one.last_s))
+
+
+def one_line_for_one_cause(
+    alarms: Sequence[AlarmView], explained_by: Callable[[str], frozenset[str]]
+) -> list[AlarmView]:
+    """Return the alarms in order; those that follow from another are told with it.
+
+    Args:
+        alarms: Any.
+        explained_by: Names of that without which a subject cannot be well: its host's creator, what it uses.
+    """
+    causes = [one for one in alarms if _rank(one) < _RANKS]
+    root_of = {one.key: _cause_of(one, causes, explained_by) for one in alarms}
+    below: dict[str, list[AlarmView]] = {}
+    for one in alarms:
+        root = one
+        while (cause := root_of[root.key]) is not None:
+            root = cause
+        below.setdefault(root.key, []).append(one)
+    roots = [one for one in alarms if root_of[one.key] is None]
+    return in_order(_with(root, [one for one in below[root.key] if one is not root]) for root in roots)
+
+
+def _cause_of(
+    one: AlarmView, causes: Sequence[AlarmView], explained_by: Callable[[str], frozenset[str]]
+) -> AlarmView | None:
+    """Return the alarm from which this one follows: of a higher rank, or equal and needing less, so never in a ring."""
+    rank, needs = _rank(one), explained_by(one.subject)
+
+    def explains(cause: AlarmView) -> bool:
+        if _rank(cause) == rank:
+            return cause.subject in needs and len(explained_by(cause.subject)) < len(needs)
+        is_near = cause.subject in {one.subject, *needs}
+        is_unseen = cause.kind is AlarmKind.LINK and one.last_s >= cause.first_s  # nothing is heard, so all looks lost
+        is_at_once = cause.is_active or abs(one.last_s - cause.last_s) <= AT_ONCE_S
+        return _rank(cause) < rank and is_at_once and (is_near or is_unseen)
+
+    return min(filter(explains, causes), key=_rank, default=None)
+
+
+def _rank(alarm: AlarmView) -> int:
+    if alarm.is_active and alarm.kind in _CAUSES:
+        return _CAUSES.index(alarm.kind)
+    return len(_CAUSES) if alarm.kind is AlarmKind.LOST else _RANKS  # a fall explains what happened around it
+
+
+def _with(root: AlarmView, others: Sequence[AlarmView]) -> AlarmView:
+    if not others:
+        return root
+    return replace(
+        root,
+        also=[one.line for one in others],
+        keys=[root.key, *(one.key for one in others)],
+        acknowledged_by=root.acknowledged_by if all(one.acknowledged_by for one in others) else "",
+        while_away=root.while_away or any(one.while_away for one in others),
+    )

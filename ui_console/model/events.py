@@ -1,0 +1,378 @@
+"""What a console hears: of its own robot, and of the whole mission; each event also as a line of JSON.
+
+Rules of this file: no bus, no clock, no screen. Times are mission seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from backbone.component.messages import (
+    ComponentState,
+    MissionTime,
+    Parameters,
+    SetParameter,
+    Statistics,
+    StoryEvent,
+)
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.mission_log import Log, PeopleKnown
+from backbone.nameserver.messages import Components, Disappeared
+from backbone.operators import OperatorActed
+from backbone.picture.health import MissionHealth
+from backbone.picture.words import why_lost
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.views import Schedule, Why
+from backbone.wire import plain
+from resource_pool.arc_client import StopState
+from ui_console.model.consent import Settled, Sought, Topic
+
+
+# ---------------------------------------------------------------------- of its own robot
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A robot was asked for."""
+
+    at_s: float
+    robot: str
+    kind: str
+    priority: int
+
+
+@dataclass(frozen=True, slots=True)
+class Granted:
+    """The RCs are held; told again, with ``again``, after each suspension.
+
+    Attributes:
+        at_s: Mission time.
+        rcs: Kind → name of what is held.
+        epochs: RC → epoch.
+        until_s: The slice lasts at least until then.
+        asked_s: When it was asked for.
+        again: True if it was held before.
+    """
+
+    at_s: float
+    rcs: Mapping[str, str]
+    epochs: Mapping[str, int]
+    until_s: float
+    asked_s: float
+    again: bool
+
+    @property
+    def after_s(self) -> float:
+        """How long the grant took, from the wish on, mission seconds."""
+        return self.at_s - self.asked_s
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The RCs went to somebody else.
+
+    Attributes:
+        at_s: Mission time.
+        reason: Why.
+        by: Because of whom.
+        expected_start_s: Next expected slot; negative: unknown.
+    """
+
+    at_s: float
+    reason: str
+    by: str
+    expected_start_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class CommandApplied:
+    """A robot did what it was told, perhaps clipped.
+
+    Attributes:
+        at_s: When it was applied.
+        rc: The robot.
+        epoch: Of the grant.
+        command: ``drive``, ``halt`` or ``jump``.
+        values: After clipping.
+        took_s: From the wish to the answer, seconds of the machine; negative: not measured.
+    """
+
+    at_s: float
+    rc: str
+    epoch: int
+    command: str
+    values: Mapping[str, float]
+    took_s: float = -1.0
+
+
+@dataclass(frozen=True, slots=True)
+class CommandRefused:
+    """Somebody said no; with ``ends_claim`` to the claim itself, so that nothing is waited for any more."""
+
+    at_s: float
+    code: str
+    detail: str
+    remedy: str
+    ends_claim: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class LinkTrouble:
+    """A peer did not answer: what was asked may or may not have happened.
+
+    Attributes:
+        at_s: When.
+        detail: What was not answered, for people.
+        command: The command of this console's hands that was not answered; empty: something else.
+    """
+
+    at_s: float
+    detail: str
+    command: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class GivenBack:
+    """The robot was given back.
+
+    Attributes:
+        at_s: When.
+        reason: Why.
+        confirmed: False if nobody confirmed it.
+        wanted: False if the operator did not ask for it: a robot that is lost.
+    """
+
+    at_s: float
+    reason: str
+    confirmed: bool
+    wanted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class LetGoNeeded:
+    """A control that is held moves nothing before it is let go, or no longer so.
+
+    Attributes:
+        at_s: When.
+        is_needed: True: let go, then press anew.
+    """
+
+    at_s: float
+    is_needed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MomentBegan:
+    """A stop, a lift, a grant, a loss, or a broken link: what was pressed before it moves nothing any more."""
+
+    at_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSeen:
+    """A picture arrived."""
+
+    at_s: float
+    captured_s: float
+    robot: str
+
+
+@dataclass(frozen=True, slots=True)
+class Attention:
+    """The operator touched the console, or turned away from it.
+
+    Attributes:
+        at_s: When.
+        is_there: False: nobody is at the console.
+    """
+
+    at_s: float
+    is_there: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentAsked:
+    """This console asked whether it may have what others hold, or lift what others stopped.
+
+    Attributes:
+        at_s: When.
+        robot: What it is about.
+        of: Names of those who were asked.
+        until_s: Silence is a no from then on.
+        topic: What was asked for.
+    """
+
+    at_s: float
+    robot: str
+    of: Sequence[str]
+    until_s: float
+    topic: Topic = Topic.TAKE
+
+
+@dataclass(frozen=True, slots=True)
+class ConsentHeard:
+    """Somebody who was asked decided, or did not in time.
+
+    Attributes:
+        at_s: When.
+        robot: What it was about.
+        user: Who decided.
+        is_given: True: it is being given back, or may move.
+        reason: For people.
+        topic: What was asked for.
+    """
+
+    at_s: float
+    robot: str
+    user: str
+    is_given: bool
+    reason: str
+    topic: Topic = Topic.TAKE
+
+
+# ---------------------------------------------------------------------- of the whole mission
+Said = (
+    Schedule
+    | Leases
+    | StoryEvent
+    | Log
+    | PeopleKnown
+    | OperatorActed
+    | ComponentState
+    | Components
+    | Disappeared
+    | ProcessFell
+    | HostLoad
+    | StopState
+    | MissionTime
+    | Statistics
+    | MissionHealth
+    | Parameters
+    | SetParameter
+    | Why
+)
+"""What components publish or answer, as it came over the bus."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A message arrived.
+
+    Attributes:
+        at_s: When.
+        body: The message.
+        source: Address of the component that said it, where the message does not say of whom it speaks.
+    """
+
+    at_s: float
+    body: Said
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHeard:
+    """This console's link to the hub came or went, or was measured.
+
+    Attributes:
+        at_s: When.
+        is_up: Whether messages pass.
+        latency_s: There and back, seconds of the machine; negative: not measured now.
+        until_s: The link counts as down if nothing more was heard of it by then.
+    """
+
+    at_s: float
+    is_up: bool
+    latency_s: float = -1.0
+    until_s: float = math.inf
+
+
+OwnEvent = (
+    Asked
+    | Granted
+    | Lost
+    | CommandApplied
+    | CommandRefused
+    | LinkTrouble
+    | GivenBack
+    | LetGoNeeded
+    | MomentBegan
+    | PictureSeen
+    | Attention
+    | ConsentAsked
+    | ConsentHeard
+    | Sought
+    | Settled
+)
+TeamEvent = Heard | LinkHeard
+ConsoleEvent = OwnEvent | TeamEvent
+
+_WORDS: dict[type[Any], str] = {
+    Lost: "suspended",
+    CommandApplied: "applied",
+    CommandRefused: "refused",
+    LinkTrouble: "no_answer",
+    GivenBack: "released",
+    LetGoNeeded: "let_go",
+    MomentBegan: "moment",
+    PictureSeen: "picture",
+    ConsentAsked: "consent_asked",
+    ConsentHeard: "consent_heard",
+    Sought: "consent_sought",
+    Settled: "consent_settled",
+    LinkHeard: "link",
+    StoryEvent: "story",
+    PeopleKnown: "people",
+    OperatorActed: "operator",
+    ComponentState: "component",
+    Disappeared: "gone",
+    ProcessFell: "fell",
+    HostLoad: "load",
+    StopState: "stop",
+    MissionTime: "time",
+    Statistics: "radio",
+    MissionHealth: "health",
+    SetParameter: "set",
+}
+
+
+def event_word(event: ConsoleEvent) -> str:
+    """Return the word of an event in JSON output: ``granted``, ``suspended``, ``resumed`` and so on."""
+    if isinstance(event, Granted):
+        return "resumed" if event.again else "granted"
+    kind = type(event.body if isinstance(event, Heard) else event)
+    return _WORDS.get(kind, kind.__name__.lower())
+
+
+def event_json(event: ConsoleEvent) -> bytes:
+    """Return the event as one line of JSON, without its end.
+
+    Example:
+        >>> event_json(LinkTrouble(2.0, "scout1 did not answer"))
+        b'{"event":"no_answer","at_s":2.0,"detail":"scout1 did not answer","command":""}'
+    """
+    word = event_word(event)
+    fields = plain(event)
+    match event:
+        case Heard(body=Disappeared(address=address)):
+            fields = {"at_s": event.at_s, "address": address}
+        case Heard():
+            where = {"where": event.source} if event.source else {}
+            fields = {"at_s": event.at_s, "act" if word == "operator" else word: fields["body"], **where}
+        case Granted():
+            fields["after_s"] = event.after_s
+        case Lost():
+            fields["why"] = why_lost(event.reason, event.by)
+    return msgspec.json.encode({"event": word, **fields})
+
+
+FOR_SCRIPTS = (Schedule, StoryEvent, OperatorActed, StopState, Disappeared, ProcessFell, LinkTrouble, CommandRefused)
+"""What a program that watches a mission is told; the rest comes several times a second."""
+
+
+def for_scripts(event: ConsoleEvent) -> list[bytes]:
+    """Return the event as one line of JSON if it is one for programs that watch, else none."""
+    said = event.body if isinstance(event, Heard) else event
+    return [event_json(event)] if isinstance(said, FOR_SCRIPTS) else []

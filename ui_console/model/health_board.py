@@ -1,0 +1,70 @@
+"""What a console knows of the mission's health, and the alarms that follow from it.
+
+Rules of this file: no bus, no clock, no screen; times are arguments. The launcher says every second how its mission
+is; a word that is too old counts no longer: then the mission is at best degraded, because the launcher is silent.
+"""
+
+from __future__ import annotations
+
+from backbone.component.messages import Absence
+from backbone.picture.health import SILENT_AFTER_S, HealthWord, MissionHealth
+from ui_console.model.alarms import AlarmBook
+from ui_console.model.views import AlarmKind, HealthView, Severity
+
+LAUNCHER_NAME = "launcher"
+REMEDY = "Look after the terminal of 'scout-backbone up'; 'scout-backbone down' ends the mission."
+
+
+class HealthBoard:
+    """The newest word on the mission's health.
+
+    Args:
+        alarms: Where absences begin and end.
+    """
+
+    def __init__(self, alarms: AlarmBook) -> None:
+        self._alarms = alarms
+        self.rate = 1.0
+        """Mission seconds per second of the machine."""
+        self._said: MissionHealth | None = None
+        self._said_s: float | None = None  # or since when it is waited for
+        self._absent: frozenset[str] = frozenset()
+
+    def take(self, said: MissionHealth, at_s: float) -> None:
+        """Take the launcher's word in."""
+        self._said, self._said_s = said, at_s
+        self._tell(said.absent, at_s)
+
+    def look(self, now_s: float) -> None:
+        """Find out whether the launcher is silent; its first word is waited for from the first look on."""
+        if self._said_s is None:
+            self._said_s = now_s
+        silence = self._silence(now_s)
+        if silence is not None and LAUNCHER_NAME not in self._absent:
+            self._tell([*(self._said.absent if self._said is not None else []), silence], now_s)
+
+    def view(self, now_s: float) -> HealthView | None:
+        """Return the word and one line for each absence; None: the launcher had no time yet to say anything."""
+        said, silence = self._said, self._silence(now_s)
+        if silence is None:
+            return HealthView(str(said.word), said.lines(now_s)) if said else None
+        is_failed = said is not None and said.word is HealthWord.FAILED
+        word = HealthWord.FAILED if is_failed else HealthWord.DEGRADED
+        return HealthView(str(word), MissionHealth(word, [silence, *(said.absent if said else ())]).lines(now_s))
+
+    def _silence(self, now_s: float) -> Absence | None:
+        if self._said_s is None or now_s <= self._said_s + SILENT_AFTER_S * self.rate:
+            return None
+        return Absence(LAUNCHER_NAME, self._said_s, "it is silent, so what is shown may be old", "", REMEDY, vital=True)
+
+    def _tell(self, absent: list[Absence], at_s: float) -> None:
+        """Begin an alarm for each absence, and end those of what is back."""
+        for absence in absent:
+            what = "; ".join(part for part in (absence.cause, absence.doing) if part)
+            line = f"{absence.name} is absent: {what}"
+            severity = Severity.ALARM if absence.vital or not absence.doing else Severity.WARNING
+            self._alarms.begin(AlarmKind.ABSENT, absence.name, line, absence.since_s, absence.remedy, severity=severity)
+        names = frozenset(absence.name for absence in absent)
+        for name in self._absent - names:
+            self._alarms.end(AlarmKind.ABSENT, name, at_s)
+        self._absent = names

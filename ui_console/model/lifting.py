@@ -1,0 +1,149 @@
+"""Whose stop is it, and who is asked before it is lifted?
+
+Rules of this file: no bus, no clock, no screen. Why it is so: docs/decisions/0018.
+
+* To stop is one act, to lift another. A lift names the stop that was seen by its number: a newer one is never lifted.
+* Your own stop is lifted at once. Whoever else stopped the robot is asked first, each of them.
+* One no keeps the stop, and so does silence. Whoever left cannot be asked, and keeps no robot standing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+
+from backbone.naming import component_of
+from backbone.ranges import Mention
+from backbone.wire import Message
+from resource_pool.arc_client import Stopper, StopState
+from ui_console.model.consent import MAX_WHY, Consent
+
+
+class AskLift(Message, frozen=True):
+    """May this robot move again? Asked where it was stopped, and everywhere else if its author left that console.
+
+    Attributes:
+        robot: Which.
+        author: Who stopped it: the one who decides.
+        console: By which console.
+        user: Who asks.
+        why: For people.
+    """
+
+    robot: Mention
+    author: Mention
+    console: Mention
+    user: Mention
+    why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)] = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LiftNow:
+    """Nobody else has a say in it."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskFirst:
+    """These decide; the stop is lifted if each of them says yes or has left."""
+
+    authors: tuple[Stopper, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NotThatStop:
+    """The stop that was seen is not the one in force; nothing is lifted."""
+
+    line: str
+
+
+LiftDecision = LiftNow | AskFirst | NotThatStop
+
+
+def decide_lift(stop: StopState, number: int, user: str, console: str) -> LiftDecision:
+    """Return what lifting this stop takes.
+
+    Args:
+        stop: How the robot is, as its RC says.
+        number: Of the stop that was seen on the screen.
+        user: Who wants to lift it.
+        console: Address of the console they sit at.
+    """
+    if not stop.is_stopped:
+        return NotThatStop(f"{stop.rc} is not stopped any more")
+    if number != stop.number:
+        who = ", ".join(author_name(author) for author in authors(stop))
+        return NotThatStop(f"{stop.rc} was stopped again since, by {who}: look at that stop first")
+    others = tuple(author for author in authors(stop) if not _is(author, user, console) and author.console)
+    return AskFirst(others) if others else LiftNow()
+
+
+def answer_of(author: Stopper, answers: Iterable[Consent]) -> Consent:
+    """Return what an author says who was asked at several consoles: one yes is a yes, and who is at none has left."""
+    here = [answer for answer in answers if answer.is_here]
+    left = Consent(True, author_name(author), "is not here any more", False)
+    return next((answer for answer in here if answer.is_given), here[0] if here else left)
+
+
+def is_agreed(answers: Iterable[Consent]) -> bool:
+    """Return whether the stop is lifted after these answers of all who were asked."""
+    return all(answer.is_given for answer in answers)
+
+
+def authors(stop: StopState) -> tuple[Stopper, ...]:
+    """Return all who stopped the robot since it last moved, the first of them first."""
+    return Stopper(stop.by, stop.console), *stop.also
+
+
+def author_name(author: Stopper) -> str:
+    """Return what to call them, for people; consoles without a person by the console's name."""
+    return component_of(author.by) if "/" in author.by else author.by
+
+
+def is_own(stop: StopState, user: str, console: str) -> bool:
+    """Return whether this operator stopped the robot, and nobody else did."""
+    return all(_is(author, user, console) for author in authors(stop))
+
+
+def lift_line(stop: StopState, user: str, console: str, is_there: Callable[[Stopper], bool]) -> str:
+    """Return in one line for people what it takes to lift the stop.
+
+    Args:
+        stop: In force.
+        user: Who may want to lift it.
+        console: Address of the console they sit at.
+        is_there: Says whether this author is there, as far as is known.
+    """
+    match decide_lift(stop, stop.number, user, console):
+        case AskFirst(others) if names := _names(author for author in others if is_there(author)):
+            return f"asks {_joined(names)} first"
+        case AskFirst(others):
+            names = _names(others)
+            return f"{_joined(names)} {'is' if len(names) == 1 else 'are'} not here any more"
+        case _:
+            return "hold to lift"
+
+
+def question_line(user: str, robot: str, why: str) -> str:
+    """Return what an author is asked, in one sentence.
+
+    Example:
+        >>> question_line("ben", "scout1", "")
+        'ben asks whether scout1, which you stopped, may move again'
+    """
+    return f"{user} asks whether {robot}, which you stopped, may move again{f': {why}' if why else ''}"
+
+
+def _is(author: Stopper, user: str, console: str) -> bool:
+    return author.by in (user, console)
+
+
+def _names(of: Iterable[Stopper]) -> list[str]:
+    return list(dict.fromkeys(author_name(author) for author in of))
+
+
+def _joined(names: Sequence[str]) -> str:
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last

@@ -1,0 +1,196 @@
+"""Driving by a script: one JSON object a line, each with the time since the grant at which it holds.
+
+``{"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}`` drives until the next line, ``{"at_s": 1, "halt":
+true}`` stops, ``{"at_s": 2, "jump": true}`` jumps, ``{"at_s": 3, "release": true}`` gives the robot
+back. The end of the script releases too. ``{"stop_robot": "scout2", "reason": "a child"}`` and ``{"stop_all": true}``
+are emergency stops; without ``at_s`` they count as soon as they are read from a pipe, also before the grant.
+
+Rules of this file: no bus, no clock, no files. Times are mission seconds since the grant.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import msgspec
+
+from backbone.errors import Refusal
+from ui_console.model.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
+
+
+class WrongScript(Refusal):
+    """A line of the script cannot be carried out; facts: ``line``."""
+
+    code = "script.line"
+    remedy = (
+        'Write one JSON object a line: {"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}, or with "halt", "jump", '
+        '"release" or "stop_all": true, or "stop_robot": NAME; at_s never decreases.'
+    )
+
+
+class _Line(msgspec.Struct, forbid_unknown_fields=True):
+    at_s: float | None = None
+    left_rad_s: float | None = None
+    right_rad_s: float | None = None
+    halt: bool = False
+    jump: bool = False
+    release: bool = False
+    stop_robot: str = ""
+    stop_all: bool = False
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One line of a script: from this time since the grant, this is wanted.
+
+    Attributes:
+        at_s: That time.
+        wish: What is wanted.
+        at_once: True: if it comes from a pipe, it is wanted now.
+    """
+
+    at_s: float
+    wish: Wish
+    at_once: bool = False
+
+
+class ScriptReader:
+    """Reads a script line by line, so that it can also come from a pipe while the robot drives."""
+
+    def __init__(self) -> None:
+        self._number, self._last_s, self._released = 0, 0.0, False
+
+    def read(self, text: str) -> Step | None:
+        """Return the step of the next line, None for an empty one.
+
+        Raises:
+            WrongScript: With the line's number and what is wrong with it.
+        """
+        self._number += 1
+        if not text.strip():
+            return None
+        try:
+            line = msgspec.json.decode(text, type=_Line)
+        except msgspec.DecodeError as error:
+            raise self._wrong(str(error)) from None
+        wish, at_s = self._wish(line), self._last_s if line.at_s is None else line.at_s
+        if line.at_s is None and not isinstance(wish, StopRobot | StopAll):
+            raise self._wrong("at_s is missing")
+        if not (math.isfinite(at_s) and at_s >= self._last_s):
+            raise self._wrong(f"at_s {at_s:g} comes after {self._last_s:g}")
+        if self._released:
+            raise self._wrong("nothing can follow a release")
+        self._last_s, self._released = at_s, isinstance(wish, GiveBack)
+        return Step(at_s, wish, line.at_s is None)
+
+    def _wish(self, line: _Line) -> Wish:
+        drives = (line.left_rad_s, line.right_rad_s) != (None, None)
+        wished = [drives, line.halt, line.jump, line.release, bool(line.stop_robot), line.stop_all]
+        if wished.count(True) != 1:
+            raise self._wrong("exactly one of: both wheel speeds, halt, jump, release, stop_robot, stop_all")
+        if line.stop_robot:
+            return StopRobot(line.stop_robot, line.reason)
+        if line.stop_all:
+            return StopAll(line.reason)
+        if line.halt:
+            return Halt()
+        if line.jump:
+            return Jump()
+        if line.release:
+            return GiveBack()
+        if line.left_rad_s is None or line.right_rad_s is None:
+            raise self._wrong("left_rad_s and right_rad_s belong together")
+        if not (math.isfinite(line.left_rad_s) and math.isfinite(line.right_rad_s)):
+            raise self._wrong("a wheel speed is not finite")
+        return Drive(line.left_rad_s, line.right_rad_s)
+
+    def _wrong(self, what: str) -> WrongScript:
+        return WrongScript(f"script line {self._number}: {what}", line=self._number)
+
+
+def read_script(text: str) -> list[Step]:
+    """Return all steps of a script.
+
+    Raises:
+        WrongScript: For the first wrong line.
+
+    Example:
+        >>> read_script('{"at_s": 0, "halt": true}')
+        [Step(at_s=0.0, wish=Halt())]
+    """
+    reader = ScriptReader()
+    return [step for line in text.splitlines() if (step := reader.read(line)) is not None]
+
+
+class ScriptPlayer:
+    """Turns steps and time into commands.
+
+    Laws: no command before its time; a drive is repeated until the next line, as commands end by
+    themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no drive and
+    no jump before a halt: what a hand does by letting go, a script does by that line.
+    """
+
+    def __init__(self, steps: list[Step] | None = None) -> None:
+        self._steps = deque(steps or [])
+        self._ended = steps is not None
+        self._drive: Drive | None = None
+        self._next_s = 0.0
+        self._over = self.must_let_go = False
+        self.held_back = 0
+        """How many lines were left out because no halt came before them."""
+
+    def require_let_go(self) -> None:
+        """From now on lines move nothing before one of them halts."""
+        self._drive, self.must_let_go = None, True
+
+    @property
+    def is_over(self) -> bool:
+        """True when the robot is to be given back or was."""
+        return self._over
+
+    def add(self, step: Step) -> None:
+        """Another step arrived; one whose time has passed is due at once."""
+        self._steps.append(step)
+
+    def end(self) -> None:
+        """No step will follow."""
+        self._ended = True
+
+    def due(self, since_grant_s: float) -> list[Wish]:
+        """Return what is to be done now, in order; asking counts as doing.
+
+        Args:
+            since_grant_s: Mission seconds since the grant.
+        """
+        wishes: list[Wish] = []
+        while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
+            wish = self._steps.popleft().wish
+            self.must_let_go = self.must_let_go and not isinstance(wish, Halt)
+            if self.must_let_go and isinstance(wish, Drive | Jump):
+                self.held_back += 1
+                continue
+            self._over = isinstance(wish, GiveBack)
+            if isinstance(wish, Drive | Halt | GiveBack):
+                self._drive = wish if isinstance(wish, Drive) else None
+            self._next_s = since_grant_s + REPEAT_EVERY_S
+            wishes.append(wish)
+        if self._ended and not self._steps and not self._over:
+            self._over = True
+            wishes.append(GiveBack())
+        if not wishes and self._drive is not None and since_grant_s >= self._next_s:
+            self._next_s = since_grant_s + REPEAT_EVERY_S
+            wishes.append(self._drive)
+        return wishes
+
+    @property
+    def next_s(self) -> float | None:
+        """Seconds since the grant at which something is due next; None: not before another step arrives."""
+        if self._over:
+            return None
+        times = [self._steps[0].at_s] if self._steps else [0.0] if self._ended else []
+        if self._drive is not None:
+            times.append(self._next_s)
+        return min(times, default=None)

@@ -1,0 +1,126 @@
+"""The behavior tree as a console's table shows it.
+
+Rules of this file: no bus, no clock, no screen. It remembers what schedules and stories tell of nodes; which nodes
+there are, and which are lost, it is told when it is looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.naming import Subsystem, component_of
+from backbone.people import People
+from backbone.picture.words import because
+from backbone.scheduling.requests import RequestState
+from backbone.scheduling.views import RequestView, Schedule
+from ui_console.model.views import NodeState, NodeView
+
+_STATE_OF_REQUEST = {
+    RequestState.RUNNING: NodeState.RUNNING,
+    RequestState.REVOKING: NodeState.RUNNING,
+    RequestState.CONNECTING: NodeState.WAITING,
+    RequestState.WAITING: NodeState.WAITING,
+    RequestState.IDLE: NodeState.IDLE,
+}
+
+
+class TreeBoard:
+    """What is known of the nodes.
+
+    Args:
+        people: Who sits at which console.
+    """
+
+    def __init__(self, people: People) -> None:
+        self._people = people
+        self._finished: dict[str, tuple[float, NodeState]] = {}
+        self._priorities: dict[str, int] = {}
+
+    def scheduled(self, schedule: Schedule) -> None:
+        """Take in the priorities of all nodes that asked for something."""
+        self._priorities |= _priorities(schedule.requests)
+
+    def told(self, story: StoryEvent) -> None:
+        """Take in that a node finished, if it says so of itself."""
+        head, _, status = story.what.partition(": ")
+        if head == "finished" and component_of(story.where) == story.subject and status in ("success", "failure"):
+            self._finished[story.subject] = (story.at_s, NodeState(status))
+
+    def begins(self, name: str) -> None:
+        """Forget how a node of this name finished: another life of it begins."""
+        self._finished.pop(name, None)
+
+    def forget(self, name: str) -> None:
+        """Forget one that left for good."""
+        self._finished.pop(name, None)
+        self._priorities.pop(name, None)
+
+    def views(
+        self, components: Iterable[ComponentState], lost: Mapping[str, float], schedule: Schedule | None
+    ) -> list[NodeView]:
+        """Return the nodes, parents before children, siblings of higher priority first.
+
+        Args:
+            components: Of the mission; behaviors among them are nodes.
+            lost: Since when which addresses are lost.
+            schedule: As last heard.
+        """
+        requests = {component_of(request.owner): request for request in (schedule.requests if schedule else [])}
+        nodes = {node.address: node for node in components if node.address.startswith(f"{Subsystem.MISSION_CONTROL}/")}
+        below: dict[str, list[ComponentState]] = {}
+        for node in nodes.values():
+            below.setdefault(node.requester if node.requester in nodes else "", []).append(node)
+        views: list[NodeView] = []
+        pending = [(root, 0) for root in self._in_order(below.get("", []))]
+        shown: set[str] = set()
+        while pending:
+            node, depth = pending.pop(0)
+            if node.address in shown:
+                continue
+            shown.add(node.address)
+            views.append(self._view(node, depth, lost.get(node.address), requests.get(component_of(node.address))))
+            pending[:0] = [(child, depth + 1) for child in self._in_order(below.get(node.address, []))]
+        return views
+
+    def _view(
+        self, node: ComponentState, depth: int, lost_since_s: float | None, request: RequestView | None
+    ) -> NodeView:
+        name, state, since_s = component_of(node.address), NodeState.RUNNING, node.since_s
+        if lost_since_s is not None:
+            state, since_s = NodeState.LOST, lost_since_s
+        elif name in self._finished:
+            since_s, state = self._finished[name]
+        elif node.state is LifeState.CONNECTING:
+            state = NodeState.STARTING
+        elif request is not None:
+            state, since_s = _STATE_OF_REQUEST[request.state], request.since_s
+        return NodeView(
+            name,
+            node.type,
+            component_of(node.requester) if depth else "",
+            depth,
+            self._priorities.get(name),
+            state,
+            since_s,
+            self._people.named(node.feedback),
+            request.arc if request is not None else "",
+            because(request, self._people) if request is not None else "",
+        )
+
+    def _in_order(self, nodes: Sequence[ComponentState]) -> list[ComponentState]:
+        def order(node: ComponentState) -> tuple[int, str]:
+            return -self._priorities.get(component_of(node.address), 0), node.address
+
+        return sorted(nodes, key=order)
+
+
+def _priorities(requests: Iterable[RequestView]) -> dict[str, int]:
+    """Return the priorities of all nodes on the paths of these requests."""
+    found: dict[str, int] = {}
+    for request in requests:
+        for step in request.priority.split("/"):
+            name, _, number = step.rpartition(":")
+            if name and number.lstrip("-").isdecimal():
+                found[name] = int(number)
+    return found

@@ -1,0 +1,428 @@
+"""What screens show, as plain values: messages by the names of people, and a struct for each other kind of row.
+
+Times ending in ``_s`` are mission seconds; ages, and what is left, are seconds counted from the view's ``now_s``. A
+negative time, age or rest means that there is none.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Any
+
+import msgspec
+
+from backbone.component.messages import ComponentState, StoryEvent
+from backbone.creator.messages import HostLoad
+from backbone.scheduling.views import RequestView
+from backbone.wire import plain
+
+NONE_S = -1.0
+"""In place of a time, an age or a rest: there is none."""
+
+
+class Severity(StrEnum):
+    """How much an alarm matters, most first."""
+
+    ALARM = "alarm"  # a robot may do what it should not, or nothing any more
+    WARNING = "warning"  # the mission goes on, less well
+    NOTICE = "notice"  # an operator should know
+
+
+class AlarmKind(StrEnum):
+    """What an alarm is about."""
+
+    STOPPED = "stopped"  # an operator stopped a robot
+    LOST = "lost"  # a component is gone that nobody ended
+    ABSENT = "absent"  # a component is wanted and absent
+    UNSAFE = "unsafe"  # an RC did not reach its safe state
+    RC_DOWN = "rc_down"  # the RC manager cannot reach an RC
+    LINK = "link"  # this console has no link to the hub
+    STALE_VIDEO = "stale_video"  # the picture driven by is old
+    STARVING = "starving"  # a request waits long and no end is in sight
+    DEADLINE = "deadline"  # packets on a radio come too late
+    OVERLOAD = "overload"  # a host has no time to spare
+    TAKEN = "taken"  # this console's robot went to somebody else
+    REFUSED = "refused"  # somebody said no to this console
+    NO_ANSWER = "no_answer"  # somebody did not answer this console
+    NOT_RECORDED = "not_recorded"  # the trace of the schedule cannot be written any more
+    VISITOR = "visitor"  # somebody who was not let in, or misbehaves, at the web console
+
+
+class StopView(msgspec.Struct, frozen=True):
+    """An operator's stop that is in force.
+
+    Attributes:
+        number: To lift it by.
+        reason: As given.
+        age_s: For how long.
+        is_confirmed: False if the wheels may still turn for a moment.
+        by_user: Who stopped it first, for people.
+        also: Who else stopped it since, for people.
+        is_mine: True if this operator stopped it, and nobody else.
+        lift_line: What lifting it needs, for people.
+    """
+
+    number: int
+    reason: str
+    age_s: float
+    is_confirmed: bool
+    by_user: str
+    also: list[str]
+    is_mine: bool
+    lift_line: str
+
+
+class VideoView(msgspec.Struct, frozen=True):
+    """Pictures of one robot as they arrive at this console.
+
+    Attributes:
+        robot: The robot.
+        age_s: Since the newest was taken.
+        rate_hz: How many arrived a second lately.
+        latency_s: From capture to here, of the newest.
+        is_stale: True: do not drive by it.
+    """
+
+    robot: str
+    age_s: float
+    rate_hz: float
+    latency_s: float
+    is_stale: bool
+
+
+class RobotView(msgspec.Struct, frozen=True):
+    """One robot.
+
+    Attributes:
+        robot: Its name.
+        number: Its place in the list, from 1; the key that picks it.
+        is_up: False if its RC cannot be reached.
+        holder: Decision process that has it; empty: nobody.
+        arc: The holder's ARC.
+        is_console: True if the holder is a console.
+        is_mine: True if this console has it.
+        priority: The holder's priority path, ``mission:10/surveillance:5/watch-scout1:3``.
+        epoch: Of the grant.
+        since_s: Since when.
+        until_s: End of the slice.
+        lease_left_s: Until the hold ends unless it is renewed.
+        lease_age_s: Since the last renewal was heard.
+        because: Why the holder has it.
+        waiting: Who wants it, the next first.
+        stop: The operator's stop in force; None: it may move.
+        video: Its pictures; None: this console gets none.
+        feedback: What its RC says.
+    """
+
+    robot: str
+    number: int
+    is_up: bool
+    waiting: list[str]
+    stop: StopView | None
+    feedback: str
+    holder: str = ""
+    arc: str = ""
+    is_console: bool = False
+    is_mine: bool = False
+    priority: str = ""
+    epoch: int = 0
+    since_s: float = NONE_S
+    until_s: float = NONE_S
+    lease_left_s: float = NONE_S
+    lease_age_s: float = NONE_S
+    because: str = ""
+    video: VideoView | None = None
+
+
+class NodeState(StrEnum):
+    """How a node of the behavior tree is."""
+
+    RUNNING = "running"  # holds its ARC, or needs none
+    WAITING = "waiting"  # wants its ARC
+    IDLE = "idle"  # wants no time now
+    SUCCESS = "success"
+    FAILURE = "failure"
+    STARTING = "starting"
+    LOST = "lost"
+
+
+class NodeView(msgspec.Struct, frozen=True):
+    """A node of the behavior tree; they come parents before children, siblings of higher priority first.
+
+    Attributes:
+        name: Of the node and its component.
+        type: Component type.
+        parent: Name of its parent; empty for a root.
+        depth: 0 for a root.
+        priority: Among its siblings, as far as it is known; None: nothing at or below it ever asked for an ARC.
+        state: How it is.
+        since_s: Since when.
+        feedback: What it says it is doing.
+        arc: What it claims; empty: nothing yet.
+        because: Why its ARC waits or runs.
+    """
+
+    name: str
+    type: str
+    parent: str
+    depth: int
+    priority: int | None
+    state: NodeState
+    since_s: float
+    feedback: str
+    arc: str
+    because: str
+
+
+class Certainty(StrEnum):
+    """Which part of the timeline a slice is in."""
+
+    PAST = "past"
+    NOW = "now"
+    NEXT = "next"  # predicted
+
+
+class SliceView(msgspec.Struct, frozen=True):
+    """Somebody's turn with a resource.
+
+    Attributes:
+        who: Decision process.
+        arc: Its ARC.
+        epoch: Of the grant; 0 for one that is predicted.
+        from_s: Begin.
+        to_s: End; of a running one the end of its slice, of a predicted one its shortest.
+        certainty: Past, now or next.
+        is_console: True if it is a console's.
+    """
+
+    who: str
+    arc: str
+    epoch: int
+    from_s: float
+    to_s: float
+    certainty: Certainty
+    is_console: bool
+
+
+class TimelineRow(msgspec.Struct, frozen=True):
+    """One resource over time; slices by their begin."""
+
+    rc: str
+    kind: str
+    is_sharable: bool
+    slices: list[SliceView]
+
+
+class TimelineView(msgspec.Struct, frozen=True):
+    """Who had which resource, who has it, who comes next."""
+
+    from_s: float
+    now_s: float
+    to_s: float
+    rows: list[TimelineRow]
+
+
+class AlarmView(msgspec.Struct, frozen=True):
+    """One alarm.
+
+    Attributes:
+        key: What it is acknowledged by.
+        kind: What it is about.
+        severity: How much it matters.
+        subject: Name to ask ``why`` about.
+        line: What happened.
+        remedy: What to do about it now; empty: nothing, or it is over.
+        first_s: When it happened first.
+        last_s: When it happened last, or since when it has been over.
+        count: How often.
+        is_active: True while it is so; False: it is over, or was an event.
+        acknowledged_by: Who has seen it; empty: nobody.
+        while_away: True if it came while the operator was away and is not acknowledged.
+        where: Where to look, for people: what the subject is, on which machine; empty: nowhere.
+        robot: The robot it is about, whose row and picture to show; empty: none.
+        also: What follows from the same cause, one line each.
+        keys: What this line and those are acknowledged by.
+    """
+
+    key: str
+    kind: AlarmKind
+    severity: Severity
+    subject: str
+    line: str
+    remedy: str
+    first_s: float
+    last_s: float
+    count: int
+    is_active: bool
+    acknowledged_by: str
+    while_away: bool
+    where: str = ""
+    robot: str = ""
+    also: list[str] = []
+    keys: list[str] = []
+
+
+class HostView(msgspec.Struct, frozen=True):
+    """One machine of the mission: what its creator said, so many seconds ago."""
+
+    load: HostLoad
+    age_s: float
+
+
+class LinkView(msgspec.Struct, frozen=True):
+    """A way that messages go.
+
+    Attributes:
+        name: ``hub``; ``commands`` to this console's robot; a radio's name.
+        is_up: False if nothing passes.
+        latency_s: There and back.
+        feedback: More about it for people.
+    """
+
+    name: str
+    is_up: bool
+    latency_s: float
+    feedback: str
+
+
+class ParameterView(msgspec.Struct, frozen=True):
+    """One parameter of a component, as last heard.
+
+    Attributes:
+        component: Name of the component.
+        address: Its address.
+        name: Name of the parameter.
+        value: As JSON.
+        before: As JSON, before the change that this console saw; empty: it saw none.
+        changed_by: Who changed it.
+        changed_s: When.
+    """
+
+    component: str
+    address: str
+    name: str
+    value: str
+    before: str = ""
+    changed_by: str = ""
+    changed_s: float = NONE_S
+
+
+class ConsentView(msgspec.Struct, frozen=True):
+    """Somebody asks for what this console holds, or to lift what its operator stopped.
+
+    Attributes:
+        user: Who.
+        robot: For what.
+        why: Why, for people.
+        left_s: Seconds until silence is a no.
+        others: How many more ask.
+        topic: ``take``: to have the robot; ``lift``: to let it move again.
+        line: The question in one sentence, for people.
+    """
+
+    user: str
+    robot: str
+    why: str
+    left_s: float
+    others: int
+    topic: str
+    line: str
+
+
+class LostView(msgspec.Struct, frozen=True):
+    """A robot that this operator held, and that went without their asking for it.
+
+    Attributes:
+        robot: Which.
+        why: For people.
+        at_s: When.
+        may_retake: True if taking it can be offered: it is there, and this console does not ask for one already.
+    """
+
+    robot: str
+    why: str
+    at_s: float
+    may_retake: bool
+
+
+class OwnView(msgspec.Struct, frozen=True):
+    """What this console wants and has.
+
+    Attributes:
+        console: Its name.
+        user: Who sits at it.
+        robot: Robot wanted or held; empty: any, or none.
+        is_held: True: keys move it; never while the link is down.
+        is_asked: True: it is wanted.
+        status: In one line: whether it is held, and if not, why.
+        epoch: Of the grant; 0: none.
+        until_s: End of the slice.
+        taken_because: Why and by whom it was taken, while it is.
+        applied: The last command that was applied, for people.
+        stop: The stop in force on the robot held; None: it may move.
+        away_since_s: Since when the operator is away.
+        consent: What this operator is asked; None: nothing.
+        asked: In one line what came of asking others; empty: nobody was asked.
+        other_screens: Where else the same person sits, one line each: one person with several screens.
+        must_let_go: True: a control is held that moves nothing before it is let go and pressed anew.
+        lost: The robot that went without the operator asking for it, until they take one or dismiss it.
+        link_down_s: Since when this console hears nothing from the mission's hub; negative: the link is up.
+        moment: Grows with each stop, lift, grant and loss; a press that began at an earlier one moves nothing.
+    """
+
+    console: str
+    user: str
+    robot: str
+    is_held: bool
+    is_asked: bool
+    status: str
+    epoch: int
+    until_s: float
+    taken_because: str
+    applied: str
+    stop: StopView | None
+    away_since_s: float
+    consent: ConsentView | None = None
+    asked: str = ""
+    other_screens: list[str] = []
+    must_let_go: bool = False
+    lost: LostView | None = None
+    link_down_s: float = NONE_S
+    moment: int = 0
+
+
+class HealthView(msgspec.Struct, frozen=True):
+    """How the mission is.
+
+    Attributes:
+        word: ``ok``, ``degraded`` or ``failed``.
+        lines: What is wanted and absent, since when, why, and what is done about it; one line each.
+    """
+
+    word: str
+    lines: list[str]
+
+
+class ConsoleView(msgspec.Struct, frozen=True):
+    """All that a console shows at one moment."""
+
+    mission: str
+    now_s: float
+    own: OwnView
+    robots: list[RobotView]
+    tree: list[NodeView]
+    requests: list[RequestView]
+    timeline: TimelineView
+    alarms: list[AlarmView]
+    hosts: list[HostView]
+    links: list[LinkView]
+    videos: list[VideoView]
+    parameters: list[ParameterView]
+    components: list[ComponentState]
+    log: list[StoryEvent]
+    health: HealthView | None = None
+
+
+def view_json(view: Any) -> bytes:
+    """Return any view as JSON, messages in it too with their fields by name."""
+    return msgspec.json.encode(plain(view))

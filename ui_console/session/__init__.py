@@ -1,0 +1,1 @@
+"""One console in a mission: what it hears and says on the bus, and the devices that drive it."""

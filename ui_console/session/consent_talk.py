@@ -1,0 +1,167 @@
+"""The talk about one console's robot: may I have it, asked and answered over the bus; the rules are in ``consent``.
+
+Both sides are here, for a console that waits today holds tomorrow.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any
+
+from backbone.component.messages import LogLevel
+from backbone.errors import LinkError, NoResponder, Refusal, code_of
+from backbone.naming import component_of
+from backbone.operators import OperatorAction
+from backbone.people import is_console
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule
+from backbone.scheduling.views import Schedule
+from ui_console.model.consent import (
+    CONSENT_WITHIN_S,
+    MAX_WHY,
+    AskConsent,
+    Consent,
+    NobodyToAsk,
+    Settled,
+    Topic,
+    require_console,
+)
+from ui_console.model.events import (
+    CommandRefused,
+    ConsentAsked,
+    ConsentHeard,
+    LinkTrouble,
+)
+from ui_console.session.feed import REPLY_TIME_S
+from ui_console.session.observer import Observer
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What a console waits for.
+
+    Attributes:
+        arc: Name of its ARC.
+        robot: The robot it wishes; empty: any.
+        called: What the robot is called, for people.
+        since_s: When it was asked for.
+    """
+
+    arc: str
+    robot: str
+    called: str
+    since_s: float
+
+
+class ConsentTalk:
+    """The questions a console asks, and those it is asked.
+
+    Args:
+        console: Whose they are.
+        give_back: Gives the robot back for the reason it is called with; returns when that is done.
+    """
+
+    def __init__(self, console: Observer[Any], give_back: Callable[[str], Awaitable[None]]) -> None:
+        self._console, self._give_back = console, give_back
+        console.answers.yield_robot = self._begin_to_yield
+        self._unanswered = 0
+
+    # ------------------------------------------------------------------ who waits
+    def begin_ask(self, claim: Claim | None, why: str = "") -> None:
+        """Ask whoever holds what is waited for; what they say is shown. Nothing if they are being asked.
+
+        Args:
+            claim: What is waited for; None: nothing.
+            why: For people; empty: how long it has been waited for.
+        """
+        if self._unanswered == 0:
+            self._unanswered = 1
+            self._console.start_task(self._ask(claim, why), "consent")
+
+    async def _ask(self, claim: Claim | None, why: str) -> None:
+        console = self._console
+        now_s = console.clock.now_s
+        try:
+            holders = await self._who_holds(claim)
+        except Refusal as refusal:
+            self._unanswered = 0
+            console.show(CommandRefused(now_s(), code_of(refusal), refusal.detail, refusal.remedy))
+            return
+        except LinkError as error:
+            self._unanswered = 0
+            console.show(LinkTrouble(now_s(), str(error)))
+            return
+        assert claim is not None  # noqa: S101  who waits for nothing was refused
+        self._unanswered = len(holders)
+        names = [component_of(holder) for holder in holders]
+        why = (why or f"waits since {now_s() - claim.since_s:.0f} s")[:MAX_WHY]
+        console.acted(OperatorAction.ASK_CONSENT, claim.called, f"of {', '.join(names)}, {why}")
+        console.show(ConsentAsked(now_s(), claim.called, names, now_s() + CONSENT_WITHIN_S * console.clock.rate))
+        question = AskConsent(claim.called, console.user, why)
+        await asyncio.gather(*(self._ask_one(holder, question) for holder in holders))
+
+    async def _who_holds(self, claim: Claim | None) -> list[str]:
+        """Return the addresses of the consoles that hold the robot, or else stand directly in the way.
+
+        Raises:
+            NobodyToAsk: There is none, or nothing is waited for.
+            LinkError: The RC manager did not answer.
+        """
+        console = self._console
+        if claim is None:
+            raise NobodyToAsk(f"{console.user} does not wait for a robot", remedy="Take the robot first.")
+        schedule = await console.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
+        owners = {request.arc: request.owner for request in schedule.requests}
+        arcs = {arc for one in schedule.requests if one.arc == claim.arc for arc in one.blockers}
+        arcs |= {holder.arc for rc in schedule.rcs if rc.rc == claim.robot for holder in rc.holders}
+        blockers = {owners[arc] for arc in arcs - {claim.arc} if arc in owners}
+        consoles = sorted(at for at in blockers if is_console(at) and at != console.address)
+        if not consoles:
+            names = ", ".join(sorted(map(component_of, blockers))) or "nobody"
+            raise NobodyToAsk(f"no operator stands in the way of {console.user}, but {names}")
+        return consoles
+
+    async def _ask_one(self, holder: str, question: AskConsent) -> None:
+        console = self._console
+        try:
+            consent = await console.bus.ask(holder, question, Consent, within_s=CONSENT_WITHIN_S + REPLY_TIME_S)
+        except NoResponder:  # a console that is gone holds nothing: its ARC ends with it
+            consent = Consent(True, component_of(holder), "is gone")
+        except LinkError:
+            consent = Consent(False, component_of(holder), "does not answer")
+        except Refusal as refusal:
+            consent = Consent(False, component_of(holder), refusal.detail)
+        self._unanswered -= 1
+        if not consent.is_given:
+            because = consent.reason or "no reason given"
+            console.tell(question.robot, f"{consent.user} keeps it from {console.user}: {because}", LogLevel.NOTICE)
+        now_s = console.clock.now_s()
+        console.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
+
+    # ------------------------------------------------------------------ who holds
+    async def seek(self, asker: str, asked: AskConsent, at_once: Consent | None) -> Consent:
+        """Have the operator, who holds the robot, decide; silence is a no.
+
+        Args:
+            asker: Address of the console that asks.
+            asked: What it asked.
+            at_once: The answer if the operator need not be asked.
+
+        Raises:
+            NotAnOperator: The asker is no console.
+            Refusal: See ``ConsentDesk.open_question``.
+        """
+        require_console(self._console.name, asker)
+        if at_once is not None:
+            return at_once
+        return await self._console.answers.seek(asker, asked.user, asked.robot, asked.why, Topic.TAKE)
+
+    def _begin_to_yield(self, settled: list[Settled]) -> None:
+        self._console.start_task(self._yield_to(settled), "consent")
+
+    async def _yield_to(self, settled: list[Settled]) -> None:
+        """Give the robot back, then say so: who was let have it finds it free."""
+        await self._give_back(f"{settled[0].sought.user} may have it")
+        self._console.answers.settle(settled)

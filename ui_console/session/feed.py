@@ -1,0 +1,354 @@
+"""The feed of a console: listens to what exists on the bus and hands it to the pure model as events.
+
+One feed serves any number of views in a process. It claims nothing, asks little (who is there, once; what a round trip
+takes every ``LINK_EVERY_S``, what the radios counted every ``PULSE_S``), and carries out an operator's verbs that need
+no grant.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import Any
+
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.messages import (
+    AskParameters,
+    AskStatistics,
+    AskStory,
+    AskTime,
+    ComponentState,
+    MissionTime,
+    Parameters,
+    SetParameter,
+    Statistics,
+    Story,
+    StoryEvent,
+)
+from backbone.creator.messages import TYPE as CREATOR
+from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.errors import LinkError, Refusal
+from backbone.keys import Conversation
+from backbone.mission_log import AskLog, AskPeople, Log, PeopleKnown
+from backbone.nameserver.messages import ADDRESS as NAMESERVER
+from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents, Resolve, Resolved
+from backbone.naming import LAUNCHER, Subsystem, component_of
+from backbone.operators import OperatorActed
+from backbone.picture.health import MissionHealth
+from backbone.picture.mission import LOG_KEPT
+from backbone.picture.reasons import reasons_for
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskSchedule, Leases
+from backbone.scheduling.views import Schedule
+from backbone.wire import Envelope
+from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
+from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
+from ui_console.model.team import ROBOT_KIND
+
+log = logging.getLogger(__name__)
+
+REPLY_TIME_S = 1.0  # chosen: a person waits this long for a picture
+LINK_FRESH_S = 0.8  # chosen: what is older than a second says so, and drawing that takes a moment; machine seconds
+LINK_EVERY_S = 0.3  # chosen: an answer may be lost before what is shown counts as old; machine seconds
+PULSE_S = 2.0  # chosen: a link that got slow is seen soon, and asking costs nothing to speak of; machine seconds
+
+LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link; machine seconds
+
+FeedEvent = Heard | LinkHeard | LinkTrouble | CommandRefused
+
+
+class LogAway(Refusal):
+    """The mission's log cannot be searched now."""
+
+    code = "console.log_away"
+    remedy = "Search again in a moment; the table without a search shows what this console heard."
+
+
+class ConsoleFeed:
+    """Tells what happens in a mission.
+
+    Args:
+        bus: Of the component it belongs to.
+        clock: The mission's time.
+        show: Called in the event loop with each event, in order.
+    """
+
+    def __init__(self, bus: Bus, clock: Clock, show: Callable[[FeedEvent], None]) -> None:
+        self._bus, self._clock, self._show = bus, clock, show
+        self._hosts: dict[str, list[Subscription]] = {}
+        self._radios: set[str] = set()
+        self._robots: set[str] = set()
+        self._listing = asyncio.Event()
+        self.listed = asyncio.Event()
+        """Set once all were asked how things are, and answered or did not."""
+        self._is_up = True
+
+    # ------------------------------------------------------------------ listening
+    def listen(self) -> None:
+        """Begin to listen; once, before ``run``."""
+        bus = self._bus
+        bus.subscribe(RC_MANAGER, Conversation.SCHEDULE, Schedule, self._heard, latest=True)
+        bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard, latest=True)
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
+        bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard, latest=True)
+        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard)
+        bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard, latest=True)
+        watch_stops(bus, self._hear)
+        bus.watch_link(self._heard_link)
+
+    async def run(self) -> None:
+        """Ask for how things are, now and whenever the link is back, and feel the mission's pulse; until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._list_when_due(), name="feed:list")
+            group.create_task(self._feel_link(), name="feed:link")
+            group.create_task(self._feel_pulse(), name="feed:pulse")
+
+    # ------------------------------------------------------------------ verbs of an operator
+    async def stop_robots(self, robots: Iterable[str], reason: str = "", user: str = "") -> list[str]:
+        """Stop these robots, all at once, whoever holds them; return those that did not confirm it."""
+        wanted = sorted(set(robots))
+        answers = await asyncio.gather(*(self._stop(robot, reason, user) for robot in wanted))
+        return [robot for robot, is_stopped in zip(wanted, answers, strict=True) if not is_stopped]
+
+    @property
+    def robots(self) -> frozenset[str]:
+        """Every robot heard of so far."""
+        return frozenset(self._robots)
+
+    async def find_robots(self) -> frozenset[str]:
+        """Return every robot of the mission, also those not heard of yet."""
+        return self.robots | set(map(component_of, await self._list_of(Subsystem.RESOURCE_POOL, ROBOT_KIND)))
+
+    async def ask_stop(self, robot: str) -> StopState | None:
+        """Return whether an operator's stop keeps the robot from moving; None: its RC did not say."""
+        with self._told():
+            stop = await ask_stop(self._bus, robot)
+            self._hear(stop)
+            return stop
+        return None
+
+    async def consoles(self) -> list[str]:
+        """Return the addresses of all consoles of the mission; none if the nameserver did not answer."""
+        return await self._list_of(Subsystem.UI_CONSOLE)
+
+    async def lift(self, stop: StopState, user: str = "") -> bool:
+        """Let a robot move again; return whether it may."""
+        with self._told():
+            self._hear(await lift_stop(self._bus, stop, user))
+            return True
+        return False
+
+    async def why(self, name: str) -> list[str]:
+        """Return for people why this robot, ARC, behavior, console or component is as it is."""
+        try:
+            return (await reasons_for(self._bus, name, self._clock)).lines(self._clock.now_s())
+        except Refusal as refusal:
+            return [refusal.detail, refusal.remedy]
+        except LinkError as error:
+            return [f"nobody answers: {error}"]
+
+    async def search_log(self, asked: AskLog) -> Log:
+        """Return what the mission's log has of this, as far back as the launcher keeps it.
+
+        Raises:
+            LogAway: The launcher did not answer.
+            Refusal: It refused the question.
+        """
+        try:
+            return await self._bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
+        except LinkError as error:
+            raise LogAway(f"the launcher, which keeps the log, did not answer: {error}") from error
+
+    async def ask_parameters(self, name: str) -> bool:
+        """Have a component tell its parameters; return whether it did."""
+        with self._told():
+            address = await self._resolve(name)
+            self._hear(await self._bus.ask(address, AskParameters(), Parameters, within_s=REPLY_TIME_S), address)
+            return True
+        return False
+
+    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
+        """Have a component run with another value; return whether it does."""
+        with self._told():
+            address = await self._resolve(name)
+            change = SetParameter(parameter, value, user or self._bus.source)
+            answer, now_s = await self._bus.ask(address, change, Parameters, within_s=REPLY_TIME_S), self._clock.now_s()
+            self._show(Heard(now_s, change, address))
+            self._show(Heard(now_s, answer, address))
+            return True
+        return False
+
+    # ------------------------------------------------------------------ within
+    def _told(self) -> _Answered:
+        """Have the console told of a refusal or a silence, which ends what stands in here."""
+        return _Answered(self._failed)
+
+    def _failed(self, error: Refusal | LinkError) -> None:
+        now_s = self._clock.now_s()
+        if isinstance(error, Refusal):
+            self._show(CommandRefused(now_s, error.code, error.detail, error.remedy))
+        else:
+            self._show(LinkTrouble(now_s, str(error)))
+
+    async def _stop(self, robot: str, reason: str, user: str) -> bool:
+        with self._told():
+            try:
+                self._hear(await stop_robot(self._bus, robot, reason, user))
+            except LinkError as error:
+                raise LinkError(f"{robot} did not confirm the stop: {error}") from error
+            return True
+        return False
+
+    async def _resolve(self, name: str) -> str:
+        resolved = await self._bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)
+        return resolved.component.address
+
+    async def _list_of(self, subsystem: Subsystem, kind: str = "") -> list[str]:
+        """Return the addresses of these components; none if the nameserver did not answer."""
+        with self._told():
+            question = ListComponents(subsystem=str(subsystem), type=kind)
+            listing = await self._bus.ask(NAMESERVER, question, Components, within_s=REPLY_TIME_S)
+            return [component.address for component in listing.components]
+        return []
+
+    async def _list_when_due(self) -> None:
+        self._listing.set()
+        while True:
+            await self._listing.wait()
+            self._listing.clear()
+            await asyncio.gather(self._list(), self._ask_schedule())
+            self.listed.set()
+
+    async def _list(self) -> None:
+        with self._told():
+            listing = await self._bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
+            self._hear(listing)
+            at = [component.address for component in listing.components]
+            behaviors = [one for one in at if one.startswith(f"{Subsystem.MISSION_CONTROL}/")]
+            robots = [component_of(one.address) for one in listing.components if one.type == ROBOT_KIND]
+            await asyncio.gather(*map(self._ask_how_it_went, behaviors), *map(self._ask_stop, robots), self._ask_log())
+
+    async def _ask_schedule(self) -> None:
+        with self._told():
+            self._hear(await self._bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S))
+
+    async def _ask_how_it_went(self, behavior: str) -> None:
+        """Hear of what a behavior finished before this console listened."""
+        with _quietly(behavior, "did not tell its story"):
+            story = await self._bus.ask(behavior, AskStory(), Story, within_s=REPLY_TIME_S)
+            for event in story.events:
+                if event.what.startswith("finished: "):
+                    self._hear(event)
+
+    async def _ask_log(self) -> None:
+        """Hear of what happened before this console listened, or while its link was away."""
+        with _quietly("the launcher", "did not tell what happened"):
+            self._hear(await self._bus.ask(LAUNCHER, AskPeople(), PeopleKnown, within_s=REPLY_TIME_S))
+            self._hear(await self._bus.ask(LAUNCHER, AskLog(most=LOG_KEPT), Log, within_s=REPLY_TIME_S))
+
+    async def _ask_stop(self, robot: str) -> None:
+        with _quietly(robot, "did not say whether it is stopped"):  # a robot of another make may know no such stop
+            self._hear(await ask_stop(self._bus, robot))
+
+    async def _feel_link(self) -> None:
+        while True:
+            await self._measure_link()
+            await self._clock.sleep_s(LINK_EVERY_S * self._clock.rate)
+
+    async def _feel_pulse(self) -> None:
+        while True:
+            await self._clock.sleep_s(PULSE_S * self._clock.rate)
+            await asyncio.gather(*map(self._count, sorted(self._radios)))
+
+    async def _measure_link(self) -> None:
+        asked_s = time.perf_counter()
+        try:
+            answer = await self._bus.ask(NAMESERVER, AskTime(), MissionTime, within_s=LINK_FRESH_S)
+        except LinkError as error:
+            log.info("the hub did not answer: %s", error)
+            self._show(LinkHeard(self._clock.now_s(), False))
+        else:
+            self._hear(answer)
+            self._show_link(time.perf_counter() - asked_s)
+
+    def _show_link(self, latency_s: float = -1.0) -> None:
+        now_s = self._clock.now_s()
+        self._show(LinkHeard(now_s, self._is_up, latency_s, now_s + LINK_FRESH_S * self._clock.rate))
+
+    async def _count(self, radio: str) -> None:
+        address = f"{Subsystem.RESOURCE_POOL}/{radio}"
+        with _quietly(radio, "did not tell its counters"):
+            self._hear(await self._bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S), address)
+
+    def _heard(self, envelope: Envelope[Any]) -> None:
+        match envelope.body:
+            case Appeared(component=component):
+                self._hear(component)
+            case Leases():  # they count from when they were said
+                self._show(Heard(envelope.stamp_s, envelope.body))
+            case OperatorActed():
+                self._hear(envelope.body, envelope.source)
+            case _:
+                self._hear(envelope.body)
+
+    def _hear(self, said: Said, source: str = "") -> None:
+        """Take in of whom more can be heard, and show what was said."""
+        match said:
+            case ComponentState():
+                self._meet(said)
+            case Components():
+                for component in said.components:
+                    self._meet(component)
+            case Schedule():
+                self._radios = {rc.rc for rc in said.rcs if rc.sharable and rc.state != "down"}
+                self._robots |= {rc.rc for rc in said.rcs if rc.kind == ROBOT_KIND}
+        self._show(Heard(self._clock.now_s(), said, source))
+
+    def _meet(self, component: ComponentState) -> None:
+        """Listen to creators, which tell of their hosts and of what fell."""
+        address = component.address
+        if component.type == CREATOR and address not in self._hosts:
+            self._hosts[address] = [
+                self._bus.subscribe(address, Conversation.TELEMETRY, HostLoad, self._heard, latest=True),
+                self._bus.subscribe(address, Conversation.EVENTS, ProcessFell, self._heard),
+            ]
+        if component.type == ROBOT_KIND:
+            self._robots.add(component_of(address))
+
+    def _heard_link(self, is_up: bool) -> None:
+        came_back, self._is_up = is_up and not self._is_up, is_up
+        self._show_link()
+        if came_back:
+            self._listing.set()
+
+
+class _Answered:
+    """Ends what stands in it at a refusal or a silence.
+
+    Args:
+        failed: Called with that.
+    """
+
+    def __init__(self, failed: Callable[[Refusal | LinkError], None]) -> None:
+        self._failed = failed
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(
+        self, _kind: type[BaseException] | None, error: BaseException | None, _at: TracebackType | None
+    ) -> bool:
+        """Swallow what ``failed`` was called with, and nothing else."""
+        if isinstance(error, Refusal | LinkError):
+            self._failed(error)
+            return True
+        return False
+
+
+def _quietly(name: str, what: str) -> _Answered:
+    """Log a refusal or a silence, which ends what stands in here, and go on without the answer."""
+    return _Answered(lambda error: log.info("%s %s: %s", name, what, error))

@@ -1,0 +1,194 @@
+"""Driving by a gamepad: a stick that counts only while the dead-man button is held.
+
+``Stick`` is pure: what the device says goes in, what is wanted comes out. ``play_gamepad`` is the loop around it. The
+device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
+
+A gamepad tells when a button is let go; one that is unplugged or out of range tells nothing, so what is wanted is said
+again every ``SAY_EVERY_S`` and ends by itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable, Mapping
+from enum import StrEnum
+from typing import Any, Protocol
+
+from backbone.errors import Refusal
+from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+
+log = logging.getLogger(__name__)
+
+EV_KEY, EV_ABS = 1, 3  # Linux, input-event-codes.h
+ABS_X, ABS_Y = 0, 1
+BTN_SOUTH, BTN_EAST, BTN_NORTH, BTN_TL, BTN_TR, BTN_SELECT, BTN_START = 304, 305, 307, 310, 311, 314, 315
+DEAD_MAN = frozenset({BTN_TL, BTN_TR})
+STILL_ZONE = 0.12  # chosen: sticks that are let go rest within a tenth of their middle
+SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
+
+
+class PadWish(StrEnum):
+    """What a button asks for."""
+
+    JUMP = "jump"
+    TAKE = "take"
+    RELEASE = "release"
+    STOP_ROBOT = "stop_robot"
+    STOP_ALL = "stop_all"
+
+
+BUTTONS = {
+    BTN_SOUTH: PadWish.JUMP,
+    BTN_START: PadWish.TAKE,
+    BTN_SELECT: PadWish.RELEASE,
+    BTN_EAST: PadWish.STOP_ROBOT,
+    BTN_NORTH: PadWish.STOP_ALL,
+}
+
+
+class NoGamepad(Refusal):
+    """No gamepad can be read on this machine."""
+
+    code = "console.no_gamepad"
+    remedy = "Plug one in, see that you may read /dev/input, and install it: pip install 'scout-backbone[gamepad]'."
+
+
+class GamepadEvent(Protocol):
+    """One event of the device."""
+
+    type: int
+    code: int
+    value: int
+
+
+class Gamepad(Protocol):
+    """What is used of evdev's ``InputDevice``."""
+
+    def async_read_loop(self) -> AsyncIterator[GamepadEvent]:
+        """Yield what it says; raise ``OSError`` when it is gone."""
+
+
+class Stick:
+    """Turns what the device says into what is wanted.
+
+    Law: without the dead-man button nothing drives, wherever the stick is.
+
+    Args:
+        ranges: Axis → least and largest value.
+    """
+
+    def __init__(self, ranges: Mapping[int, tuple[int, int]]) -> None:
+        self._ranges = ranges
+        self._at = {ABS_X: 0.0, ABS_Y: 0.0}
+        self._held: set[int] = set()
+
+    def feel(self, event: GamepadEvent) -> PadWish | None:
+        """Take in one event; return what a button that was just pressed asks for."""
+        if event.type == EV_ABS and event.code in self._at and event.code in self._ranges:
+            least, most = self._ranges[event.code]
+            share = 2 * (event.value - least) / max(1, most - least) - 1
+            self._at[event.code] = 0.0 if abs(share) < STILL_ZONE else min(max(share, -1.0), 1.0)
+        elif event.type == EV_KEY and event.code in DEAD_MAN:
+            if event.value:
+                self._held.add(event.code)
+            else:
+                self._held.discard(event.code)
+        elif event.type == EV_KEY and event.value == 1:
+            return BUTTONS.get(event.code)
+        return None
+
+    def wanted(self, speed_rad_s: float) -> Drive | None:
+        """Return what is wanted now; None: the dead-man button is not held."""
+        if not self._held:
+            return None
+        return drive_by_stick(-self._at[ABS_Y], self._at[ABS_X], speed_rad_s)
+
+
+def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
+    """Return the first gamepad of this machine and the ranges of its stick.
+
+    Raises:
+        NoGamepad: There is none, or none that can be read.
+    """
+    try:
+        import evdev  # noqa: PLC0415  an extra that few machines have
+    except ImportError as error:
+        raise NoGamepad(f"evdev is not installed: {error}") from None
+    for path in evdev.list_devices():
+        device = evdev.InputDevice(path)
+        can = device.capabilities()
+        axes = {code: (info.min, info.max) for code, info in can.get(EV_ABS, [])}
+        if {ABS_X, ABS_Y} <= axes.keys() and DEAD_MAN & set(can.get(EV_KEY, [])):
+            return device, axes
+        device.close()
+    raise NoGamepad("no device under /dev/input has a stick and a shoulder button")
+
+
+async def play_gamepad(
+    device: Gamepad,
+    stick: Stick,
+    *,
+    hold: Callable[[Drive, float], None],
+    stop: Callable[[], None],
+    wish: Callable[[PadWish], None],
+    speed_rad_s: Callable[[], float],
+) -> None:
+    """Drive by the device until it is gone or this is cancelled; the wheels stop then.
+
+    Args:
+        device: Already open.
+        stick: Fresh.
+        hold: Called again and again while the dead-man button is held, with how long that counts.
+        stop: Called when it is let go.
+        wish: Called for each button pressed.
+        speed_rad_s: Returns the speed of the wheels at full forward.
+    """
+    changed = asyncio.Event()
+
+    async def feel() -> None:
+        async for event in device.async_read_loop():
+            asked = stick.feel(event)
+            if asked is not None:
+                wish(asked)
+            changed.set()
+
+    feeling = asyncio.create_task(feel(), name="gamepad")
+    feeling.add_done_callback(lambda _feeling: changed.set())
+    was_held = False
+    try:
+        while not feeling.done():
+            drive = stick.wanted(speed_rad_s())
+            if drive is not None:
+                hold(drive, STICK_LASTS_S)
+            elif was_held:
+                stop()
+            was_held = drive is not None
+            await _wait(changed, SAY_EVERY_S if was_held else None)
+        if (error := feeling.exception()) is not None:
+            if not isinstance(error, OSError):
+                raise error
+            log.warning("the gamepad is gone: %s", error)
+    finally:
+        feeling.cancel()
+        await asyncio.gather(feeling, return_exceptions=True)
+        if was_held:
+            stop()
+
+
+async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
+    try:
+        async with asyncio.timeout(within_s):
+            await changed.wait()
+    except TimeoutError:
+        return
+    changed.clear()
+
+
+def buttons_help() -> list[str]:
+    """Return for people what the gamepad's buttons do."""
+    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
+    return [
+        "shoulder button held: the left stick drives",
+        *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),
+    ]

@@ -1,0 +1,93 @@
+"""Consoles without a screen: a script that drives, a monitor as JSON lines, one look."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from pathlib import Path
+from typing import Any
+
+from backbone.component.component import NoParameters
+from backbone.endings import ExitCode, say
+from ui_console.model.console import ConsoleModel
+from ui_console.model.events import ConsoleEvent, for_scripts
+from ui_console.model.script import Step, WrongScript, read_script
+from ui_console.model.team import TeamModel
+from ui_console.model.views import view_json
+from ui_console.session.joining import Where, end_on_signals, join, write_line
+from ui_console.session.observer import Observer, nobody_here
+from ui_console.session.scripted import ScriptDriver, feed_from
+from ui_console.session.teleoperation import Teleoperation
+
+STANDARD_INPUT = "-"
+
+
+async def drive_by_script(where: Where, wished: dict[str, Any], user: str, script: str, within_s: float) -> int:
+    """Drive a robot by a script; return the command's exit code.
+
+    Args:
+        where: The mission.
+        wished: Parameters of ``Teleoperation``.
+        user: Who drives, for the record.
+        script: File of JSON lines; ``-``: standard input.
+        within_s: Mission seconds the grant may take; 0: any time.
+    """
+    steps: list[Step] | None = None
+    try:
+        if script != STANDARD_INPUT:
+            steps = read_script(await asyncio.to_thread(Path(script).read_text))
+    except (OSError, UnicodeDecodeError, WrongScript) as error:
+        say(f"{script}: {error}")
+        return ExitCode.USAGE
+    joining = await join(where, wished)
+    driver = ScriptDriver(write_line, steps, within_s=within_s)
+    bus = await joining.open_bus()
+    console = Teleoperation(
+        joining.launch, bus, joining.clock, show=driver.show, work=driver.drive, watches=False, user=user
+    )
+    if script == STANDARD_INPUT:
+        feed_from(sys.stdin.fileno(), driver.feed)
+    interrupted = end_on_signals(console)
+    await console.run()
+    return ExitCode.INTERRUPTED if interrupted() else driver.exit_code(console)
+
+
+async def watch_as_json(where: Where, user: str) -> int:
+    """Write what happens as JSON lines until a signal ends it; return the command's exit code."""
+
+    def show(event: ConsoleEvent) -> None:
+        for line in for_scripts(event):
+            write_line(line)
+
+    joining = await join(where)
+    console: Observer[NoParameters] = Observer(
+        joining.launch, await joining.open_bus(), joining.clock, show=show, user=user, answers_of=nobody_here
+    )
+    interrupted = end_on_signals(console)
+    await console.run()
+    return ExitCode.INTERRUPTED if interrupted() else ExitCode.DONE
+
+
+async def look_once(where: Where, user: str) -> int:
+    """Write all that screens show now as one JSON object; return the command's exit code."""
+    joining = await join(where)
+    launch, clock = joining.launch, joining.clock
+    model = ConsoleModel(launch.name, user, TeamModel(launch.mission), sees=False)
+    console: Observer[NoParameters] = Observer(
+        launch, await joining.open_bus(), clock, show=model.apply, signs_in=False
+    )
+    interrupted = end_on_signals(console)
+
+    async def end_when_listed() -> None:
+        await console.feed.listed.wait()
+        console.end("all was listed")
+
+    ending = asyncio.create_task(end_when_listed(), name="end when listed")
+    try:
+        await console.run()
+    finally:
+        ending.cancel()
+    if interrupted():
+        return ExitCode.INTERRUPTED
+    write_line(view_json(model.view(clock.now_s())))
+    return ExitCode.DONE

@@ -1,0 +1,148 @@
+"""How a console's process joins a mission: who it is there, its clock, its bus, and the signals that end it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import signal
+import socket
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from backbone import run_files
+from backbone.bus.clock import MissionClock
+from backbone.bus.interface import Clock
+from backbone.bus.zenoh_bus import ZenohBus, client_config
+from backbone.cli import read_secret_option
+from backbone.component.launch import Launch
+from backbone.mission_connection import clock_elsewhere
+from backbone.naming import Subsystem
+from ui_console.session.observer import Observer
+
+MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
+
+
+@dataclass(frozen=True)
+class Where:
+    """Which mission a console joins.
+
+    Attributes:
+        mission: Its name; None: the one that is up on this machine.
+        connect: Endpoint of its hub, for a mission elsewhere, which then has a name.
+        secret_file: File with that mission's secret.
+    """
+
+    mission: str | None
+    connect: str | None
+    secret_file: Path | None
+
+
+@dataclass(frozen=True)
+class Joining:
+    """A console that has not opened its bus yet.
+
+    Attributes:
+        launch: Who it is.
+        clock: The mission's clock.
+        secret: What the mission's hub asks for.
+    """
+
+    launch: Launch
+    clock: Clock
+    secret: str
+
+    async def open_bus(self, launch: Launch | None = None) -> ZenohBus:
+        """Return the bus once the hub has answered.
+
+        Args:
+            launch: Who joins; None: this console.
+        """
+        who = launch or self.launch
+        config = client_config(who.endpoint, self.secret)
+        return await ZenohBus.open_when_up(who.mission, who.address, self.clock, config)
+
+
+async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joining:
+    """Return who this process is in the mission.
+
+    Args:
+        where: The mission.
+        parameters: Of the console.
+
+    Raises:
+        Refusal: No such mission is up on this machine.
+        LinkError: The hub elsewhere does not answer.
+    """
+    mission, connect = where.mission, where.connect
+    name = f"console-{os.getpid()}" if connect is None else _name_elsewhere(socket.gethostname())
+    clock: Clock
+    if connect is None or mission is None:
+        found = run_files.find(mission)
+        mission, endpoint, secret = found.mission, found.endpoint, run_files.secret(found)
+        clock, host = MissionClock(found.clock_origin_monotonic_s, found.clock_rate), found.host
+    else:
+        endpoint, host, secret = connect, socket.gethostname(), read_secret_option(where.secret_file)
+        clock = await clock_elsewhere(mission, connect, f"{Subsystem.UI_CONSOLE}/{name}", secret)
+    launch = Launch(
+        mission,
+        Subsystem.UI_CONSOLE,
+        name,
+        "console",
+        "ui_console.session.teleoperation:Teleoperation",
+        host,
+        endpoint,
+        clock.origin_monotonic_s,
+        clock.rate,
+        parameters or {},
+    )
+    return Joining(launch, clock, secret)
+
+
+def end_on_signals(console: Observer[Any]) -> Callable[[], bool]:
+    """Have the console end in good order on SIGINT and SIGTERM; return whether SIGINT came."""
+    return _end_on(console.end, signal.SIGINT, signal.SIGTERM)
+
+
+def end_server_on_signals(end: Callable[[str], None]) -> Callable[[], bool]:
+    """Have a server end in good order on SIGINT, SIGTERM and SIGHUP; return whether SIGINT came.
+
+    A SIGHUP that ``nohup`` ignores stays ignored.
+
+    Args:
+        end: Called with the signal's name.
+    """
+    hangups = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)
+    return _end_on(end, signal.SIGINT, signal.SIGTERM, *hangups)
+
+
+def _end_on(end: Callable[[str], None], *numbers: signal.Signals) -> Callable[[], bool]:
+    came = set[signal.Signals]()
+
+    def caught(number: signal.Signals) -> None:
+        came.add(number)
+        end(number.name)
+
+    for number in numbers:
+        asyncio.get_running_loop().add_signal_handler(number, caught, number)
+    return lambda: signal.SIGINT in came
+
+
+def write_line(line: bytes) -> None:
+    """Write one line to standard output at once; its reader may wait for it."""
+    sys.stdout.buffer.write(line + b"\n")
+    sys.stdout.buffer.flush()
+
+
+def _name_elsewhere(host: str) -> str:
+    """Return a console's name that those of other machines do not have: processes are numbered anew on each.
+
+    Example:
+        >>> _name_elsewhere("Lab PC.local").rpartition("-")[0]
+        'console-lab-pc-local'
+    """
+    plain = re.sub(r"[^a-z0-9]+", "-", host.lower()).strip("-")[:MOST_OF_HOST].strip("-")
+    return f"console-{plain}-{os.getpid()}"

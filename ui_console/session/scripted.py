@@ -1,0 +1,209 @@
+"""Driving without a screen: a script in, JSON lines out."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import Callable
+
+from backbone.errors import Refusal, code_of
+from backbone.picture.words import UNDECIDED
+from backbone.rc_manager.messages import StaleEpoch
+from resource_pool.arc_client import StopState, SwappedOut
+from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
+from ui_console.model.events import (
+    Asked,
+    CommandApplied,
+    CommandRefused,
+    ConsoleEvent,
+    Granted,
+    Heard,
+    LinkTrouble,
+    Lost,
+    MomentBegan,
+    PictureSeen,
+    event_json,
+)
+from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
+from ui_console.session.teleoperation import Teleoperation
+
+DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
+INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
+READ_BYTES = 65536
+_FOR_SCREENS_ONLY = (Asked, MomentBegan, PictureSeen)
+
+
+class ScriptDriver:
+    """Plays one script on one console.
+
+    Args:
+        write: Gets each line of JSON, without its end; must hand it on at once.
+        steps: The whole script; None: steps come by ``feed``.
+        within_s: Mission seconds the grant may take; 0: any time.
+    """
+
+    def __init__(
+        self, write: Callable[[bytes], None], steps: list[Step] | None = None, *, within_s: float = 0.0
+    ) -> None:
+        self._write, self._within_s = write, within_s
+        self._player = ScriptPlayer(steps)
+        self._reader = ScriptReader()
+        self._news = asyncio.Event()
+        self._granted = self._failed = False
+        self._wrong: WrongScript | None = None
+        self._console: Teleoperation | None = None
+        self._stops: list[StopRobot | StopAll] = []
+        self._stopped = self._is_unanswered = False
+
+    def show(self, event: ConsoleEvent) -> None:
+        """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
+        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
+            return
+        if isinstance(event, Lost) and event.reason in UNDECIDED:
+            self._player.require_let_go()
+        stop = event.body if isinstance(event, Heard) else None
+        if isinstance(stop, StopState) and (stop.is_stopped or self._stopped):
+            self._stopped = stop.is_stopped
+            self._player.require_let_go()
+        if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
+            self._failed = True
+        self._write(event_json(event))
+
+    @property
+    def must_halt(self) -> bool:
+        """Whether its lines move nothing before one that halts."""
+        return self._player.must_let_go
+
+    def _is_told(self, event: ConsoleEvent) -> bool:
+        """Take note of a silence and of its end; return whether the script knows of this silence."""
+        if isinstance(event, LinkTrouble) and event.command:
+            is_told, self._is_unanswered = self._is_unanswered, True
+            return is_told
+        if isinstance(event, CommandApplied | Granted | Lost):
+            self._is_unanswered = False
+        return False
+
+    def feed(self, line: str | None) -> None:
+        """Take the next line of the script; None: its end. A wrong line ends the script there."""
+        if self._wrong is None:
+            try:
+                step = None if line is None else self._reader.read(line)
+            except WrongScript as wrong:
+                self._wrong, step, line = wrong, None, None
+            if step is not None and step.at_once and isinstance(step.wish, StopRobot | StopAll):
+                self._stops.append(step.wish)
+                self._begin_stops()
+            elif step is not None:
+                self._player.add(step)
+            if line is None:
+                self._player.end()
+            self._news.set()
+
+    async def drive(self, console: Teleoperation) -> None:
+        """Wait for the grant, play the script to its end, give the robot back."""
+        self._console = console
+        self._begin_stops()
+        try:
+            async with asyncio.timeout(self._within_s / console.clock.rate if self._within_s else None):
+                await console.wait_granted()
+        except TimeoutError:
+            self._failed = True
+            detail = f"not granted within {self._within_s:g} s"
+            remedy = "Ask 'scout-backbone why' for the reason, use a higher --priority, or wait longer."
+            now_s = console.clock.now_s()
+            self._write(event_json(CommandRefused(now_s, "console.not_granted", detail, remedy)))
+            await console.give_back("not granted in time")
+            return
+        except Refusal:
+            return
+        self._granted = True
+        await self._play(console, console.clock.now_s())
+
+    def exit_code(self, console: Teleoperation) -> int:
+        """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
+        if self._wrong is not None:
+            return USAGE
+        if console.refusal is not None or self._failed or self._player.held_back:
+            return REFUSED
+        return DONE if self._granted and console.given_back else NO_BACKBONE
+
+    async def _play(self, console: Teleoperation, granted_s: float) -> None:
+        clock = console.clock
+        while True:
+            self._news.clear()
+            since_s, next_s = clock.now_s() - granted_s, self._player.next_s
+            if next_s is not None and abs(since_s - next_s) < INSTANT_S:
+                since_s = next_s  # what was waited for is due, however the times were rounded
+            for wish in self._player.due(since_s):
+                match wish:
+                    case GiveBack():
+                        self._tell_wrong(clock.now_s())
+                        await console.give_back("the script is over")
+                        return
+                    case StopRobot() | StopAll():
+                        await self._stop(console, wish)
+                    case Jump():
+                        await console.do(wish)
+                    case Drive() | Halt() if console.is_held:
+                        await console.do(wish)
+            await self._wait_news(console, granted_s)
+
+    def _begin_stops(self) -> None:
+        """Carry out the emergency stops that count at once, if there is a console to do it by yet."""
+        if self._console is None or not self._console.is_ready:
+            return
+        stops, self._stops = self._stops, []
+        for stop in stops:
+            self._console.start_task(self._stop(self._console, stop), "stop")
+
+    async def _stop(self, console: Teleoperation, stop: StopRobot | StopAll) -> None:
+        """Stop one robot or all; one that does not confirm it is told, and the script failed."""
+        if isinstance(stop, StopRobot):
+            is_sure = await console.stop_robot(stop.robot, stop.reason)
+        else:
+            is_sure = not await console.stop_all(stop.reason)
+        self._failed = self._failed or not is_sure
+
+    async def _wait_news(self, console: Teleoperation, granted_s: float) -> None:
+        """Return when the next step is due or another one arrived."""
+        next_s = self._player.next_s
+        wait_s = None
+        if next_s is not None:
+            wait_s = max(0.0, granted_s + next_s - console.clock.now_s()) / console.clock.rate
+        try:
+            async with asyncio.timeout(wait_s):
+                await self._news.wait()
+        except TimeoutError:
+            return
+
+    def _tell_wrong(self, now_s: float) -> None:
+        if self._wrong is not None:
+            wrong = self._wrong
+            self._write(event_json(CommandRefused(now_s, code_of(wrong), wrong.detail, wrong.remedy)))
+
+
+def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:
+    """Hand the lines read from a file descriptor to ``feed`` in this event loop, then None.
+
+    The thread that reads dies with the process: a pipe that stays open holds nothing up.
+    """
+    loop = asyncio.get_running_loop()
+
+    def hand_over(line: str | None) -> None:
+        try:
+            loop.call_soon_threadsafe(feed, line)
+        except RuntimeError:  # the loop is closed: the script is over
+            return
+
+    def read() -> None:
+        rest = b""
+        while chunk := os.read(descriptor, READ_BYTES):
+            *lines, rest = (rest + chunk).split(b"\n")
+            for line in lines:
+                hand_over(line.decode(errors="replace"))
+        if rest:
+            hand_over(rest.decode(errors="replace"))
+        hand_over(None)
+
+    threading.Thread(target=read, name="script", daemon=True).start()

@@ -1,0 +1,490 @@
+"""Teleoperation: a person's hold on one robot.
+
+Claims an ARC as a behavior does, with a priority of its own beside the mission's, and gives it back
+on request, at its end, or by its death, which the ARC sees. Faces (terminal, script) hear events
+through ``show`` and pictures through ``see``, and call the verbs. What the hands want goes through
+``controls``, what operators say to each other about the robot through ``consent_talk``.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import types
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Any, ClassVar
+
+import msgspec
+
+from backbone.bus.interface import Bus, Clock, Subscription
+from backbone.component.launch import Launch
+from backbone.component.messages import LifeState, LogLevel
+from backbone.errors import LinkError, Refusal, code_of
+from backbone.operators import OperatorAction
+from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.rc_manager.messages import AskWhy
+from backbone.scheduling.views import Why
+from backbone.wire import Envelope, Message
+from resource_pool.arc_client import (
+    ArcClient,
+    ArcNotice,
+    Frame,
+    NotMyArc,
+    PathNode,
+    Resumed,
+    StopState,
+    Suspended,
+    Suspending,
+    arc_name,
+    claim_parameters,
+)
+from ui_console.model.consent import AskConsent, Consent
+from ui_console.model.driving import Command, Drive, Halt, Jump
+from ui_console.model.events import (
+    Asked,
+    CommandRefused,
+    ConsoleEvent,
+    GivenBack,
+    Granted,
+    Heard,
+    Lost,
+    PictureSeen,
+)
+from ui_console.model.lifting import AskLift
+from ui_console.model.team import ROBOT_KIND
+from ui_console.session.consent_answers import ConsentAnswers
+from ui_console.session.consent_talk import Claim, ConsentTalk
+from ui_console.session.controls import Controls
+from ui_console.session.feed import REPLY_TIME_S
+from ui_console.session.hand_over import AskHandOver, HandOver
+from ui_console.session.observer import Observer
+from ui_console.session.presence import Presence
+from ui_console.session.stop_ear import StopEar
+
+log = logging.getLogger(__name__)
+
+ANY_ROBOT = "any robot"
+ANY_CAMERA = {ROBOT_KIND: ["camera"]}
+
+
+class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of ``Teleoperation``.
+
+    Attributes:
+        robot: Robot to claim; empty: any free one with a camera.
+        kind: Component type of the ARC.
+        priority: Among the consoles and the mission; larger is higher.
+        minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
+        away_after_s: The robot is given back when its operator touched nothing for so long, so that it goes on with
+            useful work; seconds of the machine; 0: never.
+    """
+
+    robot: str = ""
+    kind: str = "capture"
+    priority: int = 100
+    minimum_runtime_s: float = 5.0
+    away_after_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+
+
+class Teleoperation(Observer[TeleoperationParameters]):
+    """One console.
+
+    Args:
+        show: Called with each event, in order.
+        see: Called with the newest picture; pictures of earlier grants never arrive.
+        work: Run once the console is ready, instead of waiting for somebody to end it; its end is the console's.
+        takes: Claim at once.
+        watches: Also tell what happens to others.
+        keeps_arc: Keep the ARC when the robot is given back, so that it is there at once when it is taken again.
+        signs_in: Tell the mission that its operator came and left; False where somebody else does.
+        user: Who drives, for the record; empty: the console's name.
+        answers: What its operator is asked, if several consoles are one person's; None: something of its own.
+    """
+
+    parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskHandOver | AskLift
+
+    def __init__(
+        self,
+        launch: Launch,
+        bus: Bus,
+        clock: Clock,
+        *,
+        show: Callable[[ConsoleEvent], None],
+        see: Callable[[Frame], None] | None = None,
+        work: Callable[[Teleoperation], Awaitable[None]] | None = None,
+        takes: bool = True,
+        watches: bool = True,
+        keeps_arc: bool = False,
+        signs_in: bool = True,
+        user: str = "",
+        answers: ConsentAnswers | None = None,
+    ) -> None:
+        super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
+        self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
+        self._arc: ArcClient | None = None
+        self._claimed: tuple[str, dict[str, Any]] | None = None
+        self._rests = False
+        self._keeping: asyncio.Task[None] | None = None
+        self._frames: Subscription | None = None
+        self._giving_back = asyncio.Lock()
+        self._is_asking = self._takes_next = False
+        self._asked_s = 0.0
+        self._grants = 0
+        self._decided = asyncio.Event()
+        self._controls = Controls(self)
+        self._consent = ConsentTalk(self, self.give_back)
+        self._hand_over = HandOver(self, self.give_back)
+        self._ear = StopEar(self, self._heard_stop)
+        self._asking_why: asyncio.Task[None] | None = None
+        self._presence = Presence(self)
+        self._holding = ""
+        self._next_robot = ""
+        self._switching = asyncio.Lock()
+        self.refusal: Refusal | None = None
+        """Why the claim was refused; None if it was not."""
+        self.given_back: bool | None = None
+        """Whether the last release was confirmed; None before one."""
+
+    # ------------------------------------------------------------------ verbs
+    @property
+    def is_held(self) -> bool:
+        """True while commands pass."""
+        return self._keeping is not None and self._arc is not None and self._arc.granted is not None
+
+    @property
+    def is_ready(self) -> bool:
+        """True while verbs can be called."""
+        return self.state is LifeState.READY
+
+    def take(self) -> None:
+        """Claim the robot unless it is claimed; if it is just being given back, right afterwards."""
+        if self._giving_back.locked():
+            self._takes_next = True
+            self._decided.clear()
+            return
+        if self._is_asking:
+            return
+        wished, rested = self.parameters, self._arc
+        claim = (wished.kind, self._claim_parameters())
+        self._rests = self._rests and self._claimed == claim
+        if not self._rests:
+            self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
+        arc, self._claimed, self._is_asking = self._arc, claim, True
+        assert arc is not None  # noqa: S101  what rests is there
+        self._controls.connect(arc)
+        self._ear.close()  # what it told the last ARC is news to this one
+        if wished.robot:
+            self.start_task(self._ear.listen(wished.robot), "stop")
+        if self._see is not None:
+            self._frames = arc.frames(self._saw)
+        self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None
+        self._decided.clear()
+        self.acted(OperatorAction.TAKE, wished.robot or ANY_ROBOT, f"with priority {wished.priority}")
+        self.show(Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
+        self._keeping = self.start_task(self._keep(arc, rested), "arc")
+
+    async def switch(self, robot: str) -> None:
+        """Claim another robot in place of the one that is claimed, which is stopped and given back first.
+
+        Asked for several in a row, it claims the last.
+        """
+        self._next_robot = robot
+        async with self._switching:
+            if robot != self._next_robot:
+                return
+            if robot != self.parameters.robot:
+                self.parameters = msgspec.structs.replace(self.parameters, robot=robot)
+                await self.give_back(f"{self.user} takes {robot}", for_good=True)
+            self.take()
+
+    def touch(self) -> None:
+        """The operator is there; driving says so by itself."""
+        self._presence.touch()
+
+    def leave(self) -> None:
+        """The operator turned away, or the window is no longer in front: the wheels stop, and nothing held counts."""
+        self._presence.leave()
+        self.require_let_go()
+
+    def require_let_go(self) -> None:
+        """From now on what is held moves nothing until it was let go and pressed anew; wheels that turn stop.
+
+        When: a dialog opens or closes. Stops, lifts, grants, and the loss of robot or link require it anyway.
+        """
+        self._controls.require_let_go()
+
+    async def wait_granted(self) -> None:
+        """Return when the claim was granted.
+
+        Raises:
+            Refusal: It was refused.
+        """
+        await self._decided.wait()
+        if self.refusal is not None:
+            raise self.refusal
+
+    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+        """A drive key is down: the command repeats until the hold ends, then the wheels stop.
+
+        Args:
+            drive: What the key stands for.
+            lasts_s: How long that counts, machine seconds, for what says it again while it is held; None: as for keys.
+        """
+        self.touch()
+        self._controls.hold(drive, lasts_s)
+
+    def stop(self) -> None:
+        """Stop the wheels now; sticks, pads and pages say by this that they were let go."""
+        self._controls.stop()
+
+    def jump(self) -> None:
+        """The key for one jump is down: jump, unless it has to be let go first."""
+        if self._controls.press_jump() and self.is_held:
+            self.start_task(self._jump(), "jump")
+
+    async def do(self, command: Command) -> bool:
+        """Have one command carried out and tell what became of it; return True if it was applied."""
+        return not self._rests and await self._controls.do(command)
+
+    def begin_release(self) -> None:
+        """Give the robot back without waiting for it."""
+        self.start_task(self.give_back(), "release")
+
+    async def give_back(self, reason: str = "released", *, for_good: bool = False, wanted: bool = True) -> None:
+        """Give the robot back; afterwards the console watches until the next ``take``.
+
+        Args:
+            reason: For people.
+            for_good: End the ARC also if the console keeps it otherwise.
+            wanted: False if the operator did not ask for it.
+        """
+        async with self._giving_back:
+            if self._arc is not None and (self._is_asking or for_good):
+                await self._give_back(self._arc, reason, for_good=for_good, wanted=wanted)
+        if self._takes_next and self.is_ready:
+            self._takes_next = False
+            self.take()
+
+    async def _give_back(self, arc: ArcClient, reason: str, *, for_good: bool, wanted: bool) -> None:
+        keeping, self._keeping = self._keeping, None
+        self._controls.switch_off()
+        if keeping is not None:
+            keeping.cancel()
+            await asyncio.wait({keeping})
+        confirmed = await self._let_go(arc, reason, for_good=for_good)
+        if self._frames is not None:
+            self._frames.close()
+            self._frames = None
+        if self._is_asking:
+            self._is_asking, self.given_back = False, confirmed
+            self._tell_given_back(reason, confirmed=confirmed, wanted=wanted)
+
+    async def _let_go(self, arc: ArcClient, reason: str, *, for_good: bool) -> bool:
+        """Have the ARC rest if it is kept, else end it; return whether it confirmed that."""
+        if self._keeps_arc and arc.granted is not None and not for_good:  # one that waits could just be granted
+            try:
+                await arc.rest()
+            except (LinkError, Refusal) as error:
+                log.info("%s does not rest: %s", arc.arc, error)
+            else:
+                self._rests = True
+                return True
+        confirmed = True
+        try:
+            await arc.release(reason)
+        except LinkError as error:
+            log.info("the release was not confirmed: %s", error)
+            confirmed = False
+        self._controls.disconnect()
+        self._arc, self._rests = None, False
+        return confirmed
+
+    def _tell_given_back(self, reason: str, *, confirmed: bool, wanted: bool) -> None:
+        self._ear.close()
+        self._controls.tell_drive_ended(self._holding, reason)
+        self.answers.ended(True, reason)
+        robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
+        self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
+        self.report("holds no robot")
+        self.show(GivenBack(self.clock.now_s(), reason, confirmed, wanted))
+
+    # ------------------------------------------------------------------ consent
+    def begin_ask_consent(self, why: str = "") -> None:
+        """Ask whoever holds what this console waits for; what they say is shown. Nothing if they are being asked."""
+        robot, is_waiting = self.parameters.robot, self._is_asking and not self.is_held
+        claim = Claim(arc_name(self.bus, self.parameters.kind), robot, robot or ANY_ROBOT, self._asked_s)
+        self._consent.begin_ask(claim if is_waiting else None, why)
+
+    def _consent_at_once(self) -> Consent | None:
+        """Return what is said to who asks for the robot if there is nothing that the operator could decide."""
+        if not self.is_held:
+            return Consent(not self._is_asking, self.user, "holds nothing")
+        return Consent(False, self.user, "a script drives") if self._work is not None else None
+
+    # ------------------------------------------------------------------ the component's hooks
+    async def serve(self) -> None:
+        """Claim, then listen; the keys have a task of their own."""
+        self.sign_in(f"to drive {self.parameters.robot or ANY_ROBOT}, with priority {self.parameters.priority}")
+        if self._takes:
+            self.take()
+        self.start_task(self._controls.run(), "keys")
+        if self.parameters.away_after_s > 0:
+            self.start_task(self._presence.run(self.parameters.away_after_s, self._go_away), "presence")
+        if self._work is not None:
+            self.start_task(self._work_and_end(self._work), "work")
+        await self.watch()
+
+    async def answer(self, asked: Envelope[Any]) -> Message:
+        """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
+        if isinstance(asked.body, AskConsent):
+            return await self._consent.seek(asked.source, asked.body, self._consent_at_once())
+        if isinstance(asked.body, AskHandOver):
+            holds, by_script = self._holding if self.is_held else "", self._work is not None
+            return await self._hand_over.answer(asked.body, holds, self._asked_s, by_script=by_script)
+        if isinstance(asked.body, AskLift) and self._work is not None:
+            stopped_it = asked.body.console == self.address
+            return Consent(False, self.user, "a script drives, and stopped it", is_here=stopped_it)
+        if not isinstance(asked.body, ArcNotice):
+            return await super().answer(asked)
+        if self._arc is None:
+            raise NotMyArc(f"{self.name} claims no ARC")
+        return await self._arc.handle(asked.body)
+
+    async def drain(self) -> None:
+        """Give the robot back if it was not."""
+        await self.give_back("the console ends", for_good=True)
+        await super().drain()
+
+    async def connect(self) -> None:
+        """Listen to what the mission tells, and to the own link."""
+        await super().connect()
+        self.bus.watch_link(lambda _is_up: self.require_let_go())
+
+    def link_lost(self) -> None:
+        """What is held moves nothing when the link is back."""
+        self.require_let_go()
+
+    async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
+        """Stop a robot, whoever holds it; return whether that is certain."""
+        self.require_let_go()
+        return await super().stop_robot(robot, reason, user)
+
+    async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
+        """Stop every robot of the mission, whoever holds it; return those of which it is not certain."""
+        self.require_let_go()
+        return await super().stop_all(reason, user)
+
+    def schedule_heard(self) -> None:
+        """Ask why this console waits, if it does."""
+        if self._keeping is not None and not self.is_held and self._asking_why is None:
+            self._asking_why = self.start_task(self._ask_why(), "why")
+
+    # ------------------------------------------------------------------ the ARC
+    async def arc_resumed(self, notice: Resumed) -> None:
+        """Tell it; see ``ArcListener``."""
+        if self._keeping is None:
+            log.info("%s was granted after it was given back", notice.arc)
+            return  # its wish for no time reached the RC manager later than its turn did; that takes the RCs back
+        robot = notice.rcs.get(ROBOT_KIND, "no robot")
+        self.require_let_go()
+        await self._ear.listen(robot)
+        if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
+            return  # it went again meanwhile
+        again, self._grants = self._grants > 0, self._grants + 1
+        now_s = self.clock.now_s()
+        self.report(f"drives {robot}")
+        if not again:
+            self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
+        self._holding = robot
+        self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
+        self._decided.set()
+
+    async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
+        """Stop the wheels within the deadline; see ``ArcListener``."""
+        await self.do(Halt())
+
+    async def arc_suspended(self, notice: Suspended) -> None:
+        """Tell it; see ``ArcListener``."""
+        self.require_let_go()
+        if self._keeping is not None:
+            because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
+            self.answers.ended(False, f"it was lost: {because}")
+            self._controls.tell_drive_ended(self._holding, because)
+            self.report(f"waits: {notice.reason} by {notice.by}")
+            self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
+
+    def _heard_stop(self, state: StopState) -> None:
+        """The robot that is held was stopped or may move again: whoever drives it has to know that first."""
+        if self._arc is not None and self._arc.heard_stop(state):
+            self.require_let_go()
+        if not self._watches and state.number > 0:  # 0: it never was stopped
+            self.show(Heard(self.clock.now_s(), state))
+
+    def _claim_parameters(self) -> dict[str, Any]:
+        wished = self.parameters
+        return claim_parameters(
+            self.address,
+            path=[PathNode(self.name, wished.priority)],
+            minimum_runtime_s=wished.minimum_runtime_s,
+            wish={ROBOT_KIND: wished.robot} if wished.robot else {},
+            features={} if wished.robot else ANY_CAMERA,
+            console=True,
+        )
+
+    async def _keep(self, arc: ArcClient, rested: ArcClient | None) -> None:
+        """Keep the ARC as it was claimed; one that rested and cannot be used any more is ended first."""
+        assert self._claimed is not None  # noqa: S101  made in take
+        kind, parameters = self._claimed
+        rests, self._rests = self._rests, False
+        try:
+            if rested is not None and not rests:
+                await rested.release("asks otherwise")
+            await arc.keep(self.clock, kind, parameters, rests=rests)
+        except Refusal as refusal:
+            self._controls.disconnect()
+            self._arc, self._keeping, self._is_asking = None, None, False
+            self.refusal = refusal
+            self._tell_refusal(refusal)
+            self._decided.set()
+
+    def _tell_refusal(self, refusal: Refusal) -> None:
+        now_s, code = self.clock.now_s(), code_of(refusal)
+        self.show(CommandRefused(now_s, code, refusal.detail, refusal.remedy, ends_claim=True))
+
+    def _saw(self, frame: Frame) -> None:
+        if self._see is not None:
+            self.show(PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
+            self._see(frame)
+
+    async def _ask_why(self) -> None:
+        try:
+            question = AskWhy(arc_name(self.bus, self.parameters.kind))
+            why = await self.bus.ask(RC_MANAGER, question, Why, within_s=REPLY_TIME_S)
+        except (Refusal, LinkError) as error:
+            log.info("why: %s", error)
+        else:
+            if not self.is_held:
+                self.show(Heard(self.clock.now_s(), why))
+                await self._settle_with_other_screens()
+        finally:
+            self._asking_why = None
+
+    async def _settle_with_other_screens(self) -> None:
+        try:
+            await self._hand_over.settle(self.parameters.robot, self._asked_s)
+        except LinkError as error:
+            log.info("other screens: %s", error)
+
+    # ------------------------------------------------------------------ hands
+    async def _go_away(self) -> None:
+        """Let the robot go on with useful work when nobody drives it."""
+        self.leave()
+        await self.give_back(f"{self.user} is away", wanted=False)
+
+    async def _jump(self) -> None:
+        await self.do(Jump())
+
+    async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
+        await work(self)
+        self.end("the work is done")
