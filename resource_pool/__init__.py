@@ -1,1 +1,1 @@
-"""Resource controllers, their aggregates, and the one door to them."""
+"""Resource controllers, their aggregates, and the client interface to them."""

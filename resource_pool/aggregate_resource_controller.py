@@ -1,9 +1,9 @@
-"""Aggregate resource controller: several RCs that are worth something only together, as one thing.
+"""Aggregate resource controller (ARC): a set of RCs that are useful only together.
 
-An ARC asks the RC manager for its set, lets commands of its one owner through while it holds the set,
-and tells the owner when that begins and ends. It watches its owner: when that is gone or hangs, it
-gives everything back. Nobody has to say goodbye. It hears the same renewals as its RCs, so when their
-leases run out its gate is shut too and the owner knows.
+An ARC requests its set from the RC manager, passes commands of its one owner while it holds the set, and notifies the
+owner of the begin and end of a grant. If its owner dies or hangs, the ARC gives the set back, so an owner need not
+release it. The ARC gets the same renewals as its RCs: when their leases expire, it closes its gate and notifies the
+owner.
 
 Source: RAM 2002, "Resource Pool" and "The RC Scheduler".
 """
@@ -92,33 +92,33 @@ from resource_pool.messages import (
 log = logging.getLogger(__name__)
 
 RC_REPLY_S = 0.8  # chosen: a robot RC itself gives the radio half a second
-OWNER_GONE_S = 0.5  # chosen: a robot is given back within a second of its console's death; a new hub is found sooner
-OWNER_BEAT_S = 0.9  # chosen: less than the RC manager waits for a beat (1 s) with one to spare
-PREPARE_S = 0.9  # chosen: less than the RC manager waits for the opening beyond settling, so it opens in time or never
-NOTICE_S = 1.0  # chosen: an owner that needs longer to take note is noticed by its beat
-NOTICE_AGAIN_S = 0.1  # chosen: a hub that is being restarted is back after some of these; machine seconds
-REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first have RCs started
-ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and an answer given earlier is worth less
-RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # of its parameters those that change while it runs
-ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; later it has overlooked this one
+OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
+OWNER_BEAT_S = 0.9  # chosen: less than the RC manager's limit of 1 s for a beat, with one beat to spare
+PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
+NOTICE_S = 1.0  # chosen: an owner that needs longer fails its beat too
+NOTICE_AGAIN_S = 0.1  # chosen: a restarted hub is back after a few attempts; machine seconds
+REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first ask for the start of RCs
+ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and a later answer is more accurate
+RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while it runs
+ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
 
 
 class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is asked for, and by whom; see ``arc_client.claim_parameters``.
+    """Request and owner of an ARC; see ``arc_client.claim_parameters``.
 
     Attributes:
         owner: Address of the decision process.
-        path: Names and priorities from the mission's root, or of the console alone.
+        path: Names and priorities from the mission's root to the owner, or of the console alone.
         console: True for consoles.
         minimum_runtime_s: Shortest useful time, seconds.
         maximum_runtime_s: End of extensions; 0: the minimum.
         wish: Kind of RC → name.
         features: Kind of RC → features.
-        usage: Period, packet time, deadline, jitter (seconds) and kind of what is sent on the radio.
-        further_usages: The same for each further kind of request.
-        idle: True: no time is wanted yet.
-        stops_at_once: True: nothing must be brought to rest at the end of a slice.
-        may_say_not_now: True: the owner wants to be asked shortly before the end of a slice that can be made longer.
+        usage: Period, packet time, deadline, jitter (seconds) and kind of the packets on the radio.
+        further_usages: The same for each further kind of packet.
+        idle: True: the owner wants no time yet.
+        stops_at_once: True: the owner needs no time to stop at the end of a slice.
+        may_say_not_now: True: ask the owner shortly before the end of a slice that can be extended.
     """
 
     owner: str
@@ -137,7 +137,7 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 @dataclass(frozen=True, slots=True)
 class _Notice:
-    """What the owner is to be told, for how long to wait for its answer (machine seconds), and whether that is over."""
+    """A notice to the owner, the time limit of its answer (machine seconds), and the event of its end."""
 
     notice: Resumed | Suspending | Suspended
     within_s: float
@@ -145,14 +145,14 @@ class _Notice:
 
 
 class AggregateResourceController(Component[ArcParameters]):
-    """Base of every ARC; derive, set ``roles``, override ``prepare``."""
+    """Base class of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
     accepts: ClassVar[types.UnionType | type[Any] | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
-    """Kinds of RC it needs, one of each."""
+    """Kinds of RC in its set, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
-    """Those of them it uses by streams instead of exclusively."""
+    """Kinds of RC that it uses by streams instead of exclusively."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -176,19 +176,19 @@ class AggregateResourceController(Component[ArcParameters]):
 
     # ------------------------------------------------------------------ hooks
     async def prepare(self, epochs: Mapping[str, int]) -> None:
-        """Bring the connected RCs into the state the owner expects.
+        """Bring the connected RCs into the state that the owner expects.
 
-        When: all are connected, before they settle and before the gate opens. What: switch on, tune.
-        Raise a ``Refusal`` or ``LinkError`` if one of them cannot: the set is given back.
+        When: after the connection of all RCs, before they settle and before the gate opens. What: switch on, tune.
+        Raise a ``Refusal`` or ``LinkError`` if an RC cannot: then the ARC gives the set back.
         """
 
     # ------------------------------------------------------------------ for derived classes
     def rc(self, role: str) -> str:
-        """Return the name of the RC chosen for this role.
+        """Return the name of the RC of this role.
 
         Raises:
             NoSuchAction: This kind of ARC has no such role.
-            SwappedOut: None is chosen yet.
+            SwappedOut: No set is chosen yet.
         """
         if role not in self.roles:
             raise NoSuchAction(f"{self.launch.type} has no {role}", role=role)
@@ -198,20 +198,20 @@ class AggregateResourceController(Component[ArcParameters]):
 
     @property
     def epochs(self) -> Mapping[str, int]:
-        """RC → epoch of the connections that are open to commands; empty while there are none."""
+        """RC → epoch of the open connections; empty while the gate is shut."""
         return self._gate.epochs if self._gate.is_open else {}
 
     async def tell_rc(self, role: str, command: Message) -> Applied:
-        """Command one of the RCs and return what it applied."""
+        """Send a command to the RC of this role and return what the RC applied."""
         at = address(Subsystem.RESOURCE_POOL, self.rc(role))
         return await self.bus.ask(at, command, Applied, within_s=RC_REPLY_S)
 
     # ------------------------------------------------------------------ life
     async def connect(self) -> None:
-        """Find the sets of RCs that would do.
+        """Find the sets of RCs that match the claim.
 
         Raises:
-            NoSuchHardware: None would.
+            NoSuchHardware: No set matches.
         """
         given = self.parameters
         question = FindRcs(list(self.roles), given.wish, given.features)
@@ -223,7 +223,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 
     async def serve(self) -> None:
-        """Ask for run time, then watch owner and RC manager until told to stop."""
+        """Send the request, then watch owner and RC manager until the ARC ends."""
         self.start_task(self._send_notices(), "tell owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
@@ -232,16 +232,16 @@ class AggregateResourceController(Component[ArcParameters]):
         self.start_task(self._watch_rc_manager(), "watch RC manager")
 
     async def drain(self) -> None:
-        """Give everything back."""
+        """Give the set back."""
         self._gate.close("self", "", -1.0)
         if self._request is not None:
             try:
                 await self.bus.ask(RC_MANAGER, Withdraw(self.name, "self"), Done, within_s=RC_REPLY_S)
-            except (LinkError, Refusal) as error:  # its RCs come free by this ARC's death or by lease
+            except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
                 log.info("not withdrawn: %s", error)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Obey the RC manager about the gate, and the owner about everything else."""
+        """Obey the RC manager for the gate, and the owner for everything else."""
         match asked.body:
             case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:
                 raise NotFromYou(f"{self.name} does not take {type(asked.body).__name__} from {asked.source}")
@@ -272,11 +272,11 @@ class AggregateResourceController(Component[ArcParameters]):
         return Accepted()
 
     def parameters_changed(self) -> None:
-        """Ask by new run times from the next slice on; the RC manager hears of them as soon as it answers.
+        """Use new run times from the next slice on, and send them to the RC manager.
 
         Raises:
-            NeedsRestart: Something else than a run time changed.
-            MissingRuntime: No slice can be planned for such run times.
+            NeedsRestart: Another parameter than a run time changed.
+            MissingRuntime: No slice can be planned with these run times.
         """
         before, now = self._in_force, self.parameters
         fixed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)} - RUN_TIMES
@@ -289,7 +289,7 @@ class AggregateResourceController(Component[ArcParameters]):
             self._telling = self.start_task(self._tell_run_times(), "tell run times")
 
     def statistics(self) -> dict[str, float]:
-        """Count commands passed on, and refused because nothing was held."""
+        """Count commands that passed, and commands refused because the gate was shut."""
         return {"commands": self._commands, "refused_swapped_out": self._refused}
 
     # ------------------------------------------------------------------ asking for run time
@@ -310,7 +310,7 @@ class AggregateResourceController(Component[ArcParameters]):
         )
 
     async def _send_request(self) -> None:
-        """Ask the RC manager for run time; end if it says that the request can never be served."""
+        """Send the request to the RC manager; end if the RC manager refuses it."""
         request = self._request
         assert request is not None  # noqa: S101  made in connect
         try:
@@ -335,10 +335,10 @@ class AggregateResourceController(Component[ArcParameters]):
         self.story.note(self.name, f"is {scheduled.state}{place}{behind}")
 
     def _choose(self, rcs: Iterable[str]) -> None:
-        """Take this set as the one that was chosen.
+        """Record the set that the RC manager chose.
 
         Raises:
-            NotMySet: It is none of the alternatives asked for.
+            NotMySet: The set is no alternative of the request.
         """
         wanted = set(rcs)
         found = [by_role for by_role in self._sets if set(by_role.values()) == wanted]
@@ -347,20 +347,20 @@ class AggregateResourceController(Component[ArcParameters]):
         self._rcs = found[0]
 
     def _require_runtime(self, least_s: float, most_s: float) -> None:
-        """Refuse run times no slice can be planned for: a later RC manager would refuse the whole request for them.
+        """Refuse run times that no slice can have, because a later RC manager would refuse the whole request.
 
         Raises:
-            MissingRuntime: They are such.
+            MissingRuntime: No slice can have these run times.
         """
         if not (0 < least_s < math.inf and (most_s == 0 or least_s <= most_s < math.inf)):
             raise MissingRuntime(f"{self.name} asks for at least {least_s:g} s and at most {most_s:g} s", arc=self.name)
 
     async def _change_request(self, wish: Message, **changed: bool | float) -> None:
-        """Tell the RC manager; a later one that asks for the request is told the same.
+        """Change the request; the RC manager and its successors get the change.
 
         Raises:
-            Refusal: The RC manager refused; the request is as it was.
-            LinkError: It did not answer. The change stands here, and the next RC manager hears of it.
+            Refusal: The RC manager refused; the request is unchanged.
+            LinkError: The RC manager did not answer. The change stays, and the next RC manager gets it.
         """
         request = self._request
         assert request is not None  # noqa: S101  made in connect
@@ -373,10 +373,10 @@ class AggregateResourceController(Component[ArcParameters]):
             raise
 
     def _ask_by(self, changed: Mapping[str, bool | float]) -> None:
-        """Change request and parameters alike: who asks for these sees what is asked for now."""
+        """Change request and parameters together, so that the parameters show the present request."""
         assert self._request is not None  # noqa: S101  made in connect
         if self._telling is not None:
-            self._telling.cancel()  # what it tells is no longer so
+            self._telling.cancel()  # its run times are outdated
         self._request = msgspec.structs.replace(self._request, **changed)
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
 
@@ -395,15 +395,15 @@ class AggregateResourceController(Component[ArcParameters]):
             await ask_until_answered(
                 self.bus, self.clock, RC_MANAGER, change, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
             )
-        except (Refusal, LinkError) as error:  # the next one that asks for the request hears of them
-            self.story.note(self.name, f"the RC manager did not take its run times: {error}")
+        except (Refusal, LinkError) as error:  # the next RC manager gets them with the request
+            self.story.note(self.name, f"the RC manager did not accept its run times: {error}")
 
     async def _tell_rc_manager(self, wish: Message) -> None:
         await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
 
     def _current_request(self) -> CurrentRequest:
         if self._request is None:
-            raise UnknownRequest(f"{self.name} does not ask for anything yet")
+            raise UnknownRequest(f"{self.name} has no request yet")
         self._asked.set()
         return CurrentRequest(
             self._request,
@@ -415,7 +415,7 @@ class AggregateResourceController(Component[ArcParameters]):
     # ------------------------------------------------------------------ the gate
     async def _open(self, order: OpenGate) -> GateOpens:
         self._choose(order.epochs)
-        if self._gate.epochs == order.epochs:  # the same order came twice: the first goes on undisturbed
+        if self._gate.epochs == order.epochs:  # the same order came twice: the first continues
             if self._gate.is_open:
                 return GateOpens()
             reason = "is being opened already"
@@ -448,7 +448,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._let_through(order)
 
     def _let_through(self, order: OpenGate) -> None:
-        """Open the gate and tell the owner, unless it was closed meanwhile."""
+        """Open the gate and notify the owner, unless the gate was closed meanwhile."""
         if not self._gate.open(order.epochs, self.clock.now_s()):
             return
         self._slice_end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
@@ -470,7 +470,7 @@ class AggregateResourceController(Component[ArcParameters]):
         return GateClosed()
 
     def _shut(self, reason: str, by: str, expected_s: float) -> None:
-        """Let nothing pass any more, and tell the owner if something did."""
+        """Close the gate, and notify the owner if it was open."""
         was_open = self._gate.is_open
         self._gate.close(reason, by, expected_s)
         if self._offering is not None:
@@ -480,26 +480,26 @@ class AggregateResourceController(Component[ArcParameters]):
         if was_open:
             self._notify(Suspended(self.name, reason, by, expected_s))
 
-    # ------------------------------------------------------------------ a slice that ends at a bad moment
+    # ------------------------------------------------------------------ extension of a slice
     async def _offer_more(self, resumed: asyncio.Event) -> None:
-        """Ask the owner shortly before its slice ends whether it needs more, and have that given to it.
+        """Ask the owner shortly before the end of its slice whether it needs more time, and request the extension.
 
-        It is asked again before the end of what it got. Not afterwards: when the RC manager says that the
-        slice is over, that is decided, and others were promised the RCs.
+        The owner is asked again before the end of an extension. It is not asked after the RC manager has ended the
+        slice, because the RCs are then reserved for others.
         """
         await resumed.wait()
         while self._slice_end_s < self._longest_end_s():
             ask_s = self._slice_end_s - ASK_BEFORE_END_S
             if self.clock.now_s() < ask_s:
                 await self.clock.sleep_until_s(ask_s)
-                continue  # it may have been made longer meanwhile
+                continue  # it may have been extended meanwhile
             wanted_s = await self._ask_whether_not_now()
             if not wanted_s > 0:
                 return
             try:
                 await self._extend(self._slice_end_s + max(wanted_s, ASK_BEFORE_END_S))
             except (LinkError, Refusal) as error:
-                self.story.note(self.name, f"its slice was not made longer: {error}")
+                self.story.note(self.name, f"its slice was not extended: {error}")
                 return
 
     async def _ask_whether_not_now(self) -> float:
@@ -508,11 +508,11 @@ class AggregateResourceController(Component[ArcParameters]):
         try:
             return (await self.bus.ask(self._owner, question, Noted, within_s=within_s)).wanted_s
         except (LinkError, Refusal) as error:
-            self.story.note(self._owner, f"did not say whether its slice may end: {error}")
+            self.story.note(self._owner, f"did not answer whether its slice may end: {error}")
             return 0.0
 
     async def _extend(self, until_s: float) -> None:
-        """Have the RC manager let the slice last until then, at most the maximum run time from the grant on."""
+        """Request the extension of the slice until this time, at most the maximum run time from the grant on."""
         until_s = min(until_s, self._longest_end_s())
         await self._tell_rc_manager(Extend(self.name, until_s))
         self._slice_end_s = max(self._slice_end_s, until_s)
@@ -546,39 +546,39 @@ class AggregateResourceController(Component[ArcParameters]):
         )
 
     def _notify(self, notice: Resumed | Suspending | Suspended, within_s: float = NOTICE_S) -> asyncio.Event:
-        """Have the owner told after everything it was told before; the event is set when it took note, or did not."""
+        """Queue a notice after all earlier ones; the event is set when the owner noted it or the limit expired."""
         noted = asyncio.Event()
         self._notices.put_nowait(_Notice(notice, within_s, noted))
         return noted
 
     async def _send_notices(self) -> None:
-        """Tell one notice after the other, so that none overtakes another on its way to a slow owner."""
+        """Send one notice after the other, so that no notice overtakes another on its way to a slow owner."""
         while True:
             waiting = await self._notices.get()
             await self._send_until_noted(waiting)
             waiting.done.set()
 
     async def _send_until_noted(self, waiting: _Notice) -> None:
-        """Tell it until the owner took note or there is something newer to tell: a notice may get lost.
+        """Repeat a notice, which may get lost, until the owner notes it or a newer notice waits.
 
-        The owner may also hang or be gone, which others find out.
+        Other checks detect an owner that hangs or is gone.
         """
         while True:
             try:
                 await self.bus.ask(self._owner, waiting.notice, Noted, within_s=waiting.within_s)
                 return
             except Refusal as refusal:
-                self.story.note(self._owner, f"did not take note of {type(waiting.notice).__name__}: {refusal}")
+                self.story.note(self._owner, f"did not note {type(waiting.notice).__name__}: {refusal}")
                 return
             except LinkError as error:
-                self.story.note(self._owner, f"did not take note of {type(waiting.notice).__name__}: {error}")
+                self.story.note(self._owner, f"did not note {type(waiting.notice).__name__}: {error}")
             if isinstance(waiting.notice, Suspending) or not self._notices.empty():
                 return
             await self.clock.sleep_s(NOTICE_AGAIN_S * self.clock.rate)
 
     # ------------------------------------------------------------------ watching
     def _heard_leases(self, envelope: Envelope[Any]) -> None:
-        """Count the set as held for longer if every one of its RCs was renewed."""
+        """Extend the lease of the set if all its RCs were renewed."""
         leases: Leases = envelope.body
         renewed = {lease.rc: lease.epoch for lease in leases.leases if lease.arc == self.name}
         if self._gate.epochs and self._gate.epochs.items() <= renewed.items():
@@ -586,19 +586,19 @@ class AggregateResourceController(Component[ArcParameters]):
         self._doubt(renewed if not self._gate.epochs else {}, envelope.stamp_s)
 
     def _doubt(self, unfounded: dict[str, int], now_s: float) -> None:
-        """Ask anew if for a whole lease a hold is renewed that this ARC does not have: a former one of its name had it.
+        """Send the request again if the RC manager renews a hold for a whole lease that this ARC does not have.
 
-        For less than that it may be about to be opened.
+        The hold may belong to an earlier ARC of this name. For a shorter time it may be one that is about to open.
         """
         if unfounded != self._unfounded:
             self._unfounded, self._unfounded_since_s = unfounded, now_s
         elif unfounded and now_s - self._unfounded_since_s >= LEASE_S * self.clock.rate:
             self._unfounded = {}
-            self.tell(self.name, "is counted as running and holds nothing: asks anew")
+            self.tell(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")
 
     async def _watch_lease(self) -> None:
-        """Shut the gate when the RCs' leases are over: they are in their safe states then, and the owner must know."""
+        """Close the gate when the leases expire, because the RCs go to their safe states and the owner must know."""
         while True:
             self._leased.clear()
             if not self._gate.epochs:
@@ -606,21 +606,21 @@ class AggregateResourceController(Component[ArcParameters]):
                 continue
             await self.clock.sleep_until_s(self._lease_until_s)
             if self._gate.epochs and self.clock.now_s() >= self._lease_until_s:
-                self.tell(self.name, "its lease is over: nothing was renewed in time", LogLevel.WARNING)
+                self.tell(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
                 self._shut("lease", "rc_manager", -1.0)
                 if self._manager is not None and self._manager.is_there:
                     await self._ask_anew()
 
     async def _ask_anew(self) -> None:
-        """Give back what an RC manager that lives still counts as held, and ask again."""
+        """Withdraw the holds that the RC manager still counts, and send the request again."""
         gone = Withdraw(self.name, "lease")
         try:
             await ask_until_answered(
                 self.bus, self.clock, RC_MANAGER, gone, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
             )
-        except Refusal as unknown:  # it has restarted meanwhile
+        except Refusal as unknown:  # the RC manager has restarted meanwhile
             log.info("not withdrawn: %s", unknown)
-        except LinkError:  # it is gone after all: the next one asks
+        except LinkError:  # the RC manager is gone: its successor asks
             return
         await self._send_request()
 
@@ -633,7 +633,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self.end(f"its owner {self._owner} is gone")
 
     async def _beat(self) -> None:
-        """Tell the RC manager that this ARC and its owner live, for as long as both do."""
+        """Publish a heartbeat while this ARC and its owner live."""
         while True:
             try:
                 await self.bus.ask(self._owner, AskBeat(self._arc_state()), Noted, within_s=OWNER_BEAT_S)
@@ -646,7 +646,7 @@ class AggregateResourceController(Component[ArcParameters]):
             await self.clock.sleep_s(BEAT_EVERY_S * self.clock.rate)
 
     async def _watch_rc_manager(self) -> None:
-        """Ask anew if a restarted RC manager has not asked for the request by itself."""
+        """Send the request again if a restarted RC manager has not asked for it."""
         manager = self._manager = PeerMonitor(self.bus, RC_MANAGER)
         try:
             await manager.wait_there()

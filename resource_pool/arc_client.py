@@ -1,7 +1,7 @@
-"""The one door to the resource pool: all that a decision process imports of it.
+"""The client interface of the resource pool: decision processes import nothing else of it.
 
-A decision process (behavior or console) claims an ARC, hears from it when its RCs come and go, and
-speaks to it while they are there. Everything said here is refused by the ARC if it does not hold.
+A decision process (behavior or console) claims an ARC, gets a notice at the begin and end of each grant, and sends
+commands during a grant. The ARC refuses commands outside a grant.
 """
 
 from __future__ import annotations
@@ -97,42 +97,42 @@ __all__ = [
 
 log = logging.getLogger(__name__)
 
-REPLY_TIME_S = 1.0  # chosen: a command that takes longer is worth a stop
-START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are only now being started
+REPLY_TIME_S = 1.0  # chosen: a command that takes longer justifies a stop
+START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are starting
 
 
 class NotMyArc(Refusal):
-    """A notice came from an ARC this decision process does not claim."""
+    """This decision process does not claim the ARC of the notice."""
 
     code = "arc.not_mine"
     remedy = "Nothing to do: an ARC whose owner does not know it ends by itself."
 
 
 class ArcListener(Protocol):
-    """What a decision process does when its RCs come and go."""
+    """A decision process's reactions to the begin and end of grants."""
 
     async def arc_resumed(self, notice: Resumed) -> None:
-        """Go on: commands pass from now on."""
+        """Continue: commands pass from now on."""
 
     async def arc_suspending(self, notice: Suspending) -> None:
-        """Stop cleanly; return when that is done, within ``notice.deadline_s``."""
+        """Stop cleanly; return after that, within ``notice.deadline_s``."""
 
     async def arc_suspended(self, notice: Suspended) -> None:
-        """Take note that the RCs are gone; keep your state."""
+        """Stop sending commands, because the RCs are gone; keep your state."""
 
 
 class ArcClient:
-    """A decision process's hold on one ARC. Make one with ``claim``."""
+    """A decision process's client of one ARC. Make one with ``claim``."""
 
     def __init__(self, bus: Bus, arc: str, listener: ArcListener, not_now: Callable[[], float] | None = None) -> None:
         """Begin with nothing claimed.
 
         Args:
-            bus: Of the decision process.
+            bus: Bus of the decision process.
             arc: Name of the ARC.
-            listener: Told when the RCs come and go.
-            not_now: Says how many seconds are still needed beyond the end of the slice that is about to end; asked
-                only if the ARC was claimed with ``may_say_not_now``.
+            listener: Called at the begin and end of grants.
+            not_now: Returns how many seconds are still needed beyond the end of the present slice; called only if the
+                ARC was claimed with ``may_say_not_now``.
         """
         self.arc = arc
         self.address = address(Subsystem.RESOURCE_POOL, arc)
@@ -163,30 +163,30 @@ class ArcClient:
         stops_at_once: bool = False,
         not_now: Callable[[], float] | None = None,
     ) -> ArcClient:
-        """Have an ARC of this kind started for the component of ``bus`` and its RCs asked for.
+        """Start an ARC of this kind for the component of ``bus``; the ARC requests its RCs.
 
-        The caller answers ``ArcNotice`` questions by handing them to ``handle``; notices may arrive
-        before this returns, so route them by ``notice.arc == arc_name(bus, kind)``.
+        The caller passes ``ArcNotice`` questions to ``handle``. Notices may arrive before this method returns, so route
+        them by ``notice.arc == arc_name(bus, kind)``.
 
         Args:
-            bus: Of the decision process; its source is the owner.
+            bus: Bus of the decision process; its source is the owner.
             kind: Component type of the ARC: ``drive``, ``video_drive``, ``capture``.
-            listener: Told when the RCs come and go.
+            listener: Called at the begin and end of grants.
             path: Priority path from the mission's root, or of the console alone.
             minimum_runtime_s: Shortest useful time, seconds, above 0.
             maximum_runtime_s: End of extensions; 0: the minimum.
             wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
             features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
-            usage: How often commands are sent on the radio; several: one for each kind of command, ``drive`` among
-                them. A kind of its own for ``jump`` or ``transmitter`` lets those go while ``drive`` is slow.
+            usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
+                kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
             console: True for consoles.
-            idle: True to want no time yet.
-            stops_at_once: True if nothing must be brought to rest at the end of a slice: ``arc_suspending``
-                is not called then, and the hand-over does not wait for the owner.
-            not_now: Asked shortly before a slice ends that can be made longer: seconds still needed; 0: none.
+            idle: True: no time is wanted yet.
+            stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
+                called, and the context switch does not wait for the owner.
+            not_now: Called shortly before the end of a slice that can be extended: seconds still needed; 0: none.
 
         Raises:
-            Refusal: The ARC could not be started or its request can never be served.
+            Refusal: The ARC did not start, or its request can never be served.
             LinkError: The placer did not answer; the outcome is unknown.
         """
         client = cls(bus, arc_name(bus, kind), listener, not_now)
@@ -207,7 +207,7 @@ class ArcClient:
         return client
 
     async def start(self, kind: str, parameters: dict[str, Any]) -> None:
-        """Have the ARC started; see ``claim``."""
+        """Start the ARC; see ``claim``."""
         order = Start(kind, self.arc, parameters)
         await self._bus.ask(PLACER, order, Started, within_s=START_TIME_S)
 
@@ -223,20 +223,20 @@ class ArcClient:
     ) -> None:
         """Claim the ARC, and claim it again whenever it is gone, until cancelled.
 
-        The listener hears ``arc_suspended`` with the reason ``lost`` for a grant that ended with its ARC.
+        If a grant ends with its ARC, the listener gets ``arc_suspended`` with the reason ``lost``.
 
         Args:
-            clock: The mission's time.
+            clock: The mission's clock.
             kind: As for ``claim``.
             parameters: Made by ``claim_parameters``.
-            rests: The ARC was started with these parameters before and rests: it is only told that time is wanted
+            rests: True: the ARC was started with these parameters before and rests; it is only asked to want time
                 again, unless it is gone.
-            patience_s: For so long the very first start is tried again after a refusal, seconds of the machine: a host
-                that is just coming back, or an ARC of an earlier life, may be the reason.
+            patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be
+                returning or an ARC of an earlier life may be ending.
             on_changed: Called when ``wish.absence()`` may have changed.
 
         Raises:
-            Refusal: The ARC could not be started or its request can never be served.
+            Refusal: The ARC did not start, or its request can never be served.
         """
         is_there = rests and await self._wake()
         give_up_s = clock.now_s() + patience_s * clock.rate
@@ -263,10 +263,10 @@ class ArcClient:
             await self._lost()
 
     async def handle(self, notice: ArcNotice) -> Noted:
-        """Take note of what the ARC says and tell the listener; the reply goes back to the ARC.
+        """Record a notice of the ARC and call the listener; return the reply to the ARC.
 
         Raises:
-            NotMyArc: It comes from another ARC than the one claimed.
+            NotMyArc: The notice comes from another ARC than the claimed one.
         """
         if notice_arc(notice) not in ("", self.arc):
             raise NotMyArc(f"{notice_arc(notice)} is not claimed here, {self.arc} is", arc=notice_arc(notice))
@@ -275,7 +275,7 @@ class ArcClient:
                 if self.granted is not None and self.granted.epochs == notice.epochs:
                     if notice.until_s > self.granted.until_s:
                         self.granted = notice
-                    return Noted()  # told again: the answer to the first was lost, or a beat said it before
+                    return Noted()  # repeated: the first answer was lost, or a heartbeat was earlier
                 await self._lost()
                 self.granted, self.suspended = notice, None
                 self._granted.set()
@@ -298,17 +298,17 @@ class ArcClient:
         return Noted()
 
     async def wait_granted(self) -> Resumed:
-        """Return when the RCs are held; at once if they are."""
+        """Return when the RCs are granted."""
         while self.granted is None:
             await self._granted.wait()
         return self.granted
 
     async def drive(self, left_rad_s: float, right_rad_s: float) -> Applied:
-        """Turn the wheels; return what was applied after clipping.
+        """Turn the wheels; return the speeds that were applied after clipping.
 
         Raises:
-            SwappedOut: The ARC holds nothing now; nothing was sent.
-            EmergencyStopped: An operator stopped the robot, or did so before this command and after the one before.
+            SwappedOut: The ARC has no grant; no packet was sent.
+            EmergencyStopped: An operator has stopped the robot, or stopped it between the last command and this one.
         """
         return await self._move(Drive(left_rad_s, right_rad_s, self._last_stop()))
 
@@ -321,14 +321,14 @@ class ArcClient:
         return await self._move(Jump(self._last_stop()))
 
     def heard_stop(self, state: StopState) -> bool:
-        """Take note that a robot was stopped or may move again; return whether that is news.
+        """Record that a robot was stopped or freed; return whether this is news.
 
-        Whoever is told of a stop gives the next command knowing of it; a person has to be made aware of it first.
+        The next command counts as given with knowledge of the stop, so show the stop to a person before.
         """
         return self._stops.heard(state)
 
     def frames(self, listener: Callable[[Frame], None]) -> Subscription:
-        """Call the listener with the newest picture of the current grant; those of earlier grants never arrive."""
+        """Call the listener with the newest picture of the present grant; pictures of earlier grants never arrive."""
 
         def arrived(envelope: Envelope[Any]) -> None:
             frame: Frame = envelope.body
@@ -338,10 +338,10 @@ class ArcClient:
         return self._bus.subscribe(self.address, Conversation.FRAMES, Frame, arrived, latest=True)
 
     async def wait_stop_lifted(self, robot: str) -> None:
-        """Return when no operator's stop keeps this robot from moving; at once if none does.
+        """Return when no operator's stop is in force on this robot.
 
         Raises:
-            LinkError: The robot's RC did not say whether one does.
+            LinkError: The robot's RC did not answer.
         """
         lifted = asyncio.Event()
 
@@ -358,21 +358,22 @@ class ArcClient:
             hearing.close()
 
     async def state(self) -> ArcState:
-        """Return what the ARC holds and why not."""
+        """Return the ARC's RCs, or why it has no grant."""
         return await self._bus.ask(self.address, AskArc(), ArcState, within_s=REPLY_TIME_S)
 
     async def idle(self, idle: bool = True) -> None:
-        """Say that no time is wanted now, or that it is wanted again."""
+        """Want no time, or want time again."""
         await self._request(WantIdle(idle))
 
     async def rest(self) -> None:
-        """Give the RCs back and keep the ARC, which wants no time until it is kept with ``rests``.
+        """Give the RCs back and keep the ARC, which wants no time until ``keep`` with ``rests``.
 
-        When: while it is granted; an ARC that waits could just be about to be. Nothing is held afterwards, and to ask
-        again takes no new process.
+        When: during a grant, because a waiting ARC could be granted at this moment. Afterwards the ARC holds no RC, and
+            a
+        new request needs no new process.
 
         Raises:
-            LinkError: The ARC did not confirm it; release it.
+            LinkError: The ARC did not confirm; release it.
         """
         await self.idle()
         try:
@@ -382,15 +383,15 @@ class ArcClient:
             raise ReplyTimeout(f"{self.arc} still holds its RCs {REPLY_TIME_S:g} s after it was told to rest") from None
 
     async def want_runtime(self, minimum_runtime_s: float, maximum_runtime_s: float = 0.0) -> None:
-        """Ask for other run times from the next slice on."""
+        """Request other run times from the next slice on."""
         await self._request(WantRuntime(minimum_runtime_s, maximum_runtime_s))
 
     async def want_longer(self, until_s: float) -> None:
-        """Let the running slice last until this mission time, at most the maximum run time."""
+        """Extend the present slice until this mission time, at most to the maximum run time."""
         await self._request(WantLonger(until_s))
 
     async def release(self, reason: str = "done") -> None:
-        """Give the RCs back and end the ARC. Afterwards it is gone, also if it was gone before."""
+        """Give the RCs back and end the ARC. Idempotent."""
         try:
             await self._bus.ask(self.address, Release(reason), Accepted, within_s=REPLY_TIME_S)
         except LinkError as error:
@@ -401,7 +402,7 @@ class ArcClient:
             log.info("%s was gone already: %s", self.arc, refusal.detail)
 
     async def _wake(self) -> bool:
-        """Have an ARC that rests ask again; return False if it is not certain that it does."""
+        """Wake a resting ARC, which then sends its request; return False if this is not certain."""
         try:
             await self.idle(False)
         except (LinkError, Refusal) as error:
@@ -412,7 +413,7 @@ class ArcClient:
     async def _start_anew(
         self, clock: Clock, kind: str, parameters: dict[str, Any], on_changed: Callable[[], None], give_up_s: float
     ) -> None:
-        """Start the ARC; one that an earlier life of the owner left behind is ended first."""
+        """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
         while True:
             try:
                 return await self.start(kind, parameters)
@@ -435,7 +436,7 @@ class ArcClient:
     async def _end_leftover(self) -> None:
         try:
             await self._bus.ask(PLACER, StopComponent(self.arc, "left from before"), Ended, within_s=START_TIME_S)
-        except Refusal:  # a placer that never placed it cannot end it: it is told itself
+        except Refusal:  # the placer does not have it: stop it directly
             with contextlib.suppress(LinkError):
                 await self._bus.ask(self.address, Stop("left from before"), Stopping, within_s=REPLY_TIME_S)
         except LinkError as error:
@@ -465,7 +466,7 @@ class ArcClient:
             await self._agree(state)
 
     async def _agree(self, state: ArcState) -> None:
-        """Believe what the ARC says of itself, as if its notice had come."""
+        """Apply the ARC's state as if its notice had arrived."""
         if state.granted and (self.granted is None or self.granted.epochs != state.epochs):
             await self.handle(Resumed(self.arc, state.rcs, state.epochs, -1.0))
         elif self.granted is not None and not state.granted:
@@ -477,7 +478,7 @@ class ArcClient:
 
     @property
     def epochs(self) -> dict[str, int]:
-        """RC → epoch of what is held now; empty while nothing is."""
+        """RC → epoch of the present grant; empty without a grant."""
         return self.granted.epochs if self.granted is not None else {}
 
     def _last_stop(self) -> int:
@@ -511,12 +512,12 @@ def claim_parameters(
     stops_at_once: bool = False,
     may_say_not_now: bool = False,
 ) -> dict[str, Any]:
-    """Return the parameters an ARC is started with for this owner; see ``ArcClient.claim``.
+    """Return the parameters of an ARC for this owner; see ``ArcClient.claim``.
 
-    With ``may_say_not_now`` the owner is asked shortly before the end of each slice that can be made longer.
+    With ``may_say_not_now`` the owner is asked shortly before the end of each slice that can be extended.
 
     Raises:
-        ValueError: No usage is given, or two of one kind.
+        ValueError: No usage is given, or two usages have the same kind.
     """
     usages = [usage] if isinstance(usage, Usage) else list(usage)
     kinds = {one.kind for one in usages}
@@ -540,27 +541,27 @@ def claim_parameters(
 
 
 async def stop_robot(bus: Bus, robot: str, reason: str, user: str = "") -> StopState:
-    """Stop a robot now, whoever holds it, and let nothing move it until ``lift_stop``; the holder keeps its grant.
+    """Stop a robot, also one that an ARC holds; nothing moves it until ``lift_stop``, and the holder keeps its grant.
 
-    Needs no grant, neither ARC nor RC manager; a second stop keeps the first one's author. For operators only.
+    A stop needs neither grant nor ARC nor RC manager; a second stop keeps the first one's author. For operators only.
 
     Raises:
         NotFromYou: The component of ``bus`` is no operator.
-        LinkError: The robot's RC did not answer: whether it stopped is unknown.
+        LinkError: The robot's RC did not answer; the outcome is unknown.
     """
     return await _ask_robot(bus, robot, EmergencyStop(reason, user))
 
 
 async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
-    """Let a robot move again that was stopped.
+    """Lift the stop of a robot.
 
     Args:
-        bus: Of an operator.
-        stop: The one that was seen.
-        user: Who wants it, for people.
+        bus: Bus of an operator.
+        stop: The stop that the operator saw.
+        user: Name of the operator, for people.
 
     Raises:
-        OtherStop: Somebody stopped it anew since.
+        OtherStop: A newer stop is in force.
         NotFromYou: The component of ``bus`` is no operator.
         LinkError: The robot's RC did not answer.
     """
@@ -568,16 +569,16 @@ async def lift_stop(bus: Bus, stop: StopState, user: str = "") -> StopState:
 
 
 async def ask_stop(bus: Bus, robot: str) -> StopState:
-    """Return whether an operator's stop keeps the robot from moving.
+    """Return whether an operator's stop is in force on the robot.
 
     Raises:
-        LinkError: Its RC did not answer.
+        LinkError: The robot's RC did not answer.
     """
     return await _ask_robot(bus, robot, AskStop())
 
 
 def watch_stops(bus: Bus, listener: Callable[[StopState], None], robot: str = "*") -> Subscription:
-    """Call the listener whenever this robot, or any, is stopped or may move again."""
+    """Call the listener whenever this robot, or any, is stopped or freed."""
     at = f"{Subsystem.RESOURCE_POOL}/{robot}"
     return bus.subscribe(at, Conversation.EVENTS, StopState, lambda heard: listener(heard.body))
 
@@ -587,7 +588,7 @@ async def _ask_robot(bus: Bus, robot: str, question: Message) -> StopState:
 
 
 def notice_arc(notice: ArcNotice) -> str:
-    """Return the ARC a notice comes from, empty if it does not say."""
+    """Return the ARC of a notice, empty if the notice names none."""
     return "" if isinstance(notice, AskBeat) else notice.arc
 
 

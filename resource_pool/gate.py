@@ -1,9 +1,8 @@
-"""The gate of an ARC: commands pass only while its RCs are its own.
+"""The gate of an ARC: commands pass only during a grant.
 
-Pure: what the RC manager said goes in, whether and under which epochs commands pass comes out.
+Pure: the RC manager's orders go in; whether commands pass, and under which epochs, comes out.
 
-States: shut → ``prepare`` → preparing → ``open`` → open → ``close`` → shut; a close wins over a
-preparation that is still under way.
+States: shut → ``prepare`` → preparing → ``open`` → open → ``close`` → shut. ``close`` also ends a preparation.
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ from resource_pool.messages import SwappedOut
 
 @dataclass(slots=True)
 class Gate:
-    """Whether commands pass.
+    """State of the gate.
 
     Attributes:
         arc: The ARC, for refusals.
-        epochs: RC → epoch of the connection being prepared or open; empty while shut.
+        epochs: RC → epoch of the preparing or open connection; empty while shut.
         is_open: True while commands of the decision process pass.
         granted_s: Mission time of the opening; negative while not open.
         reason: Why it is shut.
-        by: Because of whom.
+        by: The ARC or operator that caused it.
         expected_s: Mission time of the next expected slot; negative: unknown.
     """
 
@@ -37,28 +36,28 @@ class Gate:
     expected_s: float = -1.0
 
     def prepare(self, epochs: Mapping[str, int]) -> None:
-        """Take over the epochs of a new connection; commands do not pass yet."""
+        """Record the epochs of a new connection; commands do not pass yet."""
         self.epochs, self.is_open, self.granted_s = dict(epochs), False, -1.0
 
     def open(self, epochs: Mapping[str, int], now_s: float) -> bool:
-        """Let commands pass, unless another connection or a close came meanwhile; return whether they do."""
+        """Open the gate, unless another connection or a close came meanwhile; return whether it is open."""
         if self.epochs != epochs:
             return False
         self.is_open, self.granted_s, self.reason, self.by, self.expected_s = True, now_s, "", "", -1.0
         return True
 
     def close(self, reason: str, by: str, expected_s: float) -> bool:
-        """Let nothing pass; return whether something did or was about to."""
+        """Close the gate; return whether it was open or preparing."""
         was_in_use = bool(self.epochs)
         self.epochs, self.is_open, self.granted_s = {}, False, -1.0
         self.reason, self.by, self.expected_s = reason, by, expected_s
         return was_in_use
 
     def epoch_of(self, rc: str) -> int:
-        """Return the epoch under which the RC may be commanded.
+        """Return the epoch for commands to the RC.
 
         Raises:
-            SwappedOut: Commands do not pass now.
+            SwappedOut: The gate is shut.
         """
         if not self.is_open:
             because = f" because of {self.by}" if self.by else ""

@@ -1,4 +1,4 @@
-"""Who holds an RC: epochs only grow, a unit RC has one holder, a hold lasts as long as its lease.
+"""Holds of an RC: epochs only grow, a unit RC has one holder, a hold lasts as long as its lease.
 
 Rules of this file: pure; time is an argument; no bus. The RC's loop reports and obeys.
 
@@ -20,10 +20,10 @@ class Hold:
 
     Attributes:
         arc: The ARC.
-        epoch: Of this connection.
+        epoch: Epoch of the connection.
         since_s: Mission time of the connection.
         lease_until_s: Mission time at which it ends unless renewed.
-        use: How the ARC uses the RC.
+        use: The ARC's use of the RC.
         companions: The other RCs of the set with their epochs.
         rank: Place among the holders by user priority, 0 first.
     """
@@ -41,9 +41,9 @@ class HoldTable:
     """The holds of one RC.
 
     Args:
-        rc: Its name, for refusals.
+        rc: Name of the RC, for refusals.
         sharable: True if several ARCs may hold it.
-        last_epoch: Epochs up to this one are over.
+        last_epoch: Epochs up to this one are stale.
     """
 
     def __init__(self, rc: str, *, sharable: bool, last_epoch: int) -> None:
@@ -52,18 +52,18 @@ class HoldTable:
 
     @property
     def last_epoch(self) -> int:
-        """Largest epoch seen."""
+        """Largest known epoch."""
         return self._last_epoch
 
     def holds(self) -> list[Hold]:
-        """Return all holds, those of higher user priority first."""
+        """Return all holds, higher user priority first."""
         return sorted(self._holds.values(), key=lambda hold: (hold.rank, hold.arc))
 
     def connect(self, hold: Hold) -> None:
-        """Let the ARC hold the RC.
+        """Connect the ARC.
 
         Raises:
-            StaleEpoch: The epoch is not larger than every one before.
+            StaleEpoch: The epoch is not larger than all earlier ones.
             Held: Another ARC holds this unit RC.
         """
         self.check(hold)
@@ -71,11 +71,11 @@ class HoldTable:
         self._holds[hold.arc] = hold
 
     def check(self, hold: Hold) -> Hold | None:
-        """Change nothing; return the ARC's present hold, which this one would replace.
+        """Check a connection without a change; return the ARC's present hold, which it would replace.
 
         Raises:
-            StaleEpoch: As ``connect`` would.
-            Held: As ``connect`` would.
+            StaleEpoch: As for ``connect``.
+            Held: As for ``connect``.
         """
         if hold.epoch <= self._last_epoch:
             raise StaleEpoch(
@@ -89,16 +89,16 @@ class HoldTable:
         return self._holds.get(hold.arc)
 
     def find(self, arc: str, epoch: int) -> Hold | None:
-        """Return the ARC's hold of this epoch, if it is the present one."""
+        """Return the ARC's present hold, if it has this epoch."""
         hold = self._holds.get(arc)
         return hold if hold is not None and hold.epoch == epoch else None
 
     def has(self, arc: str, epoch: int) -> bool:
-        """Say whether the ARC holds the RC under this epoch."""
+        """Return whether the ARC holds the RC under this epoch."""
         return self.find(arc, epoch) is not None
 
     def disconnect(self, arc: str, epoch: int) -> Hold | None:
-        """End the ARC's hold if it is of this epoch or an older one; return what was ended."""
+        """End the ARC's hold if its epoch is this one or older; return the ended hold."""
         self._last_epoch = max(self._last_epoch, epoch)
         hold = self._holds.get(arc)
         if hold is None or hold.epoch > epoch:
@@ -106,7 +106,7 @@ class HoldTable:
         return self._holds.pop(arc)
 
     def admit(self, arc: str, epoch: int) -> Hold:
-        """Return the hold under which this command may be carried out.
+        """Return the hold that admits this command.
 
         Raises:
             StaleEpoch: The ARC does not hold the RC under this epoch.
@@ -122,10 +122,10 @@ class HoldTable:
         return hold
 
     def renew(self, arc: str, epoch: int, until_s: float, rank: int = -1) -> bool:
-        """Let the hold of this epoch last until then at least, with this rank unless it is negative.
+        """Renew the hold of this epoch at least until this time, with this rank unless it is negative.
 
         Returns:
-            Whether there is such a hold.
+            Whether the ARC has such a hold.
         """
         hold = self._holds.get(arc)
         if hold is None or hold.epoch != epoch:
@@ -136,12 +136,12 @@ class HoldTable:
         return True
 
     def expire(self, now_s: float) -> list[Hold]:
-        """End and return the holds whose lease is over."""
+        """End and return the holds whose leases have expired."""
         over = [hold for hold in self._holds.values() if hold.lease_until_s <= now_s]
         for hold in over:
             del self._holds[hold.arc]
         return over
 
     def next_expiry_s(self) -> float | None:
-        """Return when the next lease is over unless renewed; None if nobody holds the RC."""
+        """Return when the next lease expires; None without a hold."""
         return min((hold.lease_until_s for hold in self._holds.values()), default=None)

@@ -1,11 +1,11 @@
-"""What is said inside the resource pool and at its one door, the ARCs.
+"""Messages of the resource pool and of its client interface, the ARCs.
 
 * decision process → ARC: ``ArcQuestion``; ARC → decision process: ``ArcNotice``.
 * ARC → scout RC: ``ScoutCommand``; scout RC → command radio RC: ``RadioCommand``; ARC → framegrabber RC: ``Tune``.
-* framegrabber RC → whoever listens to its ARC: ``Frame``, published under the ARC's address.
-* operator → robot RC, past ARC and RC manager: ``EmergencyQuestion``; robot RC → whoever listens: ``StopState``.
+* framegrabber RC → subscribers of its ARC: ``Frame``, published under the ARC's address.
+* operator → robot RC, past ARC and RC manager: ``EmergencyQuestion``; robot RC → subscribers: ``StopState``.
 
-Commands to RCs are questions: each is answered with what was applied, or refused with ``StaleEpoch``.
+Commands to RCs are questions: the answer contains the applied values, or is the refusal ``StaleEpoch``.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Drive(Message, frozen=True):
     Attributes:
         left_rad_s: Left wheel, forward is positive.
         right_rad_s: Right wheel.
-        after_stop: Number of the robot's last stop that whoever says this knows to be lifted; 0: of none.
+        after_stop: Number of the robot's last stop whose lift the sender knows; 0: no stop.
     """
 
     left_rad_s: WheelSpeed
@@ -72,32 +72,32 @@ class Jump(Message, frozen=True):
 
 
 class WantIdle(Message, frozen=True):
-    """Nothing to do now (True), or time is wanted again (False)."""
+    """Want no time (True), or want time again (False)."""
 
     idle: bool
 
 
 class WantRuntime(Message, frozen=True):
-    """Other run times from the next slice on."""
+    """Request other run times from the next slice on."""
 
     minimum_runtime_s: RunTime
     maximum_runtime_s: RunTime = 0.0
 
 
 class WantLonger(Message, frozen=True):
-    """Let the running slice last until this mission time."""
+    """Extend the present slice until this mission time."""
 
     until_s: Instant
 
 
 class Release(Message, frozen=True):
-    """Done with this ARC: it withdraws, frees its RCs and ends."""
+    """Release this ARC: it withdraws its request, frees its RCs and ends."""
 
     reason: Text = ""
 
 
 class AskArc(Message, frozen=True):
-    """What do you hold?"""
+    """Ask for the state of an ARC."""
 
 
 class ArcState(Message, frozen=True):
@@ -111,7 +111,7 @@ class ArcState(Message, frozen=True):
         granted: True while commands pass.
         epochs: RC name → epoch while granted.
         reason: Why it is swapped out, empty while granted.
-        by: Because of whom.
+        by: The ARC or operator that caused it.
         expected_start_s: Next expected slot, mission time; negative: unknown.
     """
 
@@ -127,18 +127,18 @@ class ArcState(Message, frozen=True):
 
 
 class Accepted(Message, frozen=True):
-    """Answer to questions that need no other: done."""
+    """Answer to questions without a result."""
 
 
 class Applied(Message, frozen=True):
-    """What an RC really did with a command.
+    """The effect of a command at an RC.
 
     Attributes:
         rc: The RC.
-        epoch: Under which grant.
+        epoch: Epoch of the grant.
         at_s: Mission time.
         command: ``drive``, ``halt``, ``jump``, ``transmitter``.
-        values: Values after clipping to the hardware's limits, units in the names.
+        values: Applied values, clipped to the hardware's limits, with units in their names.
     """
 
     rc: Mention
@@ -153,13 +153,13 @@ ArcQuestion = Drive | Halt | Jump | WantIdle | WantRuntime | WantLonger | Releas
 
 # ---------------------------------------------------------------------- ARC → decision process
 class Resumed(Message, frozen=True):
-    """The RCs are yours: commands pass from now on.
+    """The RCs are granted: commands pass from now on.
 
     Attributes:
         arc: The ARC.
-        rcs: Kind → name of what you hold.
+        rcs: Kind → name of the RCs.
         epochs: RC name → epoch.
-        until_s: The slice lasts at least until this mission time.
+        until_s: Mission time until which the slice lasts at least.
     """
 
     arc: Mention
@@ -169,12 +169,12 @@ class Resumed(Message, frozen=True):
 
 
 class SliceEnds(Message, frozen=True):
-    """The slice may end then: is that a bad moment? Asked only of owners that said they may answer "not now".
+    """Ask whether the slice may end at this time. Only owners that may answer "not now" get this question.
 
     Attributes:
         arc: The ARC.
         until_s: Mission time at which the slice may end.
-        most_s: Mission time until which it can be made longer.
+        most_s: Mission time until which it can be extended.
     """
 
     arc: Mention
@@ -183,7 +183,7 @@ class SliceEnds(Message, frozen=True):
 
 
 class Suspending(Message, frozen=True):
-    """The slice ends: stop cleanly; answering means you have."""
+    """The slice ends: stop cleanly, then answer."""
 
     arc: Mention
     reason: Text
@@ -192,7 +192,7 @@ class Suspending(Message, frozen=True):
 
 
 class Suspended(Message, frozen=True):
-    """The RCs are gone: commands are refused until the next ``Resumed``."""
+    """The grant has ended: commands are refused until the next ``Resumed``."""
 
     arc: Mention
     reason: Text
@@ -201,10 +201,10 @@ class Suspended(Message, frozen=True):
 
 
 class AskBeat(Message, frozen=True):
-    """Does your loop run?
+    """Heartbeat question to the owner.
 
     Attributes:
-        state: How the ARC is, so that an owner that was told otherwise knows better: a notice may come late.
+        state: The ARC's state, which corrects an owner whose notice is late or lost.
     """
 
     state: ArcState | None = None
@@ -214,7 +214,7 @@ class Noted(Message, frozen=True):
     """Answer to every notice.
 
     Attributes:
-        wanted_s: To ``SliceEnds``: seconds still needed beyond that end ("not now"), an estimate; 0: none.
+        wanted_s: For ``SliceEnds``: estimated seconds still needed beyond that end ("not now"); 0: none.
     """
 
     wanted_s: Duration = 0.0
@@ -228,9 +228,9 @@ class CommandScout(Message, frozen=True):
     """A command to a robot under a grant.
 
     Attributes:
-        arc: Who commands.
-        epoch: Of the scout RC's connection.
-        command: What to do.
+        arc: The ARC that commands.
+        epoch: Epoch of the scout RC's connection.
+        command: The command.
     """
 
     arc: Mention
@@ -239,7 +239,7 @@ class CommandScout(Message, frozen=True):
 
 
 class SwitchTransmitter(Message, frozen=True):
-    """Turn the robot's video transmitter on at a frequency, or off.
+    """Switch the robot's video transmitter on at a frequency, or off.
 
     Attributes:
         on: On or off.
@@ -251,23 +251,23 @@ class SwitchTransmitter(Message, frozen=True):
 
 
 class LoadPacket(Message, frozen=True):
-    """Send this packet. Asked by robot RCs under the radio's grant to their ARC.
+    """Send this packet. Robot RCs ask this under the radio's grant to their ARC.
 
     Attributes:
         arc: The ARC that holds robot and radio.
-        epoch: Of the radio RC's connection.
-        network_id: Of the robot.
+        epoch: Epoch of the radio RC's connection.
+        network_id: Network id of the robot.
         payload: Bytes of the robot's own protocol.
-        safe_payload: What is sent last of all to this robot when the ARC is disconnected.
-        robot_epoch: Of the robot RC's connection, for the audit.
+        safe_payload: The robot's last packet when the ARC is disconnected.
+        robot_epoch: Epoch of the robot RC's connection, for the audit.
         at_once: True: once, in the next turn of its stream, answered when it is on the air.
             False: at its stream's rate from now on, until replaced.
-        lasts_s: With ``at_once`` False: mission seconds after which ``afterwards`` replaces it; 0: none do.
+        lasts_s: With ``at_once`` False: mission seconds after which ``afterwards`` replaces it; 0: never.
             A robot RC that hangs must not keep its robot moving through the radio.
-        afterwards: What is repeated after the packet was sent once, or has lasted its time; empty: what was before.
-        kind: Which of the ARC's streams on the radio it is sent in; if it has none of that kind: its first.
-        moves: True: it moves the robot; it is not sent once a packet of a later stop was loaded.
-        robot_stop: Number of the robot's last stop when this was made.
+        afterwards: The packet that is repeated after this one; empty: the one before it.
+        kind: Kind of its stream; the ARC's first stream if the ARC has none of this kind.
+        moves: True: it moves the robot, and is not sent after a packet of a later stop was loaded.
+        robot_stop: Number of the robot's last stop when the packet was made.
     """
 
     arc: Mention
@@ -285,17 +285,17 @@ class LoadPacket(Message, frozen=True):
 
 
 class PacketLoaded(Message, frozen=True):
-    """Answer to ``LoadPacket``: it stands, and was sent if that was asked."""
+    """Answer to ``LoadPacket``: the packet is loaded, and sent if ``at_once``."""
 
 
 class Tune(Message, frozen=True):
-    """Receive this video frequency and hand its pictures to the ARC that holds the framegrabber.
+    """Receive this video frequency and deliver its pictures to the ARC that holds the framegrabber.
 
     Attributes:
         arc: The ARC.
         epoch: Of the framegrabber's connection.
         frequency: Name of the video frequency's RC.
-        robot: The one whose transmitter the ARC holds; pictures of another are not delivered. Empty: any.
+        robot: The robot of the ARC; pictures of other robots are not delivered. Empty: any.
     """
 
     arc: Mention
@@ -305,11 +305,11 @@ class Tune(Message, frozen=True):
 
 
 class NothingHeard(Message, frozen=True):
-    """The transmitter of your robot is silent; said by a framegrabber to the ARC that holds it.
+    """A framegrabber receives no transmitter; sent to the ARC that holds it.
 
     Attributes:
         rc: The framegrabber.
-        epoch: Of its connection.
+        epoch: Epoch of its connection.
     """
 
     rc: Mention
@@ -320,15 +320,15 @@ class Frame(Message, frozen=True):
     """One picture.
 
     Attributes:
-        rc: Framegrabber that took it.
-        arc: ARC it was taken for.
-        epoch: Of the framegrabber's connection; receivers drop those of other epochs.
+        rc: The framegrabber.
+        arc: The ARC that holds it.
+        epoch: Epoch of the framegrabber's connection; receivers drop pictures of other epochs.
         robot: Robot whose transmitter is expected on the frequency (chosen with the grant).
         number: Grows by one with each frame of this connection.
-        captured_s: Mission time at which it was taken.
+        captured_s: Mission time of the capture.
         width_px: Columns.
         height_px: Rows.
-        pixels: Grey levels, row by row from the top; as many as rows and columns have.
+        pixels: Grey levels, row by row from the top; ``width_px`` times ``height_px`` of them.
     """
 
     rc: Mention
@@ -348,11 +348,11 @@ class Frame(Message, frozen=True):
 
 # ---------------------------------------------------------------------- operator → robot RC: needs no grant
 class EmergencyStop(Message, frozen=True):
-    """Stop this robot now and let nothing move it until the stop is lifted. Right for every operator, at any time.
+    """Stop this robot; nothing moves it until the stop is lifted. Every operator may stop it at any time.
 
     Attributes:
-        reason: For the holder and the record.
-        user: Who wants it, for people; empty: the console that asks.
+        reason: Reason, for the holder and the log.
+        user: Name of the operator, for people; empty: the console.
     """
 
     reason: Line = ""
@@ -363,8 +363,8 @@ class LiftStop(Message, frozen=True):
     """Let the robot move again.
 
     Attributes:
-        number: Of the stop that is meant: one that was not seen is not lifted.
-        user: Who wants it, for people; empty: the console that asks.
+        number: Number of the stop that the operator saw; a newer stop is not lifted.
+        user: Name of the operator, for people; empty: the console.
     """
 
     number: Count
@@ -372,15 +372,15 @@ class LiftStop(Message, frozen=True):
 
 
 class AskStop(Message, frozen=True):
-    """Is this robot stopped?"""
+    """Ask whether this robot is stopped."""
 
 
 class Stopper(Message, frozen=True):
-    """Somebody who stopped a robot.
+    """An operator who stopped a robot.
 
     Attributes:
-        by: Who, for people; without a name the address of the console.
-        console: Address of the console it was done by: whom to ask before the stop is lifted. Empty: not known.
+        by: Name of the operator, for people; without a name the address of the console.
+        console: Address of the operator's console, which is asked before the stop is lifted. Empty: unknown.
     """
 
     by: Mention
@@ -388,19 +388,19 @@ class Stopper(Message, frozen=True):
 
 
 class StopState(Message, frozen=True):
-    """Answer to all three; also published as an event whenever it changes.
+    """Answer to the three questions before; also published as an event on every change.
 
     Attributes:
         rc: The robot.
         is_stopped: True: drives and jumps are refused.
-        number: Of the last order to stop; grows with each, also if the robot was stopped already.
-        by: Who stopped it first, or lifted the last stop.
-        reason: As given.
+        number: Number of the last order to stop; grows with each, also if the robot was stopped already.
+        by: The operator who stopped it first, or who lifted the last stop.
+        reason: The operator's reason.
         at_s: Mission time of the stop, or of its end.
-        is_confirmed: False if the packet that stops the wheels could not be handed to the radio: nothing new moves
-            the robot, and what moves it now ends by itself within ``COMMAND_TIMEOUT_S``.
-        console: Address of the console of whom ``by`` names.
-        also: Who else stopped it since it moved last.
+        is_confirmed: False if the radio did not accept the packet that stops the wheels. Then no new packet moves the
+            robot, and its present motion ends by itself within ``COMMAND_TIMEOUT_S``.
+        console: Address of the console of the operator ``by``.
+        also: Other operators who stopped it since it last moved.
     """
 
     rc: Mention
@@ -419,16 +419,16 @@ EmergencyQuestion = EmergencyStop | LiftStop | AskStop
 
 # ---------------------------------------------------------------------- the simulated world, played as hardware
 class RadioPacket(Message, frozen=True):
-    """A packet on the air: published under the world's address as a command, acknowledged by nobody.
+    """A packet on the air: published under the world's address as a command, without an acknowledgment.
 
     Attributes:
-        radio: Radio that sent it.
-        network_id: Robot it is for.
+        radio: Its sender.
+        network_id: Network id of its receiver.
         payload: Bytes of the robot's protocol.
-        arc: For the audit: who held robot and radio.
-        epoch: For the audit: the robot's epoch under which the payload was made.
-        number: Of the packet among those of its radio since it was opened.
-        air_time_s: How long its bits take.
+        arc: For the audit: the ARC that held robot and radio.
+        epoch: For the audit: epoch of the robot when the payload was made.
+        number: Its number among the packets of its radio since the radio was opened.
+        air_time_s: Duration of its bits.
         robot_stop: For the audit: number of the robot's last stop when the payload was made.
     """
 
@@ -443,18 +443,18 @@ class RadioPacket(Message, frozen=True):
 
 
 class AskWorld(Message, frozen=True):
-    """What is the world made of?"""
+    """Ask for the model of the world."""
 
 
 class WorldModel(Message, frozen=True):
-    """Answer to ``AskWorld``: enough to draw the same pictures elsewhere, and to receive them.
+    """Answer to ``AskWorld``: all that another process needs to draw and receive the same pictures.
 
     Attributes:
         mjcf: The compiled world's XML.
         robots: Robot name → network id.
-        seed: Of everything random in the world.
-        air: Between robots and base.
-        antenna_m: Where the base's antenna stands: x, y, z.
+        seed: Seed of all random processes of the world.
+        air: The air between robots and base.
+        antenna_m: Position of the base's antenna: x, y, z.
     """
 
     mjcf: Document
@@ -465,7 +465,7 @@ class WorldModel(Message, frozen=True):
 
 
 class AskPose(Message, frozen=True):
-    """Where is this body? Asked of the simulated world or of a camera above the room; robots themselves cannot tell."""
+    """Ask for the pose of a body. The simulated world or a camera above the room knows it; a robot does not."""
 
     body: Mention
 
@@ -481,15 +481,15 @@ class Pose(Message, frozen=True):
 
 
 class WorldState(Message, frozen=True):
-    """Published by the world once a frame as telemetry.
+    """State of the world, published once a frame as telemetry.
 
     Attributes:
         frame: Number of the frame.
-        at_s: Mission time it shows.
-        state: float64 vector, little endian; meaning is the model's alone.
-        transmitting: Robot → video frequency its transmitter is on at.
-        on_since: Robot that transmits → first frame in which it did on this frequency.
-        motors: Robot that transmits → how fast its wheels turn, 0 to 1 of their limit; one that is missing stands.
+        at_s: Mission time of the state.
+        state: float64 vector, little endian; only the model knows its meaning.
+        transmitting: Robot → video frequency of its transmitter, if it is on.
+        on_since: Robot that transmits → first frame on this frequency.
+        motors: Robot that transmits → speed of its wheels, 0 to 1 of their limit; a missing robot stands still.
     """
 
     frame: Count
@@ -501,7 +501,7 @@ class WorldState(Message, frozen=True):
 
 
 class ClockTick(Message, frozen=True):
-    """Published by the world once a frame: the mission's time, for hosts that do not share a monotonic clock."""
+    """The mission's time, published by the world once a frame, for hosts without a shared monotonic clock."""
 
     frame: Count
     at_s: Instant
@@ -510,56 +510,56 @@ class ClockTick(Message, frozen=True):
 
 # ---------------------------------------------------------------------- refusals
 class SwappedOut(Refusal):
-    """The ARC holds nothing now; facts: ``reason``, ``by``, ``expected_start_s``."""
+    """The ARC has no grant; facts: ``reason``, ``by``, ``expected_start_s``."""
 
     code = "arc.swapped_out"
-    remedy = "Wait until it is granted again; 'scout-backbone why' tells when that will be."
+    remedy = "Wait until it is granted again; 'scout-backbone why' predicts when."
 
 
 class NotMySet(Refusal):
-    """The order to open names RCs this ARC never asked for."""
+    """The order to open names RCs that are not in the ARC's request."""
 
     code = "arc.not_my_set"
     remedy = "Connect the RCs of one of the alternatives in the ARC's request."
 
 
 class NoSuchAction(Refusal):
-    """This kind of ARC has no RC that could do it."""
+    """This kind of ARC has no RC for the action."""
 
     code = "arc.no_such_action"
     remedy = "Claim a kind of ARC that has the RC for it (see docs/reference/arcs.md)."
 
 
 class NotYours(Refusal):
-    """Only the ARC's decision process may command it."""
+    """Only its decision process may command an ARC."""
 
     code = "arc.not_yours"
     remedy = "Claim an ARC of your own."
 
 
 class NotFromYou(Refusal):
-    """Only the RC manager gives and takes RCs; only who holds one commands it. Nothing changed."""
+    """Only the RC manager grants and revokes RCs, and only the holder commands an RC. Nothing is changed."""
 
     code = "rc.not_from_you"
     remedy = "Claim an ARC and command through it; the RC manager connects its RCs when its turn comes."
 
 
 class NeedsRestart(Refusal):
-    """The parameter exists, but what runs cannot take it over. Nothing changed."""
+    """The parameter exists, but a running component cannot change it. Nothing is changed."""
 
     code = "rc.needs_restart"
-    remedy = "Change it in the mission file; it counts from the component's next start on."
+    remedy = "Change it in the mission file; the component uses it from its next start on."
 
 
 class ImpossibleUse(Refusal):
-    """An RC cannot be held like that."""
+    """The epoch, lease or use of a connection is impossible."""
 
     code = "rc.impossible_use"
     remedy = "Connect with the next epoch, a lease of at most an hour, and periods that are finite and above 0."
 
 
 class EmergencyStopped(Refusal):
-    """An operator stopped the robot; nothing moved.
+    """An operator has stopped the robot; it did not move.
 
     Facts: ``rc``, ``number``, ``is_stopped``, ``by``, ``reason``, ``since_s``.
     """
@@ -569,34 +569,34 @@ class EmergencyStopped(Refusal):
 
 
 class GivenBeforeStop(EmergencyStopped):
-    """The command was given without knowing of the robot's last stop, which was lifted since; facts as there."""
+    """The sender did not know the robot's last stop, which was lifted since; facts as ``EmergencyStopped``."""
 
     code = "scout.given_before_stop"
-    remedy = "Give the command anew, now that you know of the stop: let go of the control and press it again."
+    remedy = "Give the command again, now that you know of the stop: let go of the control and press it again."
 
 
 class OtherStop(Refusal):
-    """The stop in force is not the one that was to be lifted; facts: ``number``, ``by``. Nothing changed."""
+    """Another stop than the one to lift is in force; facts: ``number``, ``by``. Nothing is changed."""
 
     code = "scout.other_stop"
-    remedy = "Look who stopped the robot since, and lift that stop if it may move."
+    remedy = "See which operator stopped the robot since, and lift that stop if the robot may move."
 
 
 class NoTurnSoon(Refusal):
-    """The ARC's stream on the radio is too slow for what must be sent soon; nothing was sent; fact: ``wait_s``."""
+    """The ARC's stream on the radio is too slow for an urgent packet, which was not sent; fact: ``wait_s``."""
 
     code = "radio.no_turn_soon"
     remedy = "Claim with a shorter period, or with a further usage for this kind of command."
 
 
 class HardwareFault(Refusal):
-    """The hardware did not do it; the RC reports itself down."""
+    """The hardware did not obey; the RC reports itself down."""
 
     code = "rc.hardware"
     remedy = "Check cable, power and driver of the resource."
 
 
 DEFAULT_DRIVE_USAGE = Usage(period_s=0.05, packet_time_s=0.002, kind="drive")
-"""Chosen: 20 commands a second follow a hand on a stick; 2 ms is 24 bytes at 115.2 kbit/s."""
+"""Chosen: 20 commands a second suffice for a hand on a stick; 2 ms is 24 bytes at 115.2 kbit/s."""
 
-COMMAND_TIMEOUT_S = 0.5  # chosen: longer than a keyboard's repeat delay is short; a robot stops within a body length
+COMMAND_TIMEOUT_S = 0.5  # chosen: about a keyboard's repeat delay; a robot stops within a body length

@@ -1,16 +1,16 @@
-"""Which packet the radio sends next: periodic streams of several ARCs on one channel.
+"""Packet schedule: the next packet of a radio, from periodic streams of several ARCs on one channel.
 
 Rules of this file:
 
-* A packet once begun is sent (non-preemptive).
-* First the ARC of higher user priority, then the shorter period, then the name.
-* What is repeated has an age: a packet that is not loaded anew in time gives way to what comes after it.
-* Each kind of request is a stream of its own with a constant interval from its first packet on. What is to be sent
-  once and soon takes the next turn of its stream: nobody ever sends more than was admitted, so nobody else is late.
-* A request not done by its deadline, which is the next release unless the ARC named another, is an overrun. One that
-  has not even begun by then is lost.
-* An ARC's packets reach only the robots it loaded packets for; several of its robots take turns.
-* What moves a robot and was made before its last stop is not sent, whether it waits here or comes later.
+* A packet is never interrupted (non-preemptive).
+* Packets are ordered by user priority of the ARC, then by shorter period, then by name.
+* A repeated packet that is not loaded again in time is replaced by its ``afterwards``.
+* Each kind of packet is a stream of its own with a constant interval from its first packet on. An urgent packet takes
+  the next turn of its stream. So no stream sends more than was admitted, and no other stream is late.
+* A packet that is not finished by its deadline is an overrun; a packet that has not begun by then is lost. The deadline
+  is the next release unless the ARC stated another.
+* An ARC's packets reach only the robots for which it loaded packets; several of its robots take turns.
+* A packet that moves a robot and was made before its last stop is not sent, whether it waits or arrives later.
 
 Pure; times are mission seconds.
 
@@ -25,7 +25,7 @@ from dataclasses import dataclass, field, replace
 
 from backbone.scheduling.requests import Usage
 
-MAIN_KIND = "drive"  # chosen: the stream by which a robot hears that it is not forgotten
+MAIN_KIND = "drive"  # chosen: the stream whose packets keep a robot running
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times, far below a packet
 
 
@@ -34,17 +34,17 @@ class Packet:
     """Bytes for one robot.
 
     Attributes:
-        arc: On whose behalf.
-        network_id: Of the robot.
+        arc: The ARC that commands the robot.
+        network_id: Network id of the robot.
         payload: Bytes of the robot's protocol.
-        safe_payload: What is to be sent to it last of all.
-        robot_epoch: Of the robot RC's connection.
+        safe_payload: The robot's last packet.
+        robot_epoch: Epoch of the robot RC's connection.
         until_s: Mission time from which ``afterwards`` is sent in its place.
-        afterwards: See ``until_s``; empty: ``safe_payload``. For what is sent once: what is repeated from then on in
-            the ARC's main stream; empty: what was before.
-        kind: Which of the ARC's streams it belongs to; if it has none of that kind, to its first.
-        ticket: Tells packets apart that are sent once; 0: it is repeated.
-        moves: True if the robot moves by it.
+        afterwards: See ``until_s``; empty: ``safe_payload``. For a packet that is sent once: the packet that the ARC's
+            main stream repeats from then on; empty: the one before.
+        kind: Kind of its stream; the ARC's first stream if the ARC has none of this kind.
+        ticket: Id of a packet that is sent once; 0: it is repeated.
+        moves: True if it moves the robot.
         robot_stop: Number of the robot's last stop when it was made.
     """
 
@@ -61,7 +61,7 @@ class Packet:
     robot_stop: int = 0
 
     def at(self, now_s: float) -> Packet:
-        """Return what is to be sent at this time: itself, or what comes after it."""
+        """Return the packet for this time: itself, or its ``afterwards``."""
         if now_s < self.until_s:
             return self
         return replace(self, payload=self.afterwards or self.safe_payload, until_s=math.inf, moves=False)
@@ -69,7 +69,7 @@ class Packet:
 
 @dataclass(slots=True)
 class _Stream:
-    """Requests of one kind of one ARC; ``first_s`` is None while it has nothing to send."""
+    """Packets of one kind of one ARC; ``first_s`` is None while there is no packet."""
 
     usage: Usage
     first_s: float | None = None
@@ -90,12 +90,12 @@ class _Stream:
         return math.inf if self.first_s is None else self.first_s + self.releases * self.usage.period_s
 
     def begin(self, now_s: float) -> None:
-        """Release from now on, but not before a period has passed since the last release."""
+        """Release packets from now on, but not before a period has passed since the last release."""
         if self.first_s is None:
             self.first_s, self.releases = max(now_s, self.earliest_s), 0
 
     def take(self, now_s: float) -> tuple[Packet, float]:
-        """Return the packet of the release that is due, and when it was released; those before it are lost."""
+        """Return the packet of the due release and the time of the release; earlier releases are lost."""
         period_s = self.usage.period_s
         longest_s = max(self.deadline_s, period_s)
         lost = max(0, math.floor((now_s - self.next_release_s - longest_s + INSTANT_S) / period_s) + 1)
@@ -111,7 +111,7 @@ class _Stream:
         return packet, release_s
 
     def stopped(self, network_id: int, stop: int) -> list[int]:
-        """Drop what was to move the robot, and count the rest as made after the stop; return the tickets dropped."""
+        """Drop packets that move the robot, mark the rest as made after the stop; return the dropped tickets."""
         dropped = [once.ticket for once in self.urgent if once.network_id == network_id and once.moves]
         self.urgent = deque(
             replace(once, robot_stop=stop) if once.network_id == network_id else once
@@ -156,13 +156,13 @@ class _Sender:
 
 @dataclass(frozen=True, slots=True)
 class Sending:
-    """One packet whose turn it is.
+    """One packet that is due.
 
     Attributes:
-        packet: To be sent.
-        air_time_s: How long it was admitted to occupy the air.
-        number: Which of the ARC's streams it belongs to; -1: none, it is a safe packet.
-        release_s: When it was due.
+        packet: The packet.
+        air_time_s: Its admitted time on the air.
+        number: Number of its stream; -1: no stream, because it is a safe packet.
+        release_s: Mission time of its release.
     """
 
     packet: Packet
@@ -173,12 +173,12 @@ class Sending:
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """What was counted for one ARC since it was connected.
+    """Counts of one ARC since its connection.
 
     Attributes:
         sent: Packets sent in its turns.
         overruns: Requests late or lost.
-        worst_packet_s: Longest time one of its packets really occupied the air.
+        worst_packet_s: Longest measured time of one of its packets on the air.
     """
 
     sent: int
@@ -194,10 +194,10 @@ class PacketSchedule:
         self._reported: set[tuple[str, int, str]] = set()
 
     def connect(self, arc: str, streams: list[Usage], rank: int) -> None:
-        """Give the ARC its streams; their first releases come with their first packets.
+        """Add the ARC's streams; each begins with its first packet.
 
         Raises:
-            ValueError: There is none, or a period or packet time is no span of time above 0; nothing has changed.
+            ValueError: The list is empty, or a period or packet time is not above 0 and finite; nothing is changed.
         """
         if not streams:
             raise ValueError(f"{arc}: no stream of packets")
@@ -209,12 +209,12 @@ class PacketSchedule:
         self._senders[arc] = _Sender(rank, [_Stream(usage) for usage in streams])
 
     def rank(self, arc: str, rank: int) -> None:
-        """Give the ARC, if it is connected, another place by user priority; 0 goes first."""
+        """Set the ARC's place by user priority, if it is connected; 0 is first."""
         if arc in self._senders:
             self._senders[arc].rank = rank
 
     def disconnect(self, arc: str) -> list[Sending]:
-        """Forget the ARC and all it loaded; return for each of its robots the packet that must be sent last."""
+        """Remove the ARC and its packets; return the last packet for each of its robots."""
         sender = self._senders.pop(arc, None)
         if sender is None:
             return []
@@ -228,12 +228,12 @@ class PacketSchedule:
         ]
 
     def is_overtaken(self, packet: Packet) -> bool:
-        """Return whether the packet moves its robot and was made before a stop that is known here."""
+        """Return whether the packet moves its robot and was made before a known stop."""
         sender = self._senders.get(packet.arc)
         return packet.moves and sender is not None and packet.robot_stop < sender.stops.get(packet.network_id, 0)
 
     def hear_stop(self, packet: Packet) -> list[int]:
-        """Take note of the stop that the packet was made after; return the tickets of what is not sent for it."""
+        """Record the stop before which the packet was not made; return the tickets of packets that are now dropped."""
         sender = self._senders[packet.arc]
         if packet.robot_stop <= sender.stops.get(packet.network_id, 0):
             return []
@@ -247,14 +247,14 @@ class PacketSchedule:
         stream = sender.stream_of(packet.kind)
         stream.packets[packet.network_id] = packet
         stream.begin(now_s)
-        if stream is sender.main:  # it is newer than what was to be repeated after a packet that still waits
+        if stream is sender.main:  # it is newer than the ``afterwards`` of a waiting packet
             for other in sender.streams:
                 for place, once in enumerate(other.urgent):
                     if once.network_id == packet.network_id:
                         other.urgent[place] = replace(once, afterwards=b"")
 
     def send_once(self, packet: Packet, now_s: float) -> None:
-        """Send this packet in the next turn of its stream, before what is repeated there."""
+        """Send this packet in the next turn of its stream, before the repeated packet."""
         sender = self._senders[packet.arc]
         sender.touched[packet.network_id] = packet
         stream = sender.stream_of(packet.kind)
@@ -262,19 +262,19 @@ class PacketSchedule:
         stream.begin(now_s)
 
     def next_turn_s(self, arc: str, kind: str, now_s: float) -> float:
-        """Return when the next turn comes of a packet of this kind that is to be sent once."""
+        """Return the next turn of a packet of this kind that is sent once."""
         stream = self._senders[arc].stream_of(kind)
         if stream.first_s is None:
             return max(now_s, stream.earliest_s)
         return stream.next_release_s + len(stream.urgent) * stream.usage.period_s
 
     def next_due_s(self) -> float | None:
-        """Return the earliest release of a stream that has something to send; None if there is none."""
+        """Return the earliest release of all streams with packets; None without a packet."""
         earliest_s = min((s.next_release_s for one in self._senders.values() for s in one.streams), default=math.inf)
         return earliest_s if earliest_s < math.inf else None
 
     def take(self, now_s: float) -> Sending | None:
-        """Return the packet whose turn it is, counted as sent; None if none is due."""
+        """Return the due packet and count it as sent; None if no packet is due."""
         due = [
             (sender.rank, stream.usage.period_s, arc, number)
             for arc, sender in self._senders.items()
@@ -287,22 +287,22 @@ class PacketSchedule:
         sender = self._senders[arc]
         stream = sender.streams[number]
         packet, release_s = stream.take(now_s)
-        if packet.ticket and packet.afterwards:  # what was repeated before might call it off
+        if packet.ticket and packet.afterwards:  # the packet repeated before might cancel it
             repeated = replace(packet, payload=packet.afterwards, afterwards=b"", kind=MAIN_KIND, ticket=0)
             sender.main.packets[packet.network_id] = repeated
             sender.main.begin(now_s)
         return Sending(packet, stream.usage.packet_time_s, number, release_s)
 
     def sent(self, sending: Sending, begun_s: float, took_s: float) -> list[str]:
-        """Take note of how long the packet really occupied the air.
+        """Record the packet's measured time on the air.
 
         Args:
             sending: As returned by ``take``.
-            begun_s: Mission time.
-            took_s: Measured, seconds.
+            begun_s: Mission time of its begin.
+            took_s: Its duration, seconds.
 
         Returns:
-            For people: what went wrong with this stream of this ARC for the first time.
+            Faults of this stream that occurred for the first time, for people.
         """
         arc, number = sending.packet.arc, sending.number
         sender = self._senders.get(arc)
@@ -316,7 +316,7 @@ class PacketSchedule:
         news = []
         if took_s > sending.air_time_s + INSTANT_S:
             declared = f"{took_s * 1e3:.3g} ms on the air, {sending.air_time_s * 1e3:.3g} ms were declared"
-            news.append(("slow", f"{what} take {declared}: nobody's deadline on this radio is certain"))
+            news.append(("slow", f"{what} take {declared}: no deadline on this radio is certain"))
         if stream.overruns:
             news.append(("late", f"{what} are not always done within {stream.deadline_s:g} s of their release"))
         found = [(fault, line) for fault, line in news if (arc, number, fault) not in self._reported]
@@ -324,7 +324,7 @@ class PacketSchedule:
         return [line for _, line in found]
 
     def counts(self) -> dict[str, Count]:
-        """Return what was counted for each ARC now connected."""
+        """Return the counts of each connected ARC."""
         return {
             arc: Count(
                 sum(s.sent for s in sender.streams), sum(s.overruns for s in sender.streams), sender.worst_packet_s

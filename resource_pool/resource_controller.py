@@ -1,8 +1,8 @@
-"""Resource controller: the one process through which a physical resource is reached.
+"""Resource controller (RC): the one component that controls a physical resource.
 
-It serves whoever the RC manager connected it to, under an epoch, for as long as the lease lasts.
-Everything else is refused, counted, and changes nothing. At the end of a hold, however it comes, the
-resource goes to its safe state before anything else can happen to it.
+It serves the ARCs that the RC manager connected, each under an epoch and while its lease lasts. It refuses and counts
+all other commands, which change nothing. At every end of a hold the resource goes to its safe state before the next
+connection.
 
 Source: RAM 2002, "Resource Pool"; IROS 2001, section 3.2.
 """
@@ -46,20 +46,20 @@ from resource_pool.messages import HardwareFault, ImpossibleUse, NeedsRestart, N
 
 log = logging.getLogger(__name__)
 
-SAFE_WITHIN_S = 0.4  # chosen: less than the RC manager waits for a disconnection, so that it hears why; machine seconds
+SAFE_WITHIN_S = 0.4  # chosen: below the RC manager's limit, so that the reason reaches it; machine seconds
 
 
 class RcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What every RC is told of its resource; derive and add the kind's own.
+    """Parameters of every RC; derive and add the parameters of the kind.
 
     Attributes:
         driver: Name of the driver, or ``package.module:Class``.
         sharable: True if several ARCs may hold it.
-        capacity: Share of its time it can give, 0 to 1.
-        links: Other resources it works with: kind → names.
-        world: Simulated world that plays the hardware, for the simulated drivers; others need none.
-        options: What only the driver understands. Parameters of the mission file that are none of the RC's
-            own end up here, and the driver's ``options_type`` checks them.
+        capacity: Share of its time that it can give, 0 to 1.
+        links: Resources with which it can be combined: kind → names.
+        world: Simulated world that plays the hardware; only for simulated drivers.
+        options: Options of the driver: all parameters of the mission file that are not the RC's own. The driver's
+            ``options_type`` checks them.
     """
 
     driver: str = "simulated"
@@ -74,19 +74,19 @@ R = TypeVar("R", bound=RcParameters)
 
 
 class ResourceController(Component[R], Generic[R]):
-    """Base of every RC; derive, set ``parameters_type`` and ``commands``, override the hooks."""
+    """Base class of every RC; derive, set ``parameters_type`` and ``commands``, override the hooks."""
 
     parameters_type: ClassVar[type[msgspec.Struct]] = RcParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset({"driver", "sharable", "capacity", "links", "options"})
     commands: ClassVar[types.UnionType | type[Any] | None] = None
-    """Questions this kind of RC answers besides those of the RC manager; each has the fields ``arc`` and ``epoch``."""
+    """Commands of this kind of RC, besides the RC manager's questions; each has the fields ``arc`` and ``epoch``."""
     driver_kind: ClassVar[str] = ""
-    """Kind of driver it is built on; empty: it has none, and so no driver's options."""
+    """Kind of its driver; empty: it has no driver."""
     driver_parameters: ClassVar[frozenset[str]] = frozenset({"options"})
-    """Parameters its driver takes over while it runs, if it can."""
+    """Parameters that its driver may change while it runs."""
     outlasts_s: ClassVar[float] = 0.0
-    """How long what it commands goes on after the death of its process, mission seconds: for so long its successor
-    confirms no disconnection from a hold of the earlier life. 0: it ends with the process."""
+    """Time for which the effect of a command may outlast the process, mission seconds. For this time a restarted RC
+    confirms no disconnection of an earlier hold. 0: the effect ends with the process."""
     accepts: ClassVar[types.UnionType | type[Any] | None] = Connect | Disconnect | AskRc
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -114,52 +114,52 @@ class ResourceController(Component[R], Generic[R]):
 
     # ------------------------------------------------------------------ hooks
     async def connected(self, hold: Hold) -> None:
-        """Get ready to serve this hold. When: it is in the table, nobody commands yet. Not: wait for the ARC."""
+        """Prepare to serve this hold. When: after it is in the table, before any command. Not: wait for the ARC."""
 
     async def make_safe(self, hold: Hold) -> None:
-        """Bring what this hold could command into its safe state.
+        """Bring the resource of this hold into its safe state.
 
-        When: the hold is no longer in the table, so no command of it can come any more; before the
-        disconnection is confirmed. What: stop, switch off, drop what is queued. Raise ``HardwareFault`` if
-        the hardware does not obey; after that, or if it took longer than ``SAFE_WITHIN_S`` and was cancelled,
-        it is called again for the same hold, before anybody else is connected.
+        When: after the hold has left the table, so no command of it can follow; before the disconnection is confirmed.
+        What: stop, switch off, drop the queue. Raise ``HardwareFault`` if the hardware does not obey. After a fault, or
+        if the hook exceeded ``SAFE_WITHIN_S`` and was cancelled, it is called again for the same hold before the next
+        connection.
         """
 
     async def command(self, asked: Envelope[Any]) -> Message:
-        """Carry out one of ``commands``. Call ``admit`` first: it refuses what is not of the present hold."""
+        """Carry out one of ``commands``. Call ``admit`` first, which refuses commands outside a present hold."""
         return await super().answer(asked)
 
     def ranked(self, arc: str, epoch: int) -> None:
-        """Take over the rank of this hold, if it is the present one. When: with each renewal."""
+        """Apply the rank of this hold, if it is present. When: with each renewal."""
 
     def may_command(self, source: str, hold: Hold, order: Any) -> bool:  # noqa: ARG002
-        """Say whether a command under this hold may come from there: it is the ARC that holds the RC."""
+        """Return whether the source may send a command under this hold; True for the ARC that holds the RC."""
         return source == address(Subsystem.RESOURCE_POOL, hold.arc)
 
     # ------------------------------------------------------------------ for derived classes
     def driver_site(self) -> DriverSite:
-        """Return what a driver of this RC may use."""
+        """Return the interface for a driver of this RC."""
         folder = Path(self.launch.run_directory) if self.launch.run_directory else None
         return DriverSite(
             self.name, self.bus, self.clock, self.parameters, lambda what: self.tell(self.name, what), self.fail, folder
         )
 
     def make_driver(self, name: str = "") -> Any:
-        """Return a driver of this RC's kind, not yet open: the one of this name, else the mission's.
+        """Return a driver of this RC's kind, not open yet: of this name, or the mission file's.
 
         Raises:
-            UnknownDriver: There is none.
-            WrongParameter: It does not understand its options.
+            UnknownDriver: No driver has this name.
+            WrongParameter: The driver refuses its options.
         """
         driver = build_driver(self.driver_kind, name or self.parameters.driver, self.driver_site())
         self._drivers.append(driver)
         return driver
 
     def admit(self, arc: str, epoch: int) -> Hold:
-        """Return the hold under which the command may be carried out, and count it.
+        """Return the hold that admits the command, and count the command.
 
         Raises:
-            StaleEpoch: It is not of the present hold; that is counted too, and nothing is applied.
+            StaleEpoch: The command is not of a present hold; it is counted as refused.
         """
         try:
             hold = self.holds.admit(arc, epoch)
@@ -171,7 +171,7 @@ class ResourceController(Component[R], Generic[R]):
         return hold
 
     def rc_state(self) -> RcState:
-        """Return who holds the resource and what was counted."""
+        """Return the holders and the counts."""
         holders = [Holder(hold.arc, hold.epoch, hold.since_s, hold.lease_until_s) for hold in self.holds.holds()]
         return RcState(
             self.name,
@@ -187,11 +187,11 @@ class ResourceController(Component[R], Generic[R]):
 
     # ------------------------------------------------------------------ the life of a hold
     async def connect(self) -> None:
-        """Listen to the RC manager's renewals."""
+        """Subscribe to the RC manager's renewals."""
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 
     async def serve(self) -> None:
-        """End every hold whose lease is over."""
+        """End every hold whose lease has expired."""
         while True:
             self._lease_changed.clear()
             expiry_s = self.holds.next_expiry_s()
@@ -203,22 +203,22 @@ class ResourceController(Component[R], Generic[R]):
                 over = self.holds.expire(self.clock.now_s())
                 self._lease_ends += len(over)
                 for hold in over:
-                    log.warning("the lease of %s is over", hold.arc)
+                    log.warning("the lease of %s has expired", hold.arc)
                 await self._end_holds(over, "its lease is over")
 
     async def drain(self) -> None:
-        """End all holds, safely if the hardware still obeys."""
+        """End all holds, in the safe state if the hardware obeys."""
         async with self._changing:
             ended = [self.holds.disconnect(hold.arc, hold.epoch) for hold in self.holds.holds()]
             await self._end_holds([hold for hold in ended if hold is not None], "the RC ends")
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Connect, disconnect, tell who holds, or carry out a command."""
+        """Answer the RC manager, and carry out commands."""
         match asked.body:
             case Connect() | Disconnect() if asked.source != RC_MANAGER:
                 raise self._stranger(asked.source, f"{type(asked.body).__name__} {asked.body.arc}")
             case Connect(epoch=epoch) | Disconnect(epoch=epoch) if epoch > most_epoch(self.clock.now_s()):
-                raise ImpossibleUse(f"{self.name}: nobody can have given epoch {epoch} until now")
+                raise ImpossibleUse(f"{self.name}: the RC manager cannot have reached epoch {epoch} yet")
             case Connect() as order:
                 return await self._connect(order, asked.stamp_s)
             case Disconnect(arc=arc, epoch=epoch, reason=reason):
@@ -226,7 +226,7 @@ class ResourceController(Component[R], Generic[R]):
                     hold = self.holds.disconnect(arc, epoch) or self._unsafe.get(arc)
                     if hold is not None:
                         await self._end_hold(hold, reason)
-                if epoch <= self._first_epoch:  # a grant to an earlier life, whose hardware may not be safe yet
+                if epoch <= self._first_epoch:  # a grant to an earlier process, whose hardware may not be safe yet
                     await self.clock.sleep_until_s(self._born_s + self.outlasts_s)
                 return Disconnected(self.holds.last_epoch)
             case AskRc():
@@ -236,11 +236,11 @@ class ResourceController(Component[R], Generic[R]):
                 return await self.command(asked)
 
     def parameters_changed(self) -> None:
-        """Take over capacity, and what the driver can take over; the RC manager hears of it as news.
+        """Apply the new capacity and driver parameters; the RC manager gets the change with the news.
 
         Raises:
-            NeedsRestart: What runs cannot take it over.
-            WrongParameter: The driver does not understand its options.
+            NeedsRestart: The running RC cannot change this parameter.
+            WrongParameter: The driver refuses its options.
         """
         before, now = self._in_force, self.parameters
         changed = {name for name in now.__struct_fields__ if getattr(before, name) != getattr(now, name)}
@@ -259,12 +259,12 @@ class ResourceController(Component[R], Generic[R]):
         self.changed()
 
     def publish_news(self) -> None:
-        """Publish also who holds the resource."""
+        """Publish the holders, too."""
         super().publish_news()
         self.bus.publish(self.address, Conversation.TELEMETRY, self.rc_state())
 
     def statistics(self) -> dict[str, float]:
-        """Count commands, connections, ends by lease, and safe states not reached at the first attempt."""
+        """Count commands, connections, expired leases, and safe states not reached at the first attempt."""
         return {
             "applied": self.applied,
             "refused_stale": self.refused_stale,
@@ -275,10 +275,10 @@ class ResourceController(Component[R], Generic[R]):
         }
 
     def _check_sender(self, asked: Envelope[Any]) -> None:
-        """Refuse a command that is of a present hold but not from who has it; one of no present hold is stale anyway.
+        """Refuse a command of a present hold from a component that may not command it.
 
         Raises:
-            NotFromYou: It is such a command.
+            NotFromYou: The source may not command under this hold.
         """
         order = asked.body
         hold = self.holds.find(order.arc, order.epoch)
@@ -286,7 +286,7 @@ class ResourceController(Component[R], Generic[R]):
             raise self._stranger(asked.source, f"{type(order).__name__} for {order.arc}")
 
     def _stranger(self, source: str, what: str) -> NotFromYou:
-        """Count and note who wanted what is not theirs; return the refusal."""
+        """Count and record an order from a wrong source; return the refusal."""
         self.refused_strangers += 1
         self.story.note(self.name, f"{source} was refused: {what}")
         return NotFromYou(f"{self.name} does not take {what} from {source}", source=source)
@@ -295,7 +295,7 @@ class ResourceController(Component[R], Generic[R]):
         if not 0 < order.lease_s <= LONGEST_LEASE_S:
             raise ImpossibleUse(f"{self.name}: a lease of {order.lease_s} s for {order.arc}")
         async with self._changing:
-            # From the order's own time: the RC manager counts on the end, however long the order took.
+            # From the order's own time stamp, because the RC manager relies on the end, even if the order was slow.
             since_s = self.clock.now_s()
             lease_until_s = min(given_s, since_s) + order.lease_s
             hold = Hold(order.arc, order.epoch, since_s, lease_until_s, order.use, order.companions, order.rank)
@@ -318,10 +318,10 @@ class ResourceController(Component[R], Generic[R]):
         return Connected(order.epoch)
 
     async def _end_hold(self, hold: Hold, reason: str) -> None:
-        """Bring what the ended hold could command into its safe state.
+        """Bring the resource of the ended hold into its safe state.
 
         Raises:
-            HardwareFault: It is not safe; that is kept in mind and tried again before the next connection.
+            HardwareFault: It is not safe; the RC tries again before the next connection.
         """
         self._unsafe[hold.arc] = hold
         try:
@@ -339,7 +339,7 @@ class ResourceController(Component[R], Generic[R]):
         self._report_holders()
 
     async def _end_holds(self, ended: list[Hold], reason: str) -> None:
-        """End each of them, also if the hardware does not obey for one: who ends them cannot be refused."""
+        """End these holds; a fault of the hardware at one of them stops neither the others nor the caller."""
         for hold in ended:
             try:
                 await self._end_hold(hold, reason)
@@ -350,7 +350,7 @@ class ResourceController(Component[R], Generic[R]):
         holders = ", ".join(hold.arc for hold in self.holds.holds())
         unsafe = f", not safe after {', '.join(self._unsafe)}" if self._unsafe else ""
         self.report(f"held by {holders}{unsafe}" if holders else f"free{unsafe}")
-        self.changed()  # a holder may be the same and its epoch new
+        self.changed()  # the holder may be the same with a new epoch
 
     def _heard_leases(self, envelope: Envelope[Any]) -> None:
         leases: Leases = envelope.body
@@ -360,10 +360,10 @@ class ResourceController(Component[R], Generic[R]):
                 self.holds.renew(lease.arc, lease.epoch, until_s, lease.rank)
                 self.ranked(lease.arc, lease.epoch)
         if self.name in leases.missing or any(self._has_lost(lease) for lease in leases.leases):
-            self.changed()  # the RC manager's picture is wrong, and it hears what is published
+            self.changed()  # the published state corrects the RC manager
 
     def _has_lost(self, lease: Lease) -> bool:
-        """Say whether this is a hold of this RC that was here and is no more."""
+        """Return whether this is a hold of this RC that has ended."""
         return (
             lease.rc == self.name
             and lease.epoch <= self.holds.last_epoch
@@ -372,7 +372,7 @@ class ResourceController(Component[R], Generic[R]):
 
 
 def _sort_out_options(launch: Launch, parameters_type: type[msgspec.Struct]) -> Launch:
-    """Return the launch with everything the RC's parameters do not know moved into its driver's options."""
+    """Return the launch with all parameters that are not the RC's own moved into the driver's options."""
     own = {field.encode_name for field in msgspec.structs.fields(parameters_type)}
     given = launch.parameters
     options = {name: value for name, value in given.items() if name not in own}

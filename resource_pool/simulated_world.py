@@ -1,9 +1,8 @@
-"""The simulated world, played as hardware: radio packets in, the state of every body out.
+"""The simulated world as hardware: radio packets in, states of all bodies out.
 
-It steps physics and keeps the mission's pace, and never skips a step: if it is a little late it catches up, if it
-was away longer the time it was away is none for the world. Else robots would hear nothing while it catches up,
-and stop by themselves.
-Pictures are drawn elsewhere, from the state it publishes once a frame.
+It steps physics at the mission's pace and never skips a step. After a short delay it catches up. After a longer pause
+the world's time has not advanced, because robots would get no packet while it catches up, and stop by themselves.
+Other processes draw pictures from the state that it publishes once a frame.
 """
 
 from __future__ import annotations
@@ -34,11 +33,11 @@ from scout_model.errors import UnknownBody
 from scout_model.radio_air import RadioAir, Sent
 from scout_model.world import World
 
-AWAY_S = 0.1  # chosen: three frames; with the packets' usual pause well below what robots take for silence
+AWAY_S = 0.1  # chosen: three frames; with the usual pause between packets well below a robot's limit of silence
 
 
 class WorldParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the world is made of."""
+    """The description of the world."""
 
     world: WorldDescription
 
@@ -51,7 +50,7 @@ class NoSuchBody(Refusal):
 
 
 class SimulatedWorld(Component[WorldParameters]):
-    """Plays robots and room for the simulated drivers, and audits what it hears."""
+    """Plays robots and room for the simulated drivers, and audits the packets on the air."""
 
     parameters_type = WorldParameters
     given_elsewhere = frozenset({"world"})
@@ -72,11 +71,11 @@ class SimulatedWorld(Component[WorldParameters]):
         self._away_s = 0.0
 
     async def connect(self) -> None:
-        """Begin to hear the air."""
+        """Subscribe to the packets on the air."""
         self.bus.subscribe(self.address, Conversation.COMMAND, RadioPacket, self._hear)
 
     async def serve(self) -> None:
-        """Step one frame after the other, each at its time, and publish what came of it."""
+        """Step one frame after the other, each at its time, and publish the state."""
         first_s = self.clock.now_s()
         frame = 0
         while True:
@@ -94,7 +93,7 @@ class SimulatedWorld(Component[WorldParameters]):
             self._publish(frame, due_s)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Tell what the world is and where a body stands."""
+        """Answer ``AskWorld`` and ``AskPose``."""
         match asked.body:
             case AskWorld():
                 robots = {scout.name: scout.network_id for scout in self.parameters.world.scouts}
@@ -109,7 +108,7 @@ class SimulatedWorld(Component[WorldParameters]):
         return await super().answer(asked)
 
     def statistics(self) -> dict[str, float]:
-        """Count packets, and what must never be: some of an epoch that is over or from before a stop, jammed frames."""
+        """Count packets and violations: packets of a stale epoch, packets from before a stop, jammed frames."""
         lost, delivered = self._air.lost, self._air.delivered
         return {
             "packets": self._packets,

@@ -1,9 +1,9 @@
-"""What a commander knows of the stops of robots; its commands carry the number of the last stop it knows to be lifted.
+"""Stop knowledge: the stops that a commander knows. Its commands carry the number of the last stop whose lift it knows.
 
 Rules of this file: pure; no bus, no clock.
 
-A command that was given before a stop or before its lift may arrive after both. Its number tells it from one that was
-given afterwards: the robot's RC refuses every number but that of its last stop.
+A command that was given before a stop or before its lift may arrive after both. Its number distinguishes it from a
+later command: the robot's RC refuses every number but that of its last stop.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ class StopKnowledge:
         self._last: dict[str, tuple[int, bool]] = {}
 
     def number(self, robot: str) -> int:
-        """Return the number that commands to this robot carry; 0: no stop of it is known."""
+        """Return the number for commands to this robot; 0: no stop is known."""
         number, is_lifted = self._last.get(robot, (0, True))
-        return number if is_lifted else number - 1  # one that cannot be right, also if the lift overtakes the command
+        return number if is_lifted else number - 1  # a wrong number, also if the lift overtakes the command
 
     def heard(self, state: StopState) -> bool:
-        """Take in how a robot is; return whether that is news. What is older than what is known changes nothing."""
+        """Record a robot's state; return whether it is news. A state older than the known one changes nothing."""
         known, now = self._last.get(state.rc, (0, True)), (state.number, not state.is_stopped)
         if now <= known:
             return False
@@ -31,7 +31,7 @@ class StopKnowledge:
         return True
 
     def refused(self, refusal: EmergencyStopped) -> None:
-        """Take in what the robot's RC said when it refused a command: that is how it is, whatever was heard before."""
+        """Record the state in a refusal of the robot's RC, which overrides all earlier states."""
         facts = refusal.facts
         if "rc" in facts and "number" in facts:
             self._last[str(facts["rc"])] = (int(facts["number"]), not facts.get("is_stopped", True))

@@ -1,12 +1,12 @@
-"""Emergency stop of one robot: once stopped it stays so until that very stop is lifted.
+"""Emergency stop of one robot: it stays stopped until exactly this stop is lifted.
 
 Rules of this file: pure; time is an argument; no bus.
 
-* Stopping is always right: it needs no grant. A second stop keeps the first one's author and reason, adds its own
+* A stop is always allowed and needs no grant. A second stop keeps the first one's author and reason, adds its own
   author, and has a number of its own.
-* Only the stop that was seen is lifted. A lift on its way while somebody stops again changes nothing.
-* Who holds the robot keeps it; its drives and jumps are refused with the author and the reason.
-* A command counts only if whoever gave it knew that the last stop was lifted: one that was on its way then is refused.
+* A lift names the stop that the operator saw. If a newer stop comes meanwhile, the lift changes nothing.
+* The holder keeps the robot; its drives and jumps are refused with the author and the reason.
+* A command is refused if its sender did not know that the last stop was lifted.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ import msgspec
 
 from resource_pool.messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
-MOST_AUTHORS = 16  # chosen: more people than look after one robot
+MOST_AUTHORS = 16  # chosen: more people than operate one robot
 
 
 class StopLatch:
-    """Whether a robot may move.
+    """The stop of one robot.
 
     Args:
-        rc: Its name.
-        state: As it was before its process began; None: it may move, and nobody ever stopped it.
+        rc: Name of the robot.
+        state: State before the RC's process began; None: it may move and was never stopped.
     """
 
     def __init__(self, rc: str, state: StopState | None = None) -> None:
         self.state = state or StopState(rc, False, 0, "", "", 0.0)
-        """How it is now."""
+        """The present state."""
 
     def stop(self, by: str, reason: str, now_s: float, console: str = "") -> bool:
-        """Let nothing move it any more; say whether that is new: it could move, or this author did not stop it yet.
+        """Stop the robot; return whether this is new: it could move, or this author had not stopped it yet.
 
         Args:
-            by: Who stops it, for people.
-            reason: As given.
-            now_s: When.
-            console: Address of the console it is done by.
+            by: Name of the operator, for people.
+            reason: The operator's reason.
+            now_s: Mission time.
+            console: Address of the operator's console.
         """
         state, author = self.state, Stopper(by, console)
         if not state.is_stopped:
@@ -49,15 +49,15 @@ class StopLatch:
         return is_new
 
     def confirm(self, is_confirmed: bool) -> None:
-        """Take note whether the packet that stops the wheels was handed to the radio, if it is still stopped."""
+        """Record whether the radio accepted the packet that stops the wheels, if the robot is still stopped."""
         if self.state.is_stopped:
             self.state = msgspec.structs.replace(self.state, is_confirmed=is_confirmed)
 
     def lift(self, number: int, by: str, now_s: float) -> bool:
-        """Let it move again; say whether that is new.
+        """Lift the stop; return whether this is new.
 
         Raises:
-            OtherStop: Another stop than this one is in force.
+            OtherStop: Another stop is in force.
         """
         state = self.state
         if number != state.number:
@@ -75,11 +75,11 @@ class StopLatch:
         """Return if a command may move the robot.
 
         Args:
-            after_stop: Number of the last stop that whoever gave the command knew to be lifted.
+            after_stop: Number of the last stop whose lift the sender knew.
 
         Raises:
-            EmergencyStopped: The robot may not move.
-            GivenBeforeStop: It may, and the command is older than the lift of its last stop.
+            EmergencyStopped: A stop is in force.
+            GivenBeforeStop: No stop is in force, but the command is older than the lift of the last stop.
         """
         state = self.state
         if state.is_stopped:

@@ -31,7 +31,7 @@ class CaptureArc(VideoDriveArc):
         await asyncio.gather(super().prepare(epochs), self.tell_rc("framegrabber", tune))
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Answer also the framegrabber: a transmitter that it does not hear is switched on again."""
+        """Answer the framegrabber, too: switch on a transmitter that it does not receive."""
         match asked.body:
             case NothingHeard(rc=rc, epoch=epoch):
                 grabber = self.rc("framegrabber")

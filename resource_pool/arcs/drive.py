@@ -12,6 +12,6 @@ from resource_pool.aggregate_resource_controller import AggregateResourceControl
 
 
 class DriveArc(AggregateResourceController):
-    """A robot and room on its command radio."""
+    """A robot and a share of its command radio."""
 
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio")

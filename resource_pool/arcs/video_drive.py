@@ -13,7 +13,7 @@ from resource_pool.messages import CommandScout, SwitchTransmitter
 
 
 class VideoDriveArc(AggregateResourceController):
-    """A robot, room on its command radio, and a video frequency on which it transmits while it is held."""
+    """A robot, a share of its command radio, and a video frequency on which it transmits during a grant."""
 
     roles: ClassVar[Sequence[str]] = ("scout", "command_radio", "video_frequency")
 

@@ -1,1 +1,1 @@
-"""How an RC reaches its hardware; a mission picks one by name."""
+"""Drivers: an RC's interface to its hardware; a mission chooses one by name."""

@@ -1,7 +1,7 @@
-"""What an RC expects of its hardware. A driver knows one device; it knows no ARC, no epoch, no bus of ours.
+"""Driver interface: the protocols between RCs and hardware. A driver knows one device, but no ARC, no epoch and no bus.
 
-The simulated drivers, a radio on a serial port and a grabber behind V4L2 all fit these protocols. A
-mission names a driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
+The simulated drivers, a radio on a serial port and a grabber behind V4L2 all fit these protocols. A mission names a
+driver: one of ``BUILT_IN`` for its kind, or ``package.module:Class``.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ class UnknownDriver(Refusal):
 
 @dataclass(frozen=True)
 class DriverSite:
-    """Where a driver is built in: what it may use.
+    """A driver's interface to its RC.
 
     Attributes:
         resource: Name of the resource.
-        bus: For drivers whose hardware is reached over it (the simulated ones).
-        clock: The mission's time.
+        bus: Bus, for drivers of simulated hardware.
+        clock: The mission's clock.
         parameters: The RC's parameters; the driver's own are in ``options``, checked by its ``options_type``.
-        tell: Says one line to the people who watch the mission.
-        fail: Ends the RC because of this bug or fault; its creator starts it anew, with the device reopened.
-        folder: Of this mission on this machine, for what need be found out only once; None: there is none.
+        tell: Publishes one line to the mission's log.
+        fail: Ends the RC because of this bug or fault; its creator restarts it, and it opens the device again.
+        folder: Folder of the mission on this machine, for results that are computed only once; None: no folder.
     """
 
     resource: str
@@ -51,10 +51,10 @@ class DriverSite:
     folder: Path | None = None
 
     def options(self, kind: type[Options]) -> Options:
-        """Return what the mission says to this driver alone.
+        """Return the driver's own options from the mission file.
 
         Raises:
-            WrongParameter: It says something ``kind`` does not have, or not as it should be.
+            WrongParameter: An option is not in ``kind``, or its value is illegal.
         """
         try:
             return msgspec.convert(self.parameters.options, kind)
@@ -63,55 +63,55 @@ class DriverSite:
 
 
 class NoOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """For drivers that need to be told nothing."""
+    """For drivers without options."""
 
 
 class RadioDriver(Protocol):
     """A transmitter of command packets."""
 
     async def open(self) -> None:
-        """Get hold of the device. When: once, before readiness. Raise ``HardwareFault`` if it is not there."""
+        """Open the device. When: once, before readiness. Raise ``HardwareFault`` if it is missing."""
 
     async def transmit(
         self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
     ) -> float | None:
-        """Return when the packet is on the air. Not: queue it. All behind ``payload`` is for audits only.
+        """Return when the packet is on the air. Not: queue it. The arguments after ``payload`` are for audits only.
 
         Returns:
-            How long it really occupies the air from the call on, mission seconds; None: as long as this call took.
+            Its time on the air from the call on, mission seconds; None: the duration of this call.
 
         Raises:
-            HardwareFault: It was not sent.
+            HardwareFault: The packet was not sent.
         """
 
     async def close(self) -> None:
-        """Let go of the device. When: once, last."""
+        """Close the device. When: once, last."""
 
 
 @runtime_checkable
 class AdjustableDriver(Protocol):
-    """A driver that need not be built anew when its options, or those parameters of its RC it uses, change."""
+    """A driver that can apply changed options and parameters of its RC while it runs."""
 
     def adjust(self, site: DriverSite) -> None:
-        """Take over ``site.parameters``, whose options were checked, from the next packet or picture on.
+        """Apply ``site.parameters``, whose options are checked, from the next packet or picture on.
 
         Raises:
-            Refusal: It cannot; nothing has changed.
+            Refusal: The driver cannot; nothing is changed.
         """
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a grabber took.
+    """One picture of a grabber.
 
     Attributes:
         captured_s: Mission time.
         pixels: Grey levels 0 to 255 as bytes, row by row from the top.
         width_px: Columns.
         height_px: Rows.
-        transmitters: How many transmitters were heard on the frequency; -1 where the hardware cannot tell.
-        robot: The one that was heard, if exactly one and the hardware can tell; else empty.
-        kind: What is worst about the picture, where that is known, for counts only: ``clean``, ``torn``, …; else empty.
+        transmitters: Number of transmitters on the frequency; -1: unknown to the hardware.
+        robot: The transmitting robot, if it is exactly one and known to the hardware; else empty.
+        kind: Worst fault of the picture, for counts only: ``clean``, ``torn``, …; empty: unknown.
     """
 
     captured_s: float
@@ -124,26 +124,26 @@ class Picture:
 
 
 class FramegrabberDriver(Protocol):
-    """A receiver with a digitizer behind it."""
+    """A receiver with a digitizer."""
 
     async def open(self) -> None:
-        """Get hold of the device and whatever is slow to get; see ``RadioDriver.open``."""
+        """Open the device and slow resources; see ``RadioDriver.open``."""
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:
-        """Receive this frequency from now on; hand each picture over in the event loop. Replaces an earlier tuning."""
+        """Receive this frequency from now on; deliver each picture in the event loop. Replaces an earlier tuning."""
 
     def stop(self) -> None:
-        """Hand nothing over any more. When: at the end of each hold. Calling it twice is allowed."""
+        """Stop the delivery of pictures. When: at the end of each hold. Idempotent."""
 
     async def close(self) -> None:
-        """Let go of the device. When: once, last."""
+        """Close the device. When: once, last."""
 
 
 class RobotProtocol(Protocol):
-    """How commands to one kind of robot are spelt in packets. Raise ``HardwareFault`` for what it cannot do."""
+    """Encodes commands to one kind of robot as packets. Raise ``HardwareFault`` for commands that the robot lacks."""
 
     def clip_wheel_speed(self, speed_rad_s: float) -> float:
-        """Return the speed the robot really takes, rad/s."""
+        """Return the speed within the robot's limits, rad/s."""
 
     def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
         """Return the packet for these wheel speeds."""
@@ -155,7 +155,7 @@ class RobotProtocol(Protocol):
         """Return the packet for a jump."""
 
     def transmitter(self, on: bool, frequency: str) -> bytes:
-        """Return the packet that turns the video transmitter on at this frequency, or off."""
+        """Return the packet that switches the video transmitter on at this frequency, or off."""
 
     def safe(self) -> bytes:
         """Return the packet after which the robot neither moves nor transmits."""
@@ -170,21 +170,21 @@ BUILT_IN: Mapping[str, Mapping[str, str]] = {
 
 
 class NoDevice:
-    """For resources that are a right and no device: there is nothing to drive."""
+    """For resources without a device, such as the right to use a frequency."""
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site
 
 
 def build_driver(kind: str, name: str, site: DriverSite) -> Any:
-    """Return the driver of this name, not yet open. Its module is imported only here, in the RC that needs it.
+    """Return the driver of this name, not open yet. Only this function imports its module, in the RC that needs it.
 
-    A driver class takes the site; if it has a class variable ``options_type`` (a msgspec struct), it takes
-    ``site.options(options_type)``, else no options are allowed.
+    A driver class gets the site. If it has a class variable ``options_type`` (a msgspec struct), it also gets
+    ``site.options(options_type)``; else no options are allowed.
 
     Raises:
-        UnknownDriver: There is none.
-        WrongParameter: It does not understand its options.
+        UnknownDriver: No driver has this name.
+        WrongParameter: The driver refuses its options.
     """
     built_in = BUILT_IN.get(kind, {})
     path = built_in.get(name, name)

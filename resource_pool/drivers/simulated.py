@@ -24,7 +24,7 @@ async def meet_world(site: DriverSite) -> WorldModel:
     """Return the world's model as soon as the world answers.
 
     Raises:
-        HardwareFault: It did not within ``WORLD_START_S``.
+        HardwareFault: The world did not answer within ``WORLD_START_S``.
     """
     try:
         return await ask_until_answered(
@@ -40,17 +40,17 @@ def world_of(site: DriverSite) -> str:
 
 
 class RadioOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a mission may say to a simulated radio.
+    """Options of a simulated radio.
 
     Attributes:
-        bits_per_s: Rate at which it sends; a packet that takes longer than its ARC declared raises an alarm.
+        bits_per_s: Its bit rate; a packet that takes longer than its ARC declared raises an alarm.
     """
 
     bits_per_s: Annotated[float, msgspec.Meta(gt=0)] = 115_200.0
 
 
 class SimulatedRadio:
-    """A radio whose packets the simulated world hears, in the order in which they were sent."""
+    """A radio that sends its packets to the simulated world, in order."""
 
     options_type = RadioOptions
 
@@ -64,12 +64,12 @@ class SimulatedRadio:
         self._bits_per_s = site.options(RadioOptions).bits_per_s
 
     async def open(self) -> None:
-        """Wait for nothing: packets into a world that is not there are lost, as on the air."""
+        """Return at once: packets to a missing world are lost, as on the air."""
 
     async def transmit(
         self, network_id: int, payload: bytes, *, arc: str, robot_epoch: int, robot_stop: int = 0
     ) -> float | None:
-        """Put the packet on the air; nobody acknowledges it, as on the air. Return how long its bytes take."""
+        """Send the packet without an acknowledgment, as on the air. Return the duration of its bytes."""
         air_time_s = radio_link.packet_bits(payload) / self._bits_per_s
         packet = RadioPacket(
             self._site.resource,
@@ -85,17 +85,17 @@ class SimulatedRadio:
         return air_time_s
 
     async def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no device is open."""
 
 
 class SimulatedScoutProtocol:
-    """Packets as the simulated Scout's firmware reads them."""
+    """Encodes packets for the simulated Scout's firmware."""
 
     def __init__(self, site: DriverSite) -> None:
         self._site = site
 
     def clip_wheel_speed(self, speed_rad_s: float) -> float:
-        """Return the speed the motor can do, rad/s."""
+        """Return the speed within the motor's limits, rad/s."""
         return clip_wheel_speed(speed_rad_s)
 
     def drive(self, left_rad_s: float, right_rad_s: float) -> bytes:
@@ -111,7 +111,7 @@ class SimulatedScoutProtocol:
         return radio_link.encode_jump()
 
     def transmitter(self, on: bool, frequency: str) -> bytes:
-        """Return the packet that turns the transmitter on or off."""
+        """Return the packet that switches the transmitter on or off."""
         if not on:
             return radio_link.encode_transmitter_off()
         try:

@@ -1,9 +1,8 @@
-"""Driver of the simulated receiver and framegrabber: draws what is received, where it is received.
+"""Driver of the simulated receiver and framegrabber: draws the received pictures in the receiver's process.
 
-Nothing is drawn but the robots that transmit on the tuned frequency, and only while it is tuned. Drawing
-runs in one thread of its own, which also owns the renderer; on a virtual clock it runs in the loop and
-takes no time. Either way the picture of a frame is handed over ``capture_delay_s`` after the frame's time,
-or as soon afterwards as it is drawn.
+It draws only the cameras of robots that transmit on the tuned frequency, and only while it is tuned. A thread of its
+own draws and owns the renderer; on a virtual clock the loop draws, which takes no time. In both cases the driver
+delivers the picture of a frame ``capture_delay_s`` after the frame's time, or as soon afterwards as it is drawn.
 """
 
 from __future__ import annotations
@@ -31,15 +30,15 @@ from resource_pool.messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe, probe_once
 
 CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each
-EARLY_S = 1 / 120  # chosen: a quarter of a frame; the times of frames are rounded, and no frame is left out for that
+EARLY_S = 1 / 120  # chosen: a quarter of a frame, so that rounded frame times skip no frame
 
 
 class GrabberOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a mission may say to a simulated framegrabber.
+    """Options of a simulated framegrabber.
 
     Attributes:
-        capture_delay_s: From a frame's time to the moment it is handed over, seconds: the camera sends it row by
-            row, and the grabber has it when its last row is in.
+        capture_delay_s: Time from a frame to its delivery, seconds: the camera sends it row by row, and the grabber
+            has it after its last row.
     """
 
     capture_delay_s: Annotated[float, msgspec.Meta(ge=0, le=1)] = 1 / 30
@@ -64,12 +63,12 @@ class SimulatedFramegrabber:
         self._delay_s = site.options(GrabberOptions).capture_delay_s
 
     def adjust(self, site: DriverSite) -> None:
-        """Take pictures at the new rate and with the new delay from the next one on."""
+        """Apply the new rate and delay from the next picture on."""
         self._delay_s = site.options(GrabberOptions).capture_delay_s
         self._pause_s = 1.0 / site.parameters.frame_rate_hz
 
     async def open(self) -> None:
-        """Fetch the world's model and open the renderer, or the painter where there is no OpenGL."""
+        """Fetch the world's model and open the renderer, or the painter if OpenGL is missing."""
         run = asyncio.get_running_loop().run_in_executor
         choosing = run(None, _choose, self._site.parameters.camera, self._site.folder)
         world = await meet_world(self._site)
@@ -87,7 +86,7 @@ class SimulatedFramegrabber:
         self._frequency, self._deliver, self._next_s, self._is_new = frequency, deliver, -math.inf, True
 
     def stop(self) -> None:
-        """Hand nothing over any more; see ``FramegrabberDriver.stop``."""
+        """Stop the delivery of pictures; see ``FramegrabberDriver.stop``."""
         self._frequency, self._deliver = "", None
 
     async def close(self) -> None:
@@ -134,7 +133,7 @@ class SimulatedFramegrabber:
 
 @dataclass(frozen=True, slots=True)
 class _Tuned:
-    """For whom a picture is; the first after the tuning is of a receiver that has yet to lock."""
+    """The receiver of a picture; after a tuning, the receiver first has to lock."""
 
     frequency: str
     deliver: Callable[[Picture], None]
@@ -142,7 +141,7 @@ class _Tuned:
 
 
 class _Studio:
-    """Cameras of all robots and one receiver a frequency; lives in the drawing thread."""
+    """Cameras of all robots and one receiver for each frequency; used only by the drawing thread."""
 
     def __init__(self, world: WorldModel, support: GlSupport | None, backend: str, lasts: bool) -> None:
         prepare(support.backend if support is not None and backend == "gl" else "none")
@@ -154,7 +153,7 @@ class _Studio:
         self._receivers: dict[str, Any] = {}
 
     def take(self, state: WorldState, frequency: str, is_new: bool) -> Picture:
-        """Return what the receiver of this frequency gives for this state of the world."""
+        """Return the picture of this frequency's receiver for this state of the world."""
         receiver = self._receivers.get(frequency)
         if receiver is None:
             receiver = self._video_link.Receiver(self._world.seed, frequency, self._world.air)
@@ -198,16 +197,16 @@ def _new_camera(mjcf: str, backend: str) -> Any:
 
 @functools.lru_cache(maxsize=CAMERAS_KEPT)
 def _lasting_camera(mjcf: str, backend: str) -> Any:
-    """Return the camera of all worlds of this model that this process plays on a virtual clock, one after the other.
+    """Return the camera for all worlds of this model that this process runs on a virtual clock, one after the other.
 
-    They are drawn in one thread, and what a picture shows depends on the world's state alone, so pictures that one
-    world's camera keeps serve the next world too.
+    One thread draws all of them, and a picture depends only on the world's state. So the pictures that one world's
+    camera caches are valid for the next world too.
     """
     return _new_camera(mjcf, backend)
 
 
 def _choose(wanted: str, folder: Path | None) -> tuple[GlSupport | None, str]:
-    """Return what OpenGL there is, if anybody must know, and which camera to use."""
+    """Return the OpenGL support, if it matters, and the camera to use."""
     if wanted == "paint":
         return None, "paint"
     support = probe() if folder is None else probe_once(folder)

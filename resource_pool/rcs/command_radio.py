@@ -3,9 +3,9 @@
 Rules of this file:
 
 * One packet at a time is on the air, and each keeps it for its packet time, or longer if it takes longer.
-* Everything but safe packets is sent in turns that were admitted; who declared too little is told, and all others.
-* A robot an ARC spoke to hears a safe packet last. One that could not be sent is owed until it was.
-* A radio that fails while it serves its streams ends this RC; its creator starts it anew, with the device reopened.
+* All packets but safe packets are sent in admitted turns. If an ARC declared too little time, the radio logs it.
+* The last packet to each robot of an ARC is its safe packet. The radio repeats a failed safe packet until it is sent.
+* If the radio fails while it serves its streams, this RC ends; its creator restarts it and it opens the device again.
 
 Source: IROS 2001, section 4.3; RAM 2002, "Sharable Resources".
 """
@@ -44,23 +44,23 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 log = logging.getLogger(__name__)
 
 ONCE_WITHIN_S = 0.3  # chosen: a robot RC waits half a second for its packet to be sent; machine seconds
-TRANSMIT_WITHIN_S = 1.0  # chosen: hundreds of packet times; a device that takes none for so long hangs; machine seconds
+TRANSMIT_WITHIN_S = 1.0  # chosen: hundreds of packet times; a slower device hangs; machine seconds
 
 
 @dataclass(frozen=True, slots=True)
 class _Once:
-    """Somebody waits for this packet to be sent, or for the refusal."""
+    """A packet that is sent once, and the future of its outcome."""
 
     arc: str
     on_air: asyncio.Future[None]
 
 
 class CommandRadio(ResourceController[RcParameters]):
-    """Interleaves packets by network id; when an ARC is disconnected its robots hear a last, safe packet."""
+    """Interleaves packets by network id; when an ARC is disconnected, its robots get a last, safe packet."""
 
     commands = LoadPacket
     driver_kind = "radio"
-    outlasts_s = COMMAND_TIMEOUT_S  # robots stop and are silent by themselves when they hear nothing for so long
+    outlasts_s = COMMAND_TIMEOUT_S  # robots without packets stop and switch off after this time
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -81,7 +81,7 @@ class CommandRadio(ResourceController[RcParameters]):
         await self._driver.open()
 
     async def serve(self) -> None:
-        """Send what is due, and end holds whose lease is over."""
+        """Send due packets, and end holds whose leases have expired."""
         self.start_task(self._send_when_due(), "send")
         await super().serve()
 
@@ -91,14 +91,14 @@ class CommandRadio(ResourceController[RcParameters]):
         await self._driver.close()
 
     async def connected(self, hold: Hold) -> None:
-        """Give the ARC its streams."""
+        """Add the ARC's streams."""
         try:
             self._schedule.connect(hold.arc, hold.use.streams or [DEFAULT_DRIVE_USAGE], hold.rank)
         except ValueError as error:
             raise ImpossibleUse(f"{self.name}: {error}") from None
 
     async def make_safe(self, hold: Hold) -> None:
-        """Drop what the ARC loaded; the last its robots hear is the safe packet."""
+        """Drop the ARC's packets, and send its robots their safe packets last."""
         count = self._schedule.counts().get(hold.arc)
         if count is not None and count.overruns:
             self.tell(hold.arc, f"{count.overruns} of its packets on {self.name} were late or lost, {count.sent} sent")
@@ -141,13 +141,13 @@ class CommandRadio(ResourceController[RcParameters]):
         return PacketLoaded()
 
     def ranked(self, arc: str, epoch: int) -> None:
-        """Let the ARC's packets go first that is higher now."""
+        """Order the ARCs' packets by their new ranks."""
         hold = self.holds.find(arc, epoch)
         if hold is not None:
             self._schedule.rank(arc, hold.rank)
 
     def may_command(self, source: str, hold: Hold, order: LoadPacket) -> bool:
-        """Say whether a packet may come from there: from a robot that is connected to the same ARC as the radio."""
+        """Return whether the source is a robot that is connected to the same ARC as the radio."""
         robot = component_of(source)
         return source == address(Subsystem.RESOURCE_POOL, robot) and hold.companions.get(robot) == order.robot_epoch
 
@@ -169,10 +169,10 @@ class CommandRadio(ResourceController[RcParameters]):
         """Return when the packet is on the air.
 
         Raises:
-            NoTurnSoon: Its stream is too slow; nothing will be sent.
-            StaleEpoch: The ARC lost the radio before the packet's turn: nothing was sent.
-            GivenBeforeStop: The robot was stopped before the packet's turn: nothing was sent.
-            HardwareFault: It was not sent.
+            NoTurnSoon: Its stream is too slow; the packet is not sent.
+            StaleEpoch: The ARC lost the radio before the packet's turn; the packet was not sent.
+            GivenBeforeStop: The robot was stopped before the packet's turn; the packet was not sent.
+            HardwareFault: The radio did not send the packet.
         """
         wait_s = self._schedule.next_turn_s(packet.arc, packet.kind, self.clock.now_s()) - self.clock.now_s()
         if wait_s > ONCE_WITHIN_S * self.clock.rate:
@@ -197,7 +197,7 @@ class CommandRadio(ResourceController[RcParameters]):
         return GivenBeforeStop(f"{self.name}: robot {packet.network_id} was stopped after this packet was made")
 
     def _settle(self, waiting: _Once | None, fault: Refusal | None = None) -> None:
-        """Let who waits for the packet know what became of it."""
+        """Set the outcome of a packet that is sent once."""
         if waiting is None or waiting.on_air.done():
             return
         if fault is None:
@@ -217,7 +217,7 @@ class CommandRadio(ResourceController[RcParameters]):
                 await self._send_next()
 
     async def _wait_loaded_or(self, due_s: float) -> None:
-        """Return at this time, or earlier if there is something new to send."""
+        """Return at this time, or earlier if a new packet was loaded."""
         try:
             async with asyncio.timeout((due_s - self.clock.now_s()) / self.clock.rate):
                 await self._loaded.wait()
@@ -226,7 +226,7 @@ class CommandRadio(ResourceController[RcParameters]):
 
     async def _send_next(self) -> None:
         async with self._air:
-            await self.clock.sleep_until_s(self._air_free_s)  # before the choice: who joins meanwhile may go first
+            await self.clock.sleep_until_s(self._air_free_s)  # first, because a later packet may be first in order
             sending = self._schedule.take(self.clock.now_s())
             if sending is None:
                 return
@@ -246,8 +246,8 @@ class CommandRadio(ResourceController[RcParameters]):
         """Send the packet as soon as the air is free; the caller holds the air.
 
         Raises:
-            HardwareFault: It was not sent.
-            GivenBeforeStop: The robot was stopped while it waited for the air; it was not sent.
+            HardwareFault: The radio did not send the packet.
+            GivenBeforeStop: The robot was stopped while the packet waited for the air; it was not sent.
         """
         await self.clock.sleep_until_s(self._air_free_s)
         if self._schedule.is_overtaken(sending.packet):
@@ -265,7 +265,7 @@ class CommandRadio(ResourceController[RcParameters]):
                     robot_stop=packet.robot_stop,
                 )
         except TimeoutError:
-            raise HardwareFault(f"{self.name} took no packet within {TRANSMIT_WITHIN_S} s") from None
+            raise HardwareFault(f"{self.name} accepted no packet within {TRANSMIT_WITHIN_S} s") from None
         took_s = self.clock.now_s() - begun_s if reported_s is None else reported_s
         self._air_free_s = max(self._air_free_s, begun_s + took_s)
         self._sent += 1

@@ -1,7 +1,7 @@
 """RC of a framegrabber behind a tuned receiver: pictures of one frequency, for the ARC that holds it.
 
-Pictures go out under the ARC's address and carry the connection's epoch; whoever listens drops those
-of another epoch. A picture is delivered only if exactly the expected robot was heard, where the hardware can tell.
+Pictures are published under the ARC's address with the connection's epoch; subscribers drop pictures of other epochs.
+If the hardware knows the transmitting robots, a picture is delivered only if exactly the expected robot transmits.
 
 Source: IROS 2001, section 4.1; RAM 2002, "Examples of ARCs and RCs".
 """
@@ -30,12 +30,12 @@ from resource_pool.resource_controller import RcParameters, ResourceController
 
 log = logging.getLogger(__name__)
 
-SILENT_S = 0.5  # chosen: a packet has its turn on the radio within 0.3 s, and its robot is seen two pictures later
+SILENT_S = 0.5  # chosen: a packet has its turn on the radio within 0.3 s, and its robot appears two pictures later
 ARC_REPLY_S = 1.0  # chosen: the ARC asks a robot before it answers; machine seconds
 
 
 class FramegrabberParameters(RcParameters, frozen=True, kw_only=True):
-    """A framegrabber's own.
+    """Parameters of a framegrabber.
 
     Attributes:
         frame_rate_hz: Pictures a second, above 0 to 30.
@@ -47,7 +47,7 @@ class FramegrabberParameters(RcParameters, frozen=True, kw_only=True):
 
 
 class WrongFrequency(Refusal):
-    """The receiver of this framegrabber does not receive that frequency."""
+    """The receiver of this framegrabber cannot receive this frequency."""
 
     code = "framegrabber.frequency"
     remedy = "Tune to one of the frequencies the mission file links the framegrabber to."
@@ -69,7 +69,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self._silent_since_s = math.inf
 
     async def connect(self) -> None:
-        """Open the device, so that the first grant is as quick as the others."""
+        """Open the device, so that the first grant is as quick as later ones."""
         await super().connect()
         await self._driver.open()
 
@@ -79,7 +79,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         await self._driver.close()
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
-        """Deliver nothing any more."""
+        """Stop the delivery of pictures."""
         self._driver.stop()
 
     async def command(self, asked: Envelope[Any]) -> Message:
@@ -99,9 +99,9 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         return Applied(self.name, hold.epoch, self.clock.now_s(), "tune")
 
     def statistics(self) -> dict[str, float]:
-        """Count pictures delivered, and those dropped because nobody, several or another robot was heard.
+        """Count delivered pictures, and pictures dropped because no, several or another robot transmitted.
 
-        Where the hardware knows what is wrong with its pictures, count those of each kind too, delivered or dropped.
+        If the hardware knows the faults of its pictures, count the pictures of each kind too, delivered or dropped.
         """
         return {
             **super().statistics(),
@@ -114,7 +114,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
 
     def _deliver(self, hold: Hold, expected: str, picture: Picture, numbers: Iterator[int]) -> None:
         if not self.holds.has(hold.arc, hold.epoch):
-            return  # a driver may still be busy with it when it is told to stop
+            return  # a driver may deliver one picture after its stop
         if picture.kind:
             self._kinds[picture.kind] += 1
         if picture.transmitters == 0:
@@ -143,7 +143,7 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         self.bus.publish(address(Subsystem.RESOURCE_POOL, hold.arc), Conversation.FRAMES, frame)
 
     def _heard_nothing(self, hold: Hold) -> None:
-        """Let the ARC know when its transmitter is silent for long: it was reset, or missed the packet."""
+        """Ask the ARC to switch a silent transmitter on: it was reset, or missed its packet."""
         now_s = self.clock.now_s()
         self._silent_since_s = min(self._silent_since_s, now_s)
         if now_s - self._silent_since_s >= SILENT_S:
@@ -154,5 +154,5 @@ class Framegrabber(ResourceController[FramegrabberParameters]):
         arc = address(Subsystem.RESOURCE_POOL, hold.arc)
         try:
             await self.bus.ask(arc, NothingHeard(self.name, hold.epoch), Accepted, within_s=ARC_REPLY_S)
-        except (Refusal, LinkError) as error:  # still silent after SILENT_S, it is said again
-            log.info("%s does not mend its silence: %s", hold.arc, error)
+        except (Refusal, LinkError) as error:  # repeated if it is still silent after SILENT_S
+            log.info("%s did not switch its transmitter on: %s", hold.arc, error)

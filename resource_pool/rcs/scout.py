@@ -1,7 +1,7 @@
 """RC of a Scout: wheel speeds, jump, video transmitter; reached through a command radio.
 
-Any operator may stop it at any time, without a grant and past ARC and RC manager, so that a stop needs nothing to
-work but robot, radio and hub. The stop outlives this process.
+Any operator may stop it at any time, without a grant and past ARC and RC manager, so that a stop needs only robot,
+radio and hub. The stop outlives this process.
 
 Source: IROS 2001, section 2; RAM 2002, "Robots for Surveillance and Reconnaissance".
 """
@@ -50,17 +50,17 @@ from resource_pool.stop_latch import StopLatch
 log = logging.getLogger(__name__)
 
 OPERATORS = (f"{Subsystem.UI_CONSOLE}/", f"{Subsystem.BACKBONE}/")
-"""Whose word stops a robot past its holder: people's, and what speaks for them."""
+"""Subsystems whose components may stop a robot past its holder: they act for people."""
 
-RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet is not there
+RADIO_REPLY_S = 0.5  # chosen: a radio that needs longer for one packet counts as absent
 
 
 class ScoutParameters(RcParameters, frozen=True, kw_only=True):
-    """A Scout's own.
+    """Parameters of a Scout.
 
     Attributes:
         network_id: Its address on the command radio, 1 to 254.
-        protocol: Name of the driver that spells its packets; empty: that of ``driver``.
+        protocol: Name of the driver that encodes its packets; empty: the name in ``driver``.
     """
 
     network_id: int
@@ -68,21 +68,21 @@ class ScoutParameters(RcParameters, frozen=True, kw_only=True):
 
 
 class NoRadio(Refusal):
-    """The ARC holds the robot without the radio it is reached through."""
+    """The ARC holds the robot without its command radio."""
 
     code = "scout.no_radio"
     remedy = "Claim a kind of ARC whose set includes the robot's command radio."
 
 
 class NotFinite(Refusal):
-    """A wheel cannot turn at a speed that is no number."""
+    """A wheel speed is no finite number."""
 
     code = "scout.not_finite"
     remedy = "Send finite wheel speeds; those beyond the motor's limit are clipped."
 
 
 class Scout(ResourceController[ScoutParameters]):
-    """Turns commands into packets of the Scout's protocol and has the radio send them at the ARC's rate."""
+    """Encodes commands as packets of the Scout's protocol; the radio sends them at the ARC's rate."""
 
     parameters_type = ScoutParameters
     commands = CommandScout | EmergencyQuestion
@@ -101,22 +101,22 @@ class Scout(ResourceController[ScoutParameters]):
         self._latch = StopLatch(self.name, _read_stop(self._stop_file))
 
     async def serve(self) -> None:
-        """Stop the wheels when commands stay away, and end the hold when its lease is over."""
+        """Stop the wheels when no command comes, and end the hold when its lease expires."""
         if self._latch.state.is_stopped:
             self._tell_stop(self._latch.state, "is still stopped")
         self.start_task(self._halt_when_silent(), "dead man")
         await super().serve()
 
     async def connected(self, hold: Hold) -> None:
-        """Remember under which grant the robot may be commanded."""
+        """Record the grant under which the robot obeys."""
         self._holder, self._halt_at_s, self._frequency = hold, None, ""
 
     async def make_safe(self, hold: Hold) -> None:  # noqa: ARG002
-        """Command nothing any more; the radio sends the safe packet when it is disconnected."""
+        """Send no further command; the radio sends the safe packet at its own disconnection."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Answer also operators, who need no grant to stop the robot."""
+        """Answer operators, too, who need no grant to stop the robot."""
         match asked.body:
             case AskStop():
                 return self._latch.state
@@ -147,7 +147,7 @@ class Scout(ResourceController[ScoutParameters]):
         match order.command:
             case Drive(left_rad_s=left, right_rad_s=right):
                 left, right = self._protocol.clip_wheel_speed(left), self._protocol.clip_wheel_speed(right)
-                # Before the packet goes: while it does, the hold may end, or the answer of the radio be lost.
+                # Before the packet is sent, because meanwhile the hold may end or the radio's answer may be lost.
                 self._halt_at_s = self.clock.now_s() + COMMAND_TIMEOUT_S if left or right else None
                 self._driven.set()
                 packet, still = self._protocol.drive(left, right), self._protocol.halt()
@@ -158,7 +158,7 @@ class Scout(ResourceController[ScoutParameters]):
                 self._stopped(hold)
                 return self._applied(hold, "halt", {})
             case Jump():
-                # Repeating the last drive or halt would trip the robot or call the jump off.
+                # A repeated drive or halt would trip the robot or cancel the jump.
                 as_it_is = self._protocol.transmitter(bool(self._frequency), self._frequency)
                 packet = self._protocol.jump()
                 await self._move(hold, order.command, packet, at_once=True, afterwards=as_it_is, kind="jump")
@@ -167,17 +167,17 @@ class Scout(ResourceController[ScoutParameters]):
             case SwitchTransmitter(on=on, frequency=frequency):
                 packet = self._protocol.transmitter(on, frequency)
                 self._frequency = frequency if on else ""
-                still = self._protocol.halt()  # repeated, so that the robot hears it is not forgotten
+                still = self._protocol.halt()  # repeated, to keep the robot running
                 await self._load(hold, packet, at_once=True, afterwards=still, kind="transmitter")
                 return self._applied(hold, "transmitter", {"on": float(on)})
 
     def statistics(self) -> dict[str, float]:
-        """Count also the halts because commands stayed away, and the emergency stops."""
+        """Count halts for lack of commands, and emergency stops, too."""
         stops = float(self._latch.state.number)
         return {**super().statistics(), "command_timeouts": self._timeouts, "emergency_stops": stops}
 
     async def _stop_now(self, by: str, reason: str, console: str) -> StopState:
-        """Refuse all that moves the robot from here on, and stop its wheels if somebody could be turning them."""
+        """Refuse all further motion, and stop the wheels if a holder may be turning them."""
         is_new = self._latch.stop(by, reason, self.clock.now_s(), console)
         self._keep_stop()
         self._halt_at_s = None
@@ -188,7 +188,7 @@ class Scout(ResourceController[ScoutParameters]):
             except (
                 Refusal,
                 LinkError,
-            ) as error:  # the robot halts by itself when its last drive packet has had its time
+            ) as error:  # the robot halts by itself when its last drive packet expires
                 self.story.note(holder.arc, f"the stop was not sent: {error}")
                 self._latch.confirm(False)
             else:
@@ -199,7 +199,7 @@ class Scout(ResourceController[ScoutParameters]):
         return self._latch.state
 
     def standing_stop(self) -> StandingStop | None:
-        """Return the stop in force, for everybody who looks at the mission."""
+        """Return the stop in force, for the published state."""
         state = self._latch.state
         if not state.is_stopped:
             return None
@@ -215,7 +215,7 @@ class Scout(ResourceController[ScoutParameters]):
         self.bus.publish(self.address, Conversation.EVENTS, self._latch.state)
 
     def _keep_stop(self) -> None:
-        """Keep the stop for the next process of this RC; a disk that refuses must not keep the wheels turning."""
+        """Save the stop for the next process of this RC; a full disk must not prevent the stop."""
         if self._stop_file is None:
             return
         try:
@@ -226,7 +226,7 @@ class Scout(ResourceController[ScoutParameters]):
             self.tell(self.name, f"a restart of this RC will not know that {self.name} {news}: {error.strerror}")
 
     def _stopped(self, hold: Hold) -> None:
-        """Note that the wheels stand, unless the robot has another holder by now."""
+        """Record that the wheels stand still, unless the robot has another holder by now."""
         if self._holder is not None and self._holder.epoch == hold.epoch:
             self._halt_at_s = None
 
@@ -234,7 +234,7 @@ class Scout(ResourceController[ScoutParameters]):
         """Load a packet that moves the robot.
 
         Raises:
-            EmergencyStopped: It was stopped meanwhile, and perhaps freed again; the packet is not sent.
+            EmergencyStopped: The robot was stopped meanwhile, and perhaps freed again; the packet is not sent.
         """
         try:
             await self._load(hold, payload, moves=True, **how)
@@ -277,7 +277,7 @@ class Scout(ResourceController[ScoutParameters]):
         return Applied(self.name, hold.epoch, self.clock.now_s(), command, values)
 
     async def _halt_when_silent(self) -> None:
-        """Dead-man: a drive command that is not repeated ends after ``COMMAND_TIMEOUT_S``."""
+        """Dead-man's control: a drive command without a repetition ends after ``COMMAND_TIMEOUT_S``."""
         while True:
             self._driven.clear()
             if self._halt_at_s is None:
@@ -294,23 +294,23 @@ class Scout(ResourceController[ScoutParameters]):
             self.story.note(hold.arc, "sent no command for too long: wheels stopped")
             try:
                 await self._load(hold, self._protocol.halt())
-            except (Refusal, LinkError) as error:  # swapped out, or no radio: its safe packet or the robot itself halts
+            except (Refusal, LinkError) as error:  # swapped out, or no radio: the safe packet or the robot itself halts
                 self.story.note(hold.arc, f"halt not sent: {error}")
 
     def _silent_too_long(self) -> bool:
-        """Say whether, after the sleep, still no command has come."""
+        """Return whether still no command has come after the sleep."""
         return self._halt_at_s is not None and self.clock.now_s() >= self._halt_at_s
 
 
 def _read_stop(file: Path | None) -> StopState | None:
-    """Return the stop an earlier process of this RC kept; a robot whose file cannot be read counts as stopped."""
+    """Return the stop that an earlier process of this RC saved; an unreadable file counts as a stop."""
     if file is None or not file.exists():
         return None
     try:
         return msgspec.msgpack.decode(file.read_bytes(), type=StopState)
     except (OSError, msgspec.DecodeError) as error:
         log.error("%s: %s", file, error)
-        return StopState(file.name, True, 1, "nobody knows", "what was kept of an earlier stop cannot be read", 0.0)
+        return StopState(file.name, True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)
 
 
 def _is_finite(speeds: Drive) -> bool:

@@ -1,4 +1,4 @@
-"""A complete RC on a complete driver, to be copied: a lamp that is dark whenever nobody holds it."""
+"""A complete RC on a complete driver, to be copied: a lamp that is dark without a holder."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Shine(Message, frozen=True):
 
 
 class PaintedLamp:
-    """A driver: of a lamp that exists only as a line people see."""
+    """The driver of a lamp that exists only as a line of text."""
 
     class options_type(msgspec.Struct, frozen=True, forbid_unknown_fields=True):  # noqa: N801
-        """What the mission file says to this driver."""
+        """Options of this driver in the mission file."""
 
         color: str = "white"
 
@@ -36,12 +36,12 @@ class PaintedLamp:
         self._site, self._color = site, site.options(self.options_type).color
 
     async def set_brightness(self, share: float) -> None:
-        """Return when the lamp shines like that, 0 to 1; a real one raises ``HardwareFault`` if it does not."""
+        """Return when the lamp has this brightness, 0 to 1; a real driver raises ``HardwareFault`` if it has not."""
         self._site.tell(f"shines {self._color} at {share:.0%}" if share else "is dark")
 
 
 class Lamp(ResourceController[RcParameters]):
-    """The RC: admit, act, say what was applied; and know the safe state."""
+    """The RC: admit a command, carry it out, return the applied values; and know the safe state."""
 
     commands, driver_kind = Shine, "lamp"
 

@@ -1,7 +1,7 @@
 """RC of a video frequency: exclusive, because two transmitters on one frequency make both useless.
 
-The frequency is no device of its own. Holding its RC is the right to transmit on it; robot and
-receiver do the rest.
+The frequency is no device of its own. The holder of its RC has the right to transmit on it; robot and receiver do the
+rest.
 
 Source: IROS 2001, section 2.
 """

@@ -1,7 +1,7 @@
-"""What happened in a simulated mission, in the order in which it happened: all that the laws look at.
+"""Audit: the events of a simulated mission, in order; the laws examine only these.
 
-Rule of this file: what is kept has no addresses of objects, no process ids and no machine's time, so
-that two runs of one seed give the same bytes.
+Rule of this file: events contain no addresses of objects, no process ids and no time of a machine, so that two runs of
+one seed give the same bytes.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """One thing that happened.
+    """One event.
 
     Attributes:
         at_s: Mission time.
-        who: Component it happened to, by name.
-        what: One word; see the laws for what each of them says.
+        who: Name of its component.
+        what: One word; see the laws for the meaning of each.
         values: The names and numbers of this case.
     """
 
@@ -32,11 +32,11 @@ class Happening:
     values: dict[str, Any] = field(default_factory=dict)
 
     def to_line(self) -> str:
-        """Return it as one line of JSON, the same for the same content."""
+        """Return the event as one line of JSON, the same for the same content."""
         return json.dumps([round(self.at_s, 9), self.who, self.what, self.values], sort_keys=True)
 
     def concerns(self, names: Iterable[str]) -> bool:
-        """Say whether it is about one of these names."""
+        """Return whether the event is about one of these names."""
         told = {self.who, *(str(value) for value in _flat(self.values))}
         return not told.isdisjoint(names)
 
@@ -46,17 +46,17 @@ class Happening:
 
 
 class Audit:
-    """Keeps what happens in one run."""
+    """Records the events of one run."""
 
     def __init__(self) -> None:
         self.happenings: list[Happening] = []
 
     def note(self, who: str, what: str, **values: Any) -> None:
-        """Keep that this happened now."""
+        """Record an event now."""
         self.happenings.append(Happening(asyncio.get_running_loop().time(), who, what, values))
 
     def digest(self) -> str:
-        """Return a fingerprint of everything that happened."""
+        """Return a fingerprint of all events."""
         digest = hashlib.sha256()
         for happening in self.happenings:
             digest.update(happening.to_line().encode() + b"\n")
@@ -64,7 +64,7 @@ class Audit:
 
 
 current_audit: ContextVar[Audit] = ContextVar("current_audit")
-"""Of the run whose task this is; drivers, which a mission names by class path, find it here."""
+"""The audit of the present task's run; drivers, which a mission names by class path, find it here."""
 
 
 def _flat(value: Any) -> Iterator[Any]:

@@ -1,6 +1,6 @@
-"""The real RC manager, RCs and ARCs, which tell an audit what becomes of each hold, gate and packet.
+"""The real RC manager, RCs and ARCs, which record the fate of each hold, gate and packet in an audit.
 
-Rule of this file: nothing decides here. What is overridden notes, then does what it always did.
+Rule of this file: no decisions. Each overriding method records, then calls the original.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ R = TypeVar("R", bound=RcParameters)
 
 # ---------------------------------------------------------------------- drivers
 class AuditedRadio:
-    """A radio that keeps what it sends; no robot hears it."""
+    """A radio that records its packets; no robot receives them."""
 
     def __init__(self, site: DriverSite) -> None:
         self._name, self._audit = site.resource, current_audit.get()
 
     async def open(self) -> None:
-        """Nothing to get hold of."""
+        """Do nothing: there is no device."""
 
     async def transmit(
         self,
@@ -49,14 +49,14 @@ class AuditedRadio:
         *,
         arc: str,
         robot_epoch: int,
-        robot_stop: int = 0,  # noqa: ARG002  nobody stops robots there
+        robot_stop: int = 0,  # noqa: ARG002  no operator stops robots there
     ) -> None:
-        """Keep the packet."""
+        """Record the packet."""
         command = payload[:1].decode("ascii")
         self._audit.note(self._name, "packet", robot=network_id, command=command, arc=arc, epoch=robot_epoch)
 
     async def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no device is open."""
 
 
 class AuditedGrabber:
@@ -66,30 +66,30 @@ class AuditedGrabber:
         self._name, self._audit = site.resource, current_audit.get()
 
     async def open(self) -> None:
-        """Nothing to get hold of."""
+        """Do nothing: there is no device."""
 
     def tune(self, frequency: str, deliver: Callable[[Picture], None]) -> None:  # noqa: ARG002
-        """Keep to what it is tuned."""
+        """Record the frequency."""
         self._audit.note(self._name, "tuned", frequency=frequency)
 
     def stop(self) -> None:
-        """Keep that it is stopped."""
+        """Record the stop."""
         self._audit.note(self._name, "stopped")
 
     async def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no device is open."""
 
 
 # ---------------------------------------------------------------------- RCs
 class AuditedRc(ResourceController[R]):
-    """Tells when a hold begins, when it is over, and when all is safe after it."""
+    """Records the begin and end of each hold, and its safe state."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._audit = current_audit.get()
 
     async def connected(self, hold: Hold) -> None:
-        """Note the hold; see ``ResourceController.connected``."""
+        """Record the hold; see ``ResourceController.connected``."""
         self._audit.note(self.name, "held", arc=hold.arc, epoch=hold.epoch)
         try:
             await super().connected(hold)
@@ -98,7 +98,7 @@ class AuditedRc(ResourceController[R]):
             raise
 
     async def make_safe(self, hold: Hold) -> None:
-        """Note that the hold is over, then what comes of it; see ``ResourceController.make_safe``."""
+        """Record the end of the hold, then its safe state or fault; see ``ResourceController.make_safe``."""
         self._audit.note(self.name, "let go", arc=hold.arc, epoch=hold.epoch)
         try:
             await super().make_safe(hold)
@@ -126,7 +126,7 @@ class AuditedFramegrabber(AuditedRc[FramegrabberParameters], Framegrabber):
 
 # ---------------------------------------------------------------------- ARCs
 class AuditedGate(Gate):
-    """Tells when it opens and when it shuts."""
+    """Records when it opens and when it shuts."""
 
     __slots__ = ("audit",)
 
@@ -157,7 +157,7 @@ class AuditedGate(Gate):
 
 
 class AuditedArc(AggregateResourceController):
-    """An ARC whose gate tells."""
+    """An ARC with an audited gate."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -178,14 +178,14 @@ class AuditedCaptureArc(AuditedArc, CaptureArc):
 
 # ---------------------------------------------------------------------- RC manager
 class AuditedRcManager(RcManager):
-    """Tells each of its decisions, and whether its schedule keeps its promises after each."""
+    """Records each of its decisions, and checks the invariants of its schedule after each."""
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._audit = current_audit.get()
 
     def happened(self, event: Event, at_s: float | None = None) -> None:
-        """Have it decided, then checked; see ``RcManager.happened``."""
+        """Decide about the event, then check; see ``RcManager.happened``."""
         super().happened(event, at_s)
         try:
             self.manager.check()
@@ -207,4 +207,4 @@ COMPONENTS: Mapping[str, type[Component[Any]]] = {
     "video_drive": AuditedVideoDriveArc,
     "capture": AuditedCaptureArc,
 }
-"""Component type → class, of all that a placer starts in a simulated mission."""
+"""Component type → class, of all components that a placer starts in a simulated mission."""

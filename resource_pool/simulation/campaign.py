@@ -1,4 +1,4 @@
-"""Many simulated missions, spread over the processors; the first that breaks a law, with its story."""
+"""Fault campaign: many simulated missions on all processors, and the story of the first that breaks a law."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from resource_pool.simulation.shrink import smallest
 from resource_pool.simulation.supervised_mission import run_supervised
 from resource_pool.simulation.supervision_faults import SupervisionFault
 
-BATCH = 10  # chosen: two seconds of work, so that progress is seen and the first broken law soon ends it all
-ALONE = 2 * BATCH  # chosen: fewer are done before other processes have started
+BATCH = 10  # chosen: two seconds of work, so that progress is visible and a broken law ends the campaign soon
+ALONE = 2 * BATCH  # chosen: fewer missions are finished before other processes have started
 
 
 AnyFault = Fault | SupervisionFault
@@ -29,14 +29,14 @@ AnyFault = Fault | SupervisionFault
 
 @dataclass(frozen=True, slots=True)
 class Count:
-    """What was seen in some runs.
+    """Counts of some runs.
 
     Attributes:
-        runs: How many seeds there were; each means a pool mission and a supervised one.
-        happenings: Things that happened in them.
-        grants: Grants in them.
-        packets: Packets on the air.
-        faults: Faults on purpose.
+        runs: Number of seeds; each stands for a pool mission and a supervised one.
+        happenings: Number of events.
+        grants: Number of grants.
+        packets: Number of packets on the air.
+        faults: Number of injected faults.
     """
 
     runs: int = 0
@@ -46,7 +46,7 @@ class Count:
     faults: int = 0
 
     def __add__(self, other: Count) -> Count:
-        """Return what was seen in both."""
+        """Return the sum of both counts."""
         return Count(
             self.runs + other.runs,
             self.happenings + other.happenings,
@@ -61,13 +61,13 @@ class Finding:
     """A mission that breaks a law.
 
     Attributes:
-        seed: Of the mission.
-        supervised: Whether it is the supervised mission of this seed, or its pool mission.
-        chaos: Whether anything went wrong on purpose.
+        seed: Seed of the mission.
+        supervised: True: the supervised mission of this seed; False: its pool mission.
+        chaos: True if faults were injected.
         broken: The law, in the run with the fewest faults.
-        faults: As few faults as still break it.
-        faults_before: How many the run had that broke it first.
-        story: What happened to those concerned, up to the breach.
+        faults: The smallest found set of faults that breaks the law.
+        faults_before: Number of faults in the first run that broke it.
+        story: Events of the concerned components up to the breach.
     """
 
     seed: int
@@ -92,12 +92,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of all runs.
+    """The result of all runs.
 
     Attributes:
-        count: What was seen.
-        finding: The broken law of the smallest seed that was run and broke one; None if all hold.
-        took_s: Machine seconds it took.
+        count: Counts of all runs.
+        finding: The broken law of the smallest failing seed; None if all laws hold.
+        took_s: Duration, machine seconds.
     """
 
     count: Count
@@ -114,7 +114,7 @@ class Outcome:
         )
 
     def to_json(self) -> dict[str, object]:
-        """Return what ``--json`` prints."""
+        """Return the result as plain data, for ``--json``."""
         finding = self.finding
         told: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
         if finding is not None:
@@ -140,10 +140,10 @@ def simulate(
 
     Args:
         first: First seed.
-        seeds: How many, 1 or more.
-        chaos: Whether things go wrong on purpose.
-        tell: Takes lines of progress.
-        processes: How many to use; one for each processor if not said, this one alone for few seeds.
+        seeds: Number of seeds, 1 or more.
+        chaos: True: inject faults.
+        tell: Called with lines of progress.
+        processes: Number of processes; None: one for each processor, or only this one for few seeds.
     """
     began_s = time.monotonic()
     batches = [range(at, min(at + BATCH, first + seeds)) for at in range(first, first + seeds, BATCH)]
@@ -162,7 +162,7 @@ def simulate(
 
 
 def find(seed: int, *, chaos: bool) -> Finding | None:
-    """Return which law the mission of this seed breaks, with as few faults as possible; None if it breaks none."""
+    """Return the law that the mission of this seed breaks, with as few faults as possible; None if all laws hold."""
     runs = ((supervised, _run_quietly(seed, supervised, chaos)) for supervised in (False, True))
     supervised, run = next(((supervised, run) for supervised, run in runs if run.broken is not None), (False, None))
     if run is None or run.broken is None:
@@ -192,7 +192,7 @@ def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[Count, int
 
 
 def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tuple[Count, int | None]]:
-    """Run the batches in fresh processes, always as many as there are workers; begin none after a broken law."""
+    """Run the batches in fresh processes, one for each worker; begin none after a broken law."""
     waiting = iter(batches)
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
         running = {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, workers)}
@@ -207,7 +207,7 @@ def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tup
 
 
 def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[Count, int | None]:
-    """Run missions until one breaks a law; return what was seen, and its seed."""
+    """Run missions until one breaks a law; return the counts, and the seed of that mission."""
     counted = Count()
     for seed in batch:
         counted += Count(1)
@@ -220,7 +220,7 @@ def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[Count, int | None]:
 
 
 def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyFault] | None = None) -> MissionRun:
-    """Run the mission without the log: components speak of every fault, and what matters is in the audit."""
+    """Run the mission without logging: components log every fault, and the audit holds all that matters."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

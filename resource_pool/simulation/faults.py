@@ -1,8 +1,8 @@
-"""What goes wrong on purpose: which message gets lost, who hangs, who is killed, and when.
+"""Injected faults of a pool mission: lost messages, hanging components, killed components.
 
-Every fault has an identity that does not depend on the others: a message is known by who said it to
-whom and as the how-manieth of its kind. So a run can be repeated with some of its faults only, and the
-smallest set that still breaks a law can be looked for.
+Every fault has an identity that does not depend on other faults: the id of a message is its sender, its receiver, its
+kind and its number of this kind. So a run can be repeated with some of its faults only, to find the smallest set that
+breaks a law.
 
 Pure: a seed gives the faults, or a list does.
 """
@@ -19,19 +19,19 @@ from resource_pool.simulation.shape import BRING_UP_S, MissionShape
 
 Effect = Literal["lost", "late", "doubled"]
 
-LONGEST_DELAY_S = 2.5  # chosen: longer than a lease, so that what comes late has long been given up
+LONGEST_DELAY_S = 2.5  # chosen: longer than a lease, so that a late message comes after its time-out
 LONGEST_HANG_S = 3.0  # chosen: longer than a lease
 LONGEST_ABSENCE_S = 1.5  # chosen: a creator restarts at once, and later each time
 
 
 @dataclass(frozen=True, slots=True)
 class MessageFault:
-    """A message that does not arrive as it should.
+    """A fault of one message.
 
     Attributes:
-        message: Its identity: who said it to whom, what, and the how-manieth of these it is.
-        effect: What becomes of it.
-        by_s: Of one that is late: by how much.
+        message: Its id: sender, receiver, kind and number of this kind.
+        effect: ``lost``, ``late`` or ``doubled``.
+        by_s: Delay of a late message.
     """
 
     message: str
@@ -44,12 +44,12 @@ class MessageFault:
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """A component that dies as by SIGKILL.
+    """The death of a component as by SIGKILL.
 
     Attributes:
-        at_s: When.
+        at_s: Mission time.
         target: Name of the component.
-        away_s: Time until its creator has it running again, if it does.
+        away_s: Time until its creator has restarted it, if it restarts it.
     """
 
     at_s: float
@@ -62,12 +62,12 @@ class Kill:
 
 @dataclass(frozen=True, slots=True)
 class Hang:
-    """A component that for a while gets nothing and nothing gets away from it; then everything, in order.
+    """A component that for a while neither gets nor sends messages; then all of them travel, in order.
 
     Attributes:
-        at_s: When it begins.
+        at_s: Mission time of its begin.
         target: Address of the component.
-        lasts_s: How long.
+        lasts_s: Duration.
     """
 
     at_s: float
@@ -83,14 +83,14 @@ Fault = MessageFault | Kill | Hang
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """How bad it is.
+    """Shares and numbers of faults.
 
     Attributes:
-        lost: Share of messages that get lost.
-        late: Share that come late.
-        doubled: Share that come twice.
-        kills: How many components are killed.
-        hangs: How many are cut off.
+        lost: Share of lost messages.
+        late: Share of late messages.
+        doubled: Share of doubled messages.
+        kills: Number of killed components.
+        hangs: Number of hanging components.
     """
 
     lost: float = 0.0
@@ -104,7 +104,7 @@ CALM_WEATHER = Weather()
 
 
 def draw_weather(seed: int) -> Weather:
-    """Return the weather of this seed: of some seeds only kills, of some only the network, of most everything."""
+    """Return the weather of this seed: only kills for some seeds, only network faults for some, all faults for most."""
     dice = Random(f"weather {seed}")
     kind = dice.choice(("kills", "network", "both", "both"))
     kills = dice.randint(1, 6) if kind != "network" else 0
@@ -116,7 +116,7 @@ def draw_weather(seed: int) -> Weather:
 
 
 def draw_moments(shape: MissionShape, weather: Weather) -> list[Kill | Hang]:
-    """Return who is killed and who hangs in this mission, in order of time."""
+    """Return the kills and hangs of this mission, in order of time."""
     dice = Random(f"moments {shape.seed}")
     rcs = [resource.name for resource in shape.resources]
     arcs = [owner.arc for owner in shape.owners]
@@ -146,7 +146,7 @@ class DrawnFates:
         self._doubled = weather.lost + weather.late + weather.doubled
 
     def fate(self, message: str) -> MessageFault | None:
-        """Return what becomes of this message; None: it arrives as it should."""
+        """Return the fault of this message; None: it arrives."""
         if not self._doubled:
             return None
         digest = hashlib.blake2b(message.encode(), digest_size=16, key=self._key).digest()
@@ -160,13 +160,13 @@ class DrawnFates:
 
 
 class GivenFates:
-    """Lets happen what a list says and nothing else."""
+    """Injects exactly the faults of a list."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self._faults = {fault.message: fault for fault in faults if isinstance(fault, MessageFault)}
 
     def fate(self, message: str) -> MessageFault | None:
-        """Return what becomes of this message; None: it arrives as it should."""
+        """Return the fault of this message; None: it arrives."""
         return self._faults.get(message)
 
 

@@ -1,6 +1,6 @@
-"""Messages with numbers that cannot be, said over the wire in the name of one who may say such a message.
+"""Hostile messages: impossible numbers in the name of a component that may send such a message.
 
-They are written and read as between processes, so whatever the decoder refuses never reaches a component.
+They are encoded and decoded as between processes, so a message that the decoder refuses reaches no component.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from backbone.wire import Envelope, Message, Reader, write
 from resource_pool.simulation.audit import Audit
 from resource_pool.simulation.supervised_shape import SupervisedShape
 
-WITHIN_S = 1.0  # chosen: everybody answers a refusal at once
+WITHIN_S = 1.0  # chosen: every component answers a refusal at once
 COUNTS = (2**63 - 1, 2**63, 2**64 - 1, -(2**63))
 TIMES = (1e9, 1e308, math.inf, -math.inf, math.nan, -1.0)
 
@@ -42,9 +42,9 @@ class HostileMessage:
     """One hostile message.
 
     Attributes:
-        source: In whose name it is said.
-        target: Address of the one who hears it; for a publication, under which it is published.
-        conversation: Of a publication; empty: it is a question.
+        source: Address of its alleged sender.
+        target: Address of its receiver; for a publication, the address under which it is published.
+        conversation: Conversation of a publication; empty: a question.
         body: The message.
     """
 
@@ -55,7 +55,7 @@ class HostileMessage:
 
 
 def hostile_message(shape: SupervisedShape, target: str, number: int) -> HostileMessage:
-    """Return the hostile message of this number for a component that hears such."""
+    """Return the hostile message of this number for this component."""
     dice = Random(f"hostile {number}")
     count, time_s = dice.choice(COUNTS), dice.choice(TIMES)
     _, _, rcs, arcs, owners, _ = shape.groups()
@@ -92,7 +92,7 @@ def hostile_message(shape: SupervisedShape, target: str, number: int) -> Hostile
 
 
 async def say_hostile(message: HostileMessage, join: Callable[[str, Clock], Bus], clock: Clock, audit: Audit) -> None:
-    """Say it, and note what came of it: whether the decoder let it pass, and what was answered."""
+    """Send the message, and record whether the decoder accepted it, and the answer."""
     body = message.body
     try:
         raw = write(Envelope(1, message.source, 1, clock.now_s(), "", body))

@@ -1,26 +1,25 @@
-"""What must hold in every simulated mission, whatever goes wrong. Pure: happenings in, the first broken law out.
+"""Laws of every simulated mission, with any faults. Pure: events in, the first broken law out.
 
 The laws, by name:
 
-* one-holder: at no instant have two ARCs one unit RC, as the RCs themselves see it.
-* epochs-grow: every hold of an RC has a larger epoch than all before it, over all restarts.
-* fenced: once a robot was commanded under an epoch, no packet of an older one goes on the air to it; and none
-  but the safe packet once it was given to the next; and none outside of its ARC's hold of the radio.
-* freed: an ARC of which the RC manager says that its RCs are free has none any more of those that are up.
-* safe: who commanded a robot through a radio leaves it safe: the safe packet is the last it hears from it.
-* whole-set: a gate opens only over RCs that were all connected to its ARC under just these epochs.
-* true: what an owner believes agrees with its ARC's gate, and the gate with the RCs, but for known delays.
-* schedule: the RC manager's schedule keeps its own promises after each event.
-* kept: where every message arrives, an RC manager that dies and is soon back takes nothing from anybody without
-  having decided so: holders and epochs stay.
-* progress: when nothing fails any more, whoever wants time and has no higher rival gets it (not under the policy
+* one-holder: at no time do two ARCs hold one unit RC, by the RCs' own records.
+* epochs-grow: every hold of an RC has a larger epoch than all earlier holds, also over restarts.
+* fenced: after a command under an epoch, the robot gets no packet of an older epoch; after the connection of the next
+  ARC it gets only the safe packet; and no packet is sent outside its ARC's hold of the radio.
+* freed: when the RC manager counts an ARC's RCs as free, the ARC holds no RC that is up.
+* safe: the last packet to a robot from an ARC and a radio is the safe packet.
+* whole-set: a gate opens only when all its RCs were connected to its ARC under exactly these epochs.
+* true: an owner's belief agrees with its ARC's gate, and the gate with the RCs, except for known delays.
+* schedule: the invariants of the RC manager's schedule hold after each event.
+* kept: if every message arrives and the RC manager dies and is soon back, holders and epochs stay unless it decides
+  otherwise.
+* progress: without further faults, each owner that wants time and has no higher rival gets it (not under the policy
   ``strict``).
-* no-bug: nobody ends by a bug.
+* no-bug: no component ends by a bug.
 
-What happens (the words of the audit): ``begins killed ends fails`` of components; ``held``, ``let go``,
-``safe``, ``unsafe`` of RCs; ``open shut`` of ARCs; ``resumed suspended claims releases wants applied refused``
-of decision processes; ``packet`` of radios; the trace's own words of the RC manager; ``calm`` and ``over``
-of the mission.
+Events of the audit: ``begins killed ends fails`` of components; ``held``, ``let go``, ``safe``, ``unsafe`` of RCs;
+``open shut`` of ARCs; ``resumed suspended claims releases wants applied refused`` of decision processes; ``packet`` of
+radios; the trace's events of the RC manager; ``calm`` and ``over`` of the mission.
 """
 
 from __future__ import annotations
@@ -37,23 +36,21 @@ from resource_pool.simulation.shape import MissionShape
 
 SAFE, FREED = "S", "freed"
 FREED_WITHIN_S = 0.5  # chosen: an RC ends one hold after the other, each within 0.4 s; the next is not connected before
-RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time in which a lost ARC is claimed anew
-SOON_BACK_S = 0.6  # chosen: with the time it needs to ask everybody it renews before any lease is over
+RECOVERY_S = 6.0  # chosen: a lease, a late message, and the time in which a lost ARC is claimed again
+SOON_BACK_S = 0.6  # chosen: with the time for its questions to all components, it renews before any lease expires
 UNDISTURBED_S = 4.0  # chosen: two leases
 RC_MANAGER = "rc_manager"
 Path = tuple[tuple[str, int], ...]
-CALM_DELAY_S = (
-    1.5  # chosen: in the calm a notice takes no time, a death is seen at once, an owner is missed in half a second
-)
+CALM_DELAY_S = 1.5  # chosen: in the calm a notice takes no time, a death is seen at once, a lost owner in half a second
 STORM_DELAY_S = LEASE_S + LONGEST_DELAY_S + LONGEST_HANG_S + 2.0
-"""Chosen: while things fail, a renewal may be late by the longest delay and then be held back by a hang;
-what it renewed lasts a lease, and the next second the owner hears of the end."""
+"""Chosen: with faults, a renewal may be late by the longest delay and then wait for the end of a hang; the renewed hold
+lasts a lease, and the owner gets the notice of its end within the next second."""
 STORY_LENGTH = 30  # chosen: a screen
 
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A law that does not hold.
+    """A broken law.
 
     Attributes:
         law: Its name.
@@ -79,14 +76,14 @@ def first_broken(
     longest_s: float = 0.0,
     others: Sequence[Path] = (),
 ) -> Broken | None:
-    """Return the law that was broken first, or None if all hold.
+    """Return the first broken law, or None if all hold.
 
     Args:
         shape: The mission.
-        happenings: All that happened, in order.
+        happenings: All events, in order.
         all_arrived: True if no message was lost, late or doubled.
-        longest_s: By how much longer than usual beliefs may be wrong, because processes were paused or cut off.
-        others: Paths of decision processes beside the owners, which always want time.
+        longest_s: Additional time for which beliefs may be wrong, because processes were paused or cut off.
+        others: Paths of decision processes besides the owners; they always want time.
     """
     judge = _Judge(shape, all_arrived, longest_s, others)
     for happening in happenings:
@@ -96,7 +93,7 @@ def first_broken(
 
 
 def story_of(broken: Broken, happenings: Sequence[Happening], length: int = STORY_LENGTH) -> list[Happening]:
-    """Return the last things that happened to those concerned before the law was broken, packets of a kind once."""
+    """Return the last events of the concerned components before the breach, equal packets once."""
     told: list[Happening] = []
     for happening in reversed([h for h in happenings if h.at_s <= broken.at_s and h.concerns(broken.names)]):
         if told and happening.what == told[-1].what == "packet" and happening.values == told[-1].values:
@@ -109,7 +106,7 @@ def story_of(broken: Broken, happenings: Sequence[Happening], length: int = STOR
 
 @dataclass(slots=True)
 class _Sent:
-    """What an ARC sent through a radio it holds."""
+    """The packets of an ARC through a radio that it holds."""
 
     epoch: int
     last: dict[int, str] = field(default_factory=dict)
@@ -118,7 +115,7 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Belief:
-    """What an owner was told of its ARC."""
+    """An owner's belief about its ARC."""
 
     epochs: dict[str, int] | None = None
     since_s: float = 0.0
@@ -150,7 +147,7 @@ class _Judge:
 
     # ------------------------------------------------------------------ one thing after the other
     def judge(self, h: Happening) -> Iterator[Broken]:
-        """Take note of what happened and yield each law it breaks."""
+        """Record an event and yield each law that it breaks."""
         yield from self._overdue(h.at_s)
         match h.what:
             case "held":
@@ -211,7 +208,7 @@ class _Judge:
         self._sent.setdefault(h.who, {})[arc] = _Sent(epoch)
 
     def _must_be_free(self, h: Happening, rcs: Set[str]) -> None:
-        """From now on no ARC that is called free has one of these RCs."""
+        """Record that the ARC of this event may hold none of these RCs from now on."""
         held = ((rc, arc, epoch) for rc in sorted(rcs) for arc, epoch in self._holds[rc].items())
         self._doubts |= {(FREED, arc, rc, str(epoch)): h.at_s for rc, arc, epoch in held if arc in self._free}
 
@@ -273,7 +270,7 @@ class _Judge:
 
     # ------------------------------------------------------------------ the RC manager's restart
     def _note_restart(self, h: Happening) -> None:
-        """Keep in mind what must stay when nothing but the RC manager was struck for a while, and it is soon back."""
+        """Record the holds that must stay, if only the RC manager had a fault lately and is soon back."""
         if h.what == "ends" or (h.what == "begins" and h.who != RC_MANAGER):
             self._need_not_keep(h.who)
         if h.who == RC_MANAGER and h.what == "begins" and h.at_s > self._struck_s + SOON_BACK_S:
@@ -292,9 +289,9 @@ class _Judge:
     def _need_not_keep(self, arc: str) -> None:
         self._to_keep = {hold for hold in self._to_keep if hold[1] != arc}
 
-    # ------------------------------------------------------------------ what is believed
+    # ------------------------------------------------------------------ beliefs
     def _compare(self, now_s: float) -> None:
-        """Keep since when each two that should agree do not."""
+        """Record since when each pair that should agree disagrees."""
         doubts: set[tuple[str, ...]] = set()
         for owner in self._shape.owners:
             believed = self._beliefs[owner.name].epochs
@@ -312,7 +309,7 @@ class _Judge:
         self._doubts = {doubt: self._doubts.get(doubt, now_s) for doubt in sorted(doubts)}
 
     def _overdue(self, now_s: float) -> Iterator[Broken]:
-        """Yield who has disagreed for longer than there is an excuse."""
+        """Yield each pair that has disagreed for longer than the allowed delay."""
         calm_s = self._calm_s
         for doubt, since_s in self._doubts.items():
             if doubt[0] == FREED:
@@ -331,9 +328,9 @@ class _Judge:
 
     # ------------------------------------------------------------------ the end
     def _progress(self, now_s: float) -> Iterator[Broken]:
-        """Judge the calm: who wanted time all through it, and had nobody above, got some."""
+        """Judge the calm: each owner that wanted time throughout and had no higher rival got time."""
         if self._shape.policy == "strict":
-            return  # it lets RCs stand idle for those that may not start yet
+            return  # it leaves RCs idle for ARCs that may not start yet
         wanting = [owner for owner in self._shape.owners if owner.name in self._wanting]
         for owner in wanting:
             paths = [*(other.path for other in wanting if other is not owner), *self._others]
@@ -345,5 +342,5 @@ class _Judge:
             if self._gates.get(owner.arc):
                 continue
             since_s = self._wanting[owner.name]
-            what = f"{owner.name} has wanted time since {since_s:.4f} s, got none, and nobody is above it"
+            what = f"{owner.name} has wanted time since {since_s:.4f} s, got none, and has no higher rival"
             yield Broken("progress", now_s, what, (owner.name, owner.arc))

@@ -1,13 +1,13 @@
-"""The liveness law: whatever is wanted runs again soon after the last fault, or is named as absent.
+"""The liveness law: soon after the last fault, each wanted component runs again or is reported as absent.
 
-* said: never does the launcher say for more than ``SAID_WITHIN_S`` that health is ``ok`` while the same thing is
-  missing; what it said last counts until it has been silent for ``SILENT_AFTER_S``.
-* liveness: ``RUNS_AGAIN_S`` after the last fault everything wanted runs, and the RC manager knows the request of
-  every ARC among it, or it is named in some component's ``absent``.
-* no-false-alarm: when all of it runs then, health says ``ok``.
-* lives: nobody is ended as hung who was not paused: a starved process is late, not dead.
+* said: the launcher never publishes health ``ok`` for more than ``SAID_WITHIN_S`` while the same component is missing;
+  its last word counts until it has been silent for ``SILENT_AFTER_S``.
+* liveness: ``RUNS_AGAIN_S`` after the last fault each wanted component runs, and the RC manager knows the request of
+  each ARC among them, or a component's ``absent`` names it.
+* no-false-alarm: if all of them run then, health is ``ok``.
+* lives: no process is ended as hung that was not paused, because a starved process is late, not dead.
 
-``Watcher`` looks and notes; ``first_unhealed`` judges what was noted, and is pure.
+``Watcher`` records; ``first_unhealed`` judges the records and is pure.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from resource_pool.simulation.simulated_machines import Machines
 from resource_pool.simulation.supervised_shape import CORE, SupervisedShape, arc_of, walk
 
 RUNS_AGAIN_S = 40.0
-"""Chosen: hung for 3 s, then ended within 2 s and restarted after at most 2 s, while its owner compares every 20 s and
-then tries every 5 s; a second time around for what depends on it."""
+"""Chosen: hung for 3 s, ended within 2 s, restarted after at most 2 s, while its owner compares every 20 s and then
+tries every 5 s; a second time for components that depend on it."""
 SAID_WITHIN_S = 2.0  # the promise
 LOOK_EVERY_S = 0.25  # chosen: an eighth of it
 
 
 class Watcher:
-    """Compares again and again what should run with what does, and with what health says."""
+    """Compares wanted components with running ones, and with the published health, until cancelled."""
 
     def __init__(self, shape: SupervisedShape, machines: Machines, audit: Audit, clock: Clock) -> None:
         self._machines, self._audit, self._clock, self._shape = machines, audit, clock, shape
@@ -55,7 +55,7 @@ class Watcher:
         self._word, self._heard_s, self._ok_since_s = HealthWord.DEGRADED, clock.now_s(), math.inf
 
     async def watch(self, bus: Bus) -> None:
-        """Look until cancelled."""
+        """Compare until cancelled."""
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard)
         while True:
             now_s = self._clock.now_s()
@@ -74,12 +74,12 @@ class Watcher:
             await self._clock.sleep_s(LOOK_EVERY_S)
 
     def missing(self, wanted: Sequence[str]) -> dict[str, str]:
-        """Return which of these do not run, or cannot be reached, and why."""
+        """Return the components that do not run or cannot be reached, with the reasons."""
         found = {name: self._why_missing(name) for name in wanted}
         return {name: why for name, why in found.items() if why}
 
     def judge_calm(self) -> None:
-        """Note what is missing at the end of the calm, with what is said of it."""
+        """Record the missing components at the end of the calm, with their reports."""
         missing = self.missing([*self._wanted, *self._calm_arcs])
         manager = self._machines.component("rc_manager")
         if isinstance(manager, AuditedRcManager):
@@ -132,7 +132,7 @@ def _at_the_end(h: Happening) -> Broken | None:
     missing, named = h.values["missing"], h.values["named"]
     for name, why in missing.items():
         if name not in named:
-            return Broken("liveness", h.at_s, f"{name} is wanted and {why}; nobody names it as absent", (name,))
+            return Broken("liveness", h.at_s, f"{name} is wanted and {why}; no component reports it as absent", (name,))
     if not missing and h.values["word"] != HealthWord.OK:
         told = "; ".join(f"{name}: {cause}" for name, cause in named.items())
         return Broken("no-false-alarm", h.at_s, f"all that is wanted runs, and health says {told}", tuple(named))

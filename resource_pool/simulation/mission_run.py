@@ -1,4 +1,4 @@
-"""One mission from a seed: everybody real but hardware, placer and creators; from first start to last law.
+"""One mission from a seed, from first start to last law; only hardware, placer and creators are simulated.
 
 Source: the idea of judging a whole distributed system in one process on virtual time is FoundationDB's
 (Zhou et al., SIGMOD 2021, section 4).
@@ -42,14 +42,14 @@ from resource_pool.simulation.unreliable_network import UnreliableNetwork
 
 @dataclass(frozen=True, slots=True)
 class MissionRun:
-    """What became of one mission.
+    """The result of one mission.
 
     Attributes:
         shape: The mission.
-        faults: What went wrong on purpose, in order.
-        happenings: All that happened, in order.
-        digest: Fingerprint of all that happened.
-        broken: The first law that was broken; None if all hold.
+        faults: Injected faults, in order.
+        happenings: All events, in order.
+        digest: Fingerprint of all events.
+        broken: The first broken law; None if all hold.
     """
 
     shape: MissionShape
@@ -63,9 +63,9 @@ def run_mission(seed: int, *, chaos: bool, faults: Sequence[Fault] | None = None
     """Run the mission of this seed to its end and judge it; the same arguments give the same bytes.
 
     Args:
-        seed: Of the mission, its moods and its faults.
-        chaos: Whether anything goes wrong on purpose.
-        faults: Only these faults, instead of those the seed means.
+        seed: Seed of the mission, its moods and its faults.
+        chaos: True: inject faults.
+        faults: Only these faults, instead of the seed's.
     """
     shape = draw_shape(seed)
     weather = draw_weather(seed) if chaos else CALM_WEATHER

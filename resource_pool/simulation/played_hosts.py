@@ -1,6 +1,6 @@
-"""Placer, creators and hosts in one process: components are started, watched, killed and restarted by name.
+"""Played hosts: placer, creators and hosts in one process, which start, watch, kill and restart components by name.
 
-It stands in for the real placer and creators, whose subject is processes; here a component is a task.
+They replace the real placer and creators, which handle processes; here a component is a task.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, St
 from backbone.wire import Envelope, Message
 from resource_pool.simulation.audit import Audit
 
-HOST = "host"  # chosen: everybody is on one
+HOST = "host"  # chosen: all components are on one host
 FALLEN_AWAY_S = 0.3  # chosen: a creator's first back-off is of this order
 STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when it withdraws
 
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What is needed to start a component, again and again.
+    """All that is needed to start a component repeatedly.
 
     Attributes:
-        component: Its class, or what makes one.
-        subsystem: Where it belongs.
+        component: Its class, or a factory.
+        subsystem: Its subsystem.
         name: Its name.
         kind: Its component type.
         parameters: Its parameters.
@@ -67,10 +67,10 @@ class PlayedHosts:
         self._watching: dict[str, asyncio.Task[None]] = {}
 
     def begin(self, role: Role) -> None:
-        """Have the component start, and restarted when it falls if it is one of those.
+        """Start the component; restart it when it falls, if its role says so.
 
         Raises:
-            NameTaken: There is one of this name, or it is about to be restarted.
+            NameTaken: A component of this name lives or is being restarted.
         """
         if role.name in self._lives:
             raise NameTaken(f"{role.name} is placed already", name=role.name)
@@ -78,7 +78,7 @@ class PlayedHosts:
         self._watching[role.name] = asyncio.create_task(self._watch(life), name=f"creator of {role.name}")
 
     async def start(self, role: Role) -> bool:
-        """Have the component started; return when it is ready (True) or was ended before (False).
+        """Start the component; return when it is ready (True) or has ended before (False).
 
         Raises:
             NameTaken: As ``begin``.
@@ -98,11 +98,11 @@ class PlayedHosts:
         return life.ready.is_set()
 
     def knows(self, name: str) -> bool:
-        """Say whether there is a component of this name, or one that is about to be restarted."""
+        """Return whether a component of this name lives or is being restarted."""
         return name in self._lives
 
     def running(self, name: str) -> Component[Any] | None:
-        """Return the component of this name if it lives now."""
+        """Return the living component of this name, or None."""
         life = self._lives.get(name)
         return life.component if life is not None else None
 
@@ -121,7 +121,7 @@ class PlayedHosts:
         """End the component for good: ask it to, and kill it if that takes too long.
 
         Raises:
-            NotPlaced: There is none.
+            NotPlaced: No component has this name.
         """
         life = self._lives.get(name)
         if life is None:
@@ -139,14 +139,14 @@ class PlayedHosts:
         return EndedBy.SIGKILL if late else EndedBy.ASKING
 
     async def stop_all(self) -> None:
-        """End everybody at once as SIGKILL does; return when nothing runs any more."""
+        """End all components at once as SIGKILL does; return when they have ended."""
         watching = list(self._watching.values())
         for task in watching:
             task.cancel()
         await asyncio.gather(*watching, return_exceptions=True)
 
     async def _watch(self, life: _Life) -> None:
-        """Run the component; again after a pause whenever it falls, if it is to be restarted."""
+        """Run the component; run it again after a pause whenever it falls, if its role says so."""
         name = life.role.name
         try:
             while True:
@@ -160,7 +160,7 @@ class PlayedHosts:
                 del self._lives[name], self._watching[name]
 
     async def _live(self, life: _Life) -> None:
-        """Live one life of the component to its end."""
+        """Run one life of the component to its end."""
         role = life.role
         launch = Launch(
             self._network.mission, role.subsystem, role.name, role.kind, "", HOST, "", 0.0, 1.0, dict(role.parameters)
@@ -196,7 +196,7 @@ class PlayedHosts:
 
 
 class PlayedPlacer(Component[NoParameters]):
-    """Answers what decision processes and the RC manager ask of the placer."""
+    """Answers the questions of decision processes and the RC manager to the placer."""
 
     accepts = PlacerQuestion
 

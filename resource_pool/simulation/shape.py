@@ -1,4 +1,4 @@
-"""Which mission a seed means: its hardware, its decision processes and how long it lasts.
+"""The mission of a seed: hardware, decision processes and duration.
 
 Pure: the same seed gives the same mission, in every process and on every machine.
 """
@@ -14,8 +14,8 @@ from backbone.scheduling.requests import Usage
 
 MISSION = "simulated"
 MOST_OWNERS = 8
-BRING_UP_S = 1.0  # chosen: on virtual time everybody is ready within a tenth of it
-SHORTEST_ACTIVE_S, LONGEST_ACTIVE_S = 6.0, 16.0  # chosen: several turns of everybody, several runs a second
+BRING_UP_S = 1.0  # chosen: on virtual time all components are ready within a tenth of it
+SHORTEST_ACTIVE_S, LONGEST_ACTIVE_S = 6.0, 16.0  # chosen: several turns of each owner, several runs a second
 
 RADIO_DRIVER = "resource_pool.simulation.audited_pool:AuditedRadio"
 GRABBER_DRIVER = "resource_pool.simulation.audited_pool:AuditedGrabber"
@@ -33,9 +33,9 @@ class OwnerShape:
         minimum_runtime_s: Shortest useful time.
         maximum_runtime_s: End of extensions.
         wish: Kind of RC → name.
-        usage: Of the radio.
-        begins_s: Mission time at which it claims its ARC first.
-        rests: True if it has given its ARC back in the calm at the end.
+        usage: Use of the radio.
+        begins_s: Mission time of its first claim.
+        rests: True if it gives its ARC back in the calm at the end.
     """
 
     name: str
@@ -60,15 +60,15 @@ class MissionShape:
     """One mission.
 
     Attributes:
-        seed: It was made from.
+        seed: Its seed.
         resources: The hardware.
-        asleep: RCs that are started only when they are claimed.
+        asleep: RCs that start only when an ARC claims them.
         owners: The decision processes.
-        priority: Of the mission among the consoles.
+        priority: Priority of the mission among the consoles.
         grace_s: Time to stop cleanly at the end of a slice.
-        policy: Of the RC manager.
-        active_s: Mission time until which decision processes do as they like and faults happen.
-        calm_s: Time after that in which everybody who wants only drives, and nothing fails.
+        policy: Policy of the RC manager.
+        active_s: Mission time until which decision processes have moods and faults happen.
+        calm_s: Time after that in which owners only drive, without faults.
     """
 
     seed: int
@@ -104,8 +104,8 @@ def draw_shape(seed: int) -> MissionShape:
     )
 
 
-CALM_LEAST_S = 8.0  # chosen: a lost ARC is found by its beat, a lost hold by its lease, and both are claimed anew
-SWITCH_S = 0.5  # chosen: a context switch of which every step is slow
+CALM_LEAST_S = 8.0  # chosen: a lost ARC is found by its beat, a lost hold by its lease, and both are claimed again
+SWITCH_S = 0.5  # chosen: a context switch whose every step is slow
 
 
 def _resources(dice: Random) -> tuple[Resource, ...]:
@@ -134,7 +134,7 @@ def _times(dice: Random) -> dict[str, Any]:
 
 
 class _Tree:
-    """Grows the behavior tree: each new behavior hangs under the mission or under an earlier one."""
+    """Grows the behavior tree: the parent of a new behavior is the mission or an earlier behavior."""
 
     def __init__(self, dice: Random, priority: int) -> None:
         self._dice = dice

@@ -1,4 +1,4 @@
-"""From all faults of a broken run to as few as still break the same law.
+"""Shrinker: reduces the faults of a broken run to a small set that breaks the same law.
 
 Source: Zeller and Hildebrandt, "Simplifying and Isolating Failure-Inducing Input", IEEE Transactions on
 Software Engineering 28(2), 2002: algorithm ddmin, by complements.
@@ -11,18 +11,18 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-MOST_TRIALS = 300  # chosen: at five to ten runs a second, the time a person waits for an answer
+MOST_TRIALS = 300  # chosen: at five to ten runs a second, a minute at most
 
 
 def smallest(causes: Sequence[T], breaks: Callable[[Sequence[T]], bool], most_trials: int = MOST_TRIALS) -> list[T]:
-    """Return some of the causes, in their order, that together still break it.
+    """Return a subset of the causes, in their order, that together still break it.
 
-    Of what is returned no single one can be left out, unless the trials were used up before.
+    No single cause of the result can be left out, unless the trials were used up.
 
     Args:
-        causes: They all together break it.
-        breaks: Says whether some of them do; must give the same answer for the same causes.
-        most_trials: How often it may be asked.
+        causes: Causes that break it together.
+        breaks: Returns whether a subset breaks it; deterministic.
+        most_trials: Largest number of calls.
 
     Example:
         >>> smallest([1, 2, 3, 4, 5, 6], lambda some: {2, 5} <= {*some})

@@ -1,11 +1,11 @@
 """A network of simulated processes: each has one link to the hub, which is the nameserver's process.
 
-What was measured of the real bus (decision 0003) is what happens here:
+It behaves as measured on the real bus (decision 0003):
 
-* A link that is cut, or whose process or hub is paused, keeps what is said until it heals; after a lease it is given
-  up: what it kept is lost, questions on it end without an answer, tokens fall at both of its ends.
-* A process that dies, or the hub, is noticed at once.
-* A link that was given up comes back a moment after it could: tokens and services rise by themselves.
+* A link that is cut, or whose process or hub is paused, keeps messages until it heals. After a lease it is given up: it
+  loses these messages, its questions end without an answer, and tokens fall at both of its ends.
+* The death of a process or of the hub is noticed at once.
+* A link that was given up comes back a moment after its fault ends; tokens and services return by themselves.
 * Neighbors in one process reach each other without a link.
 """
 
@@ -30,7 +30,7 @@ Act = Callable[[], None]
 
 
 def _nothing() -> None:
-    """Nobody minds that it was lost."""
+    """Ignore the loss."""
 
 
 class Link:
@@ -39,7 +39,7 @@ class Link:
     def __init__(self, network: LinkedNetwork, process: SimulatedProcess, *, is_hub: bool) -> None:
         self.process, self.is_hub, self.is_up = process, is_hub, False
         self.shown: dict[str, None] = {}
-        """Addresses of tokens that it raised, in order."""
+        """Addresses of its tokens, in order."""
         self.listeners: list[LinkListener] = []
         self.questions: dict[object, Act] = {}
         self._network = network
@@ -50,11 +50,11 @@ class Link:
 
     @property
     def is_blocked(self) -> bool:
-        """Whether nothing passes now."""
+        """True if no message passes."""
         return self._blocks > 0
 
     def carry(self, act: Act, lost: Act = _nothing) -> None:
-        """Do it when what is said over this link now arrives, or the other if it never does."""
+        """Call ``act`` when a message sent now arrives, or ``lost`` if it never does."""
         if not self.is_up:
             lost()
         elif self.is_blocked:
@@ -63,13 +63,13 @@ class Link:
             act()
 
     def block(self) -> None:
-        """Let nothing pass until ``unblock`` was called as often."""
+        """Stop all messages until ``unblock`` is called as often."""
         self._blocks += 1
         if self._blocks == 1:
             self._ring(LINK_LEASE_S, self.give_up)
 
     def unblock(self) -> None:
-        """Take back one ``block``."""
+        """Undo one ``block``."""
         self._blocks -= 1
         if self._blocks or self.process.is_dead:
             return
@@ -82,7 +82,7 @@ class Link:
             self._ring(RECONNECT_AFTER_S, self.come_up)
 
     def give_up(self) -> None:
-        """Take note that the link is lost."""
+        """Record that the link is lost."""
         self._cancel_alarm()
         if not self.is_up:
             return
@@ -99,7 +99,7 @@ class Link:
             self._ring(RECONNECT_AFTER_S, self.come_up)
 
     def come_up(self) -> None:
-        """Take note that the link stands, unless something is in its way."""
+        """Record that the link is up, unless it is blocked."""
         if self.is_up or self.is_blocked or self.process.is_dead or not self._network.has_hub:
             return
         self.is_up = True
@@ -107,7 +107,7 @@ class Link:
         self._changed()
 
     def close(self) -> None:
-        """Take note that the process is gone."""
+        """Record that the process has ended."""
         self.give_up()
         self._cancel_alarm()
 
@@ -129,14 +129,14 @@ class Link:
 
 
 class LinkedBus(LocalBus):
-    """One component's voice and ears, over its process's link."""
+    """One component's bus, over its process's link."""
 
     def __init__(self, network: LinkedNetwork, source: str, clock: Clock, link: Link) -> None:
         super().__init__(network, source, clock)
         self.link = link
 
     def declare_to_neighbors(self, address: str) -> Declared:
-        """Raise a token; another of the same address may stand where it cannot be seen."""
+        """Raise a token; behind a cut link another token of this address may stand."""
         tokens = self.network.tokens.setdefault(address, [])
         self.link.shown[address] = None
 
@@ -183,16 +183,16 @@ class LinkedNetwork(LocalNetwork):
 
     @property
     def has_hub(self) -> bool:
-        """Whether there is a hub to have a link to."""
+        """True if a hub runs."""
         return self._hub is not None
 
     def processes(self) -> list[SimulatedProcess]:
-        """Return every process there ever was, in the order in which they began."""
+        """Return all processes, ended ones too, in the order of their starts."""
         return list(self._begun)
 
-    # ------------------------------------------------------------------ processes come and go
+    # ------------------------------------------------------------------ life of processes
     def begin(self, process: SimulatedProcess) -> Link:
-        """Give a new process its link, which comes up as soon as it can."""
+        """Return the link of a new process, which comes up as soon as possible."""
         self._begun.append(process)
         link = self.links[process] = Link(self, process, is_hub=process.name == self._hub_name)
         if link.is_hub:
@@ -209,7 +209,7 @@ class LinkedNetwork(LocalNetwork):
         asyncio.get_running_loop().call_later(RECONNECT_AFTER_S, link.come_up, context=Context())
 
     def end(self, process: SimulatedProcess) -> None:
-        """Take a dead process's link away; the hub's takes all others with it."""
+        """Close a dead process's link; the death of the hub closes all links."""
         link = self.links.pop(process)
         if link is self._hub:
             self._hub = None
@@ -221,11 +221,11 @@ class LinkedNetwork(LocalNetwork):
         link.close()
 
     def pause(self, process: SimulatedProcess) -> None:
-        """Let nothing pass a paused process."""
+        """Block the link of a paused process."""
         self._block(self.links[process], 1)
 
     def go_on(self, process: SimulatedProcess) -> None:
-        """Take back one ``pause``."""
+        """Undo one ``pause``."""
         if process in self.links:
             self._block(self.links[process], -1)
 
@@ -235,7 +235,7 @@ class LinkedNetwork(LocalNetwork):
             self.links[process].block()
 
     def heal(self, process: SimulatedProcess) -> None:
-        """Take back one ``cut``."""
+        """Undo one ``cut``."""
         if process in self.links and not self.links[process].is_hub:
             self.links[process].unblock()
 
@@ -246,7 +246,7 @@ class LinkedNetwork(LocalNetwork):
             link.block()
 
     def heal_host(self, host: str) -> None:
-        """Take back one ``cut_host``."""
+        """Undo one ``cut_host``."""
         self._host_cuts[host] -= 1
         for link in self._of_host(host):
             link.unblock()
@@ -262,13 +262,13 @@ class LinkedNetwork(LocalNetwork):
         for each in list(others):
             each.block() if by > 0 else each.unblock()
 
-    # ------------------------------------------------------------------ what LocalNetwork asks
+    # ------------------------------------------------------------------ transport
     def join(self, source: str, clock: Clock) -> LinkedBus:
-        """Return a new bus of the process whose step this is."""
+        """Return a new bus of the present process."""
         return LinkedBus(self, source, clock, self.links[_own()])
 
     def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
-        """Carry it over both links, and the answer back."""
+        """Carry the question over both links, and the answer back."""
         own, server = self.links.get(_own()), self.servers.get(address)
         if own is None or own.process.is_dead:
             raise NoResponder("this process is dead")
@@ -311,7 +311,7 @@ class LinkedNetwork(LocalNetwork):
         own.carry(arrive, end)
 
     def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
-        """Carry it over both links."""
+        """Carry the publication over both links."""
         own, theirs = self.links.get(_own()), self._link_of(listening)
         if own is None or theirs is None or own.process.is_dead:
             return
@@ -325,7 +325,7 @@ class LinkedNetwork(LocalNetwork):
             own.carry(lambda: theirs.carry(deliver))
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:  # noqa: ARG002
-        """Let the watcher see what it can see by now."""
+        """Update the watcher with the tokens that it can see."""
         own = self.links.get(_own())
         if own is None or own.process.is_dead or own is self._link_of(watching):
             self._look(watching, address)
@@ -334,7 +334,7 @@ class LinkedNetwork(LocalNetwork):
 
     # ------------------------------------------------------------------ tokens
     def look_anew(self, link: Link) -> None:
-        """Let everybody see what has changed with this link."""
+        """Update all watchers after a change of this link."""
         for watching in list(self.watchers):
             addresses = self.tokens if _bus(watching).link is link else link.shown
             for address in list(addresses):
@@ -375,7 +375,7 @@ class LinkedNetwork(LocalNetwork):
 
 def _bus(declared: Declared) -> LinkedBus:
     bus = declared.owner
-    assert isinstance(bus, LinkedBus)  # noqa: S101  nobody joins otherwise
+    assert isinstance(bus, LinkedBus)  # noqa: S101  ``join`` returns no other class
     return bus
 
 

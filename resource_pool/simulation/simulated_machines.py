@@ -1,7 +1,7 @@
-"""Machines on which zygotes fork, in one event loop: creators and keepers are the real ones, only processes are played.
+"""Simulated machines in one event loop: creators and keepers are real, only zygotes and processes are simulated.
 
-A process dies as a real one does: at once, with nothing more to be heard of it. With a creator everything dies that
-its zygote forked. What is noted in the audit are the words the laws know: begins, killed, ends, gives up, fails.
+A process dies as a real one does: at once and without a further message. With a creator die all processes that its
+zygote forked. The audit gets the events of the laws: begins, killed, ends, gives up, fails.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from resource_pool.simulation.audit import Audit
 from resource_pool.simulation.simulated_links import LinkedNetwork
 from resource_pool.simulation.simulated_processes import ProcessLoop, SimulatedProcess, current_process
 
-FORK_S = 0.02  # chosen: what a fork and the imports of a component take
+FORK_S = 0.02  # chosen: the duration of a fork and of a component's imports
 HUB_WITHIN_S = 5.0  # zenoh_bus.OPEN_TIMEOUT_MS
 FIRST_PID = 1000
-LATE_STEPS = 5  # chosen: creator, owner, nameserver and observer each take a step, and one was just missed
+LATE_STEPS = 5  # chosen: creator, owner, nameserver and observer need a step each, and one was just missed
 
 
 class Machines:
     """All machines of one mission.
 
     Attributes:
-        network: Of all processes.
-        lives: What runs, by process.
+        network: Network of all processes.
+        lives: Running components, by process.
         on_begin: Called with each process that was forked.
     """
 
@@ -53,14 +53,14 @@ class Machines:
 
     # ------------------------------------------------------------------ looking
     def find(self, name: str) -> SimulatedProcess | None:
-        """Return the process in which a component of this name lives now, be it not ready yet."""
+        """Return the process of the component of this name, ready or not."""
         for process, life in self.lives.items():
             if process.name == name or (isinstance(life, SharedProcess) and name in life.members()):
                 return process
         return None
 
     def component(self, name: str) -> Component[Any] | None:
-        """Return the component of this name if it lives now."""
+        """Return the living component of this name, or None."""
         for process, life in self.lives.items():
             if isinstance(life, SharedProcess):
                 if name in life.members():
@@ -75,18 +75,18 @@ class Machines:
         return list(life.members()) if isinstance(life, SharedProcess) else [process.name]
 
     def vitals(self, _folder: str, pid: int) -> Vitals | None:
-        """Return what the system shows of a process; None if it has ended."""
+        """Return the vitals of a process; None if it has ended."""
         return next((process.vitals() for process in self.lives if process.pid == pid), None)
 
     def lateness_s(self) -> float:
-        """Return the time between two moments in which a starved process runs; 0 if no machine is or just was."""
+        """Return the time between two moments in which a starved process runs; 0 without starved machines."""
         now_s = self._loop.time()
         gaps = [gap_s for until_s, gap_s in self._starved.values() if now_s < until_s + LATE_STEPS * gap_s]
         return LATE_STEPS * max(gaps, default=0.0)
 
-    # ------------------------------------------------------------------ what goes wrong
+    # ------------------------------------------------------------------ faults
     def starve(self, host: str, until_s: float, gap_s: float) -> None:
-        """Let every process of this host, new ones too, run only for a moment every ``gap_s``."""
+        """Give every process of this host, also new ones, a processor only for a moment every ``gap_s``."""
         self._starved[host] = max(until_s, self._starved.get(host, (0.0, 0.0))[0]), gap_s
         for process in self.lives:
             if process.host == host:
@@ -109,7 +109,7 @@ class Machines:
 
     # ------------------------------------------------------------------ processes
     def begin(self, name: str, host: str) -> SimulatedProcess:
-        """Return a new process without anything in it."""
+        """Return a new, empty process."""
         self._next_pid += 1
         process = SimulatedProcess(self._loop, name, host, self._next_pid)
         self.network.begin(process)
@@ -120,7 +120,7 @@ class Machines:
         return process
 
     def fork(self, launch: Launch, ended: Callable[[int, int], None]) -> SimulatedProcess:
-        """Return a new process that becomes what the launch says; its end is told by pid and returncode."""
+        """Return a new process that runs the launch; ``ended`` gets its pid and returncode."""
         process = self.begin(launch.name, launch.host)
         task = self._loop.create_task(self._live(process, launch), name=launch.name, context=process.context)
         self._tasks[process] = task
@@ -129,11 +129,11 @@ class Machines:
         return process
 
     def register(self, zygote: SimulatedZygote, owner: SimulatedProcess) -> None:
-        """Take note that what this zygote forks dies with its owner."""
+        """Record that the components of this zygote die with its owner."""
         self._zygotes[owner] = zygote
 
     async def end_all(self) -> None:
-        """End everything at once; return when nothing runs any more."""
+        """End all processes at once; return when they have ended."""
         for process in list(self.lives):
             process.die()
         while tasks := [task for process in self.network.processes() for task in process.end_tasks()]:
@@ -148,7 +148,7 @@ class Machines:
                 async with asyncio.timeout(HUB_WITHIN_S):
                     await link.usable.wait()
             except TimeoutError:
-                raise HubUnreachable(f"nobody listens for {launch.name}") from None
+                raise HubUnreachable(f"no hub listens for {launch.name}") from None
             life = self.lives[process] = self._born(process, launch, clock)
             self._audit.note(process.name, "begins")
             await life.run()
@@ -187,7 +187,7 @@ class Machines:
 
 
 current_machines: ContextVar[Machines] = ContextVar("current_machines")
-"""Of the mission whose step this is; creators, which a mission names by class path, find them here."""
+"""The machines of the present mission; creators, which a mission names by class path, find them here."""
 
 
 class SimulatedZygote:
@@ -204,7 +204,7 @@ class SimulatedZygote:
             machines.register(self, self._owner)
 
     async def fork(self, launch: Launch) -> int:
-        """Have the component running and return its pid."""
+        """Start the component and return its pid."""
         await asyncio.sleep(0)
         process = self._machines.fork(launch, self._exited)
         self._forked[process.pid] = process
@@ -216,16 +216,16 @@ class SimulatedZygote:
             self._machines.kill(self._forked[pid], number)
 
     def keep_running(self) -> str:
-        """Return that nothing is wrong: zygotes are not paused here."""
+        """Return no fault, because simulated zygotes are never paused."""
         return ""
 
     def die(self) -> None:
-        """Take everything along that was forked here."""
+        """Kill all components of this zygote."""
         for process in list(self._forked.values()):
             self._machines.kill(process)
 
     async def close(self) -> None:
-        """End everything that was forked here."""
+        """End all components of this zygote."""
         self.die()
 
     def _exited(self, pid: int, returncode: int) -> None:
@@ -242,5 +242,5 @@ class SimulatedCreator(Creator):
         super().__init__(launch, bus, clock, SimulatedZygote(machines), machines.vitals)
 
     def measure(self) -> tuple[float, float, int]:
-        """Return the same for every machine: where something is placed must not depend on the real one's load."""
+        """Return the same load for every machine, because placements must not depend on the real machine."""
         return 0.1, 0.1, 4

@@ -1,7 +1,7 @@
-"""A decision process that does as it likes: drives, idles, asks for other run times, releases, claims again.
+"""A decision process with moods: it drives, idles, asks for other run times, releases, claims again.
 
-It speaks to its ARC through ``arc_client`` as every behavior and console does, and tells the audit what
-it was told and what came of its commands.
+It uses its ARC through ``arc_client`` as every behavior and console does, and records notices and outcomes of commands
+in the audit.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ from resource_pool.simulation.audit import current_audit
 
 log = logging.getLogger(__name__)
 
-TICK_S = 1e-6  # chosen: far above the rounding of a time that is waited for, far below any that means something
-AGAIN_S = 0.3  # chosen: a wish nobody confirmed is said again at a person's pace
+TICK_S = 1e-6  # chosen: far above the rounding of times, far below every meaningful time
+AGAIN_S = 0.3  # chosen: an unconfirmed wish is repeated at a person's pace
 TOP_WHEEL_SPEED_RAD_S = 10.0  # chosen: below the motor's limit
 
 
 class OwnerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What it does.
+    """Parameters of a simulated owner.
 
     Attributes:
-        seed: Of its moods.
+        seed: Seed of its moods.
         kind: Kind of its ARC.
         path: Its place in the behavior tree.
         console: True for a console.
@@ -56,7 +56,7 @@ class OwnerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         usage: As for ``ArcClient.claim``.
         begins_s: Mission time of its first claim.
         calm_at_s: Mission time from which it only drives.
-        rests: True if it gives its ARC back then.
+        rests: True if it then gives its ARC back.
     """
 
     seed: int
@@ -81,14 +81,14 @@ class SimulatedOwner(Component[OwnerParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._audit = current_audit.get()
-        # A later life begins at another time, and must not repeat the earlier one's moods.
+        # A later life begins at another time and must have other moods.
         self._dice = Random(f"{self.parameters.seed} {self.name} {clock.now_s():.6f}")
         self._driving_dice = Random(f"driving {self.parameters.seed} {self.name} {clock.now_s():.6f}")
         self._arc: ArcClient | None = None
 
     # ------------------------------------------------------------------ life
     async def serve(self) -> None:
-        """Claim, live, release, again and again; from the calm on have the ARC and drive, or rest."""
+        """Claim, use and release the ARC repeatedly; from the calm on keep the ARC and drive, or rest."""
         await self.clock.sleep_until_s(self.parameters.begins_s)
         while not self._is_calm():
             await self._live_with_arc()
@@ -97,20 +97,20 @@ class SimulatedOwner(Component[OwnerParameters]):
             await self._live_with_arc()
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Hand a notice to the hold on the ARC."""
+        """Pass a notice to the ARC client."""
         notice: ArcNotice = asked.body
         if self._arc is None:
             raise NotMyArc(f"{self.name} claims nothing", arc=notice_arc(notice))
         return await self._arc.handle(notice)
 
     def absences(self) -> list[Absence]:
-        """Return its ARC if it wants it and misses it."""
+        """Return its ARC if it is wanted and missing."""
         absence = self._arc.wish.absence() if self._arc is not None else None
         return [absence] if absence is not None else []
 
-    # ------------------------------------------------------------------ told by the ARC
+    # ------------------------------------------------------------------ notices of the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
-        """Keep that the RCs are there."""
+        """Record the grant."""
         self._audit.note(self.name, "resumed", arc=notice.arc, epochs=dict(notice.epochs))
 
     async def arc_suspending(self, notice: Suspending) -> None:
@@ -120,7 +120,7 @@ class SimulatedOwner(Component[OwnerParameters]):
             await self._command("halt", self._arc.halt())
 
     async def arc_suspended(self, notice: Suspended) -> None:
-        """Keep that the RCs are gone."""
+        """Record the end of the grant."""
         self._audit.note(self.name, "suspended", arc=notice.arc, reason=notice.reason, by=notice.by)
 
     # ------------------------------------------------------------------ with an ARC
@@ -135,14 +135,14 @@ class SimulatedOwner(Component[OwnerParameters]):
             for task in (keeping, driving):
                 task.cancel()
             await asyncio.gather(keeping, driving, return_exceptions=True)
-        # From here on what was granted is not used any more, whatever is still told about it.
+        # From here on the grant is not used, even if notices about it still arrive.
         self._audit.note(self.name, "releases", arc=arc.arc)
         self._arc = None
         self.changed()
         await self._until_said(lambda: arc.release("had enough"))
 
     async def _have_moods(self, arc: ArcClient) -> None:
-        """Ask for this and that until it wants to release; in the calm want time and never release."""
+        """Change its requests until it releases; in the calm want time and never release."""
         dice, given = self._dice, self.parameters
         while not self._is_calm():
             await self._until_calm_or(dice.uniform(0.2, 2.5))
@@ -200,7 +200,7 @@ class SimulatedOwner(Component[OwnerParameters]):
     def _speed_rad_s(self) -> float:
         return round(self._driving_dice.uniform(-1.0, 1.0) * TOP_WHEEL_SPEED_RAD_S, 2)
 
-    # ------------------------------------------------------------------ said to the ARC
+    # ------------------------------------------------------------------ requests to the ARC
     async def _command(self, what: str, doing: Awaitable[Any]) -> None:
         try:
             applied = await doing
@@ -221,7 +221,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         return True
 
     async def _until_said(self, say: Callable[[], Awaitable[None]]) -> None:
-        """Say it again until somebody confirms: what an unanswered wish did is unknown."""
+        """Repeat a wish until the ARC confirms it, because the outcome of an unanswered wish is unknown."""
         while not await self._say("confirmed", say()):
             await self.clock.sleep_s(AGAIN_S)
 

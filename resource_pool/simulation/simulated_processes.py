@@ -1,8 +1,8 @@
-"""Processes that share one event loop, each of which can be paused, starved and killed by itself.
+"""Simulated processes in one event loop; each can be paused, starved and killed alone.
 
-A process is a context: whatever a component begins runs in a copy of its process's context, so the loop knows to which
-process each of its steps belongs. The steps of a stopped process wait; when it goes on, what arrived meanwhile comes
-first, then the timers that became due, as in a real event loop after SIGCONT.
+A process is a context: all tasks of a component run in a copy of its process's context, so the loop knows the process
+of each of its steps. The steps of a stopped process wait. When it continues, it first handles arrivals, then due
+timers, as a real event loop does after SIGCONT.
 
 Rule of this file: it knows no components and decides nothing.
 """
@@ -21,7 +21,7 @@ from backbone.component.heartbeat import BEAT_EVERY_S, Vitals
 R = TypeVar("R")
 Ts = TypeVarTuple("Ts")
 
-WINDOW_S = 1e-6  # chosen: in it a starved process does all that is due: virtual time stands still while it works
+WINDOW_S = 1e-6  # chosen: in it a starved process does all due work, because virtual time stands still meanwhile
 _NO_PROCESS = Context()
 
 
@@ -29,16 +29,16 @@ class SimulatedProcess:
     """One process.
 
     Args:
-        loop: Runs it.
-        name: Of its component, or of the process that components share.
-        host: Where it runs.
-        pid: Never used before.
+        loop: Its event loop.
+        name: Name of its component, or of the shared process.
+        host: Its host.
+        pid: Its pid, never used before.
     """
 
     def __init__(self, loop: ProcessLoop, name: str, host: str, pid: int) -> None:
         self.name, self.host, self.pid, self.is_dead = name, host, pid, False
         self.tasks: dict[asyncio.Task[Any], None] = {}
-        """Its tasks, in the order in which they began."""
+        """Its tasks, in the order of their starts."""
         self._loop = loop
         self.context = contextvars.copy_context()
         self.context.run(current_process.set, self)
@@ -50,21 +50,21 @@ class SimulatedProcess:
         self._beats, self._since_s, self._queued_s = 1, loop.time(), 0.0
 
     def run(self, act: Callable[[*Ts], R], *arguments: *Ts) -> R:
-        """Call it as a step of this process; it must only schedule what is to be done."""
+        """Call ``act`` as a step of this process; it may only schedule work."""
         return self.context.copy().run(act, *arguments)
 
     @property
     def is_paused(self) -> bool:
-        """Whether it is stopped as by SIGSTOP."""
+        """True if it is stopped as by SIGSTOP."""
         return self._pauses > 0
 
     @property
     def is_stopped(self) -> bool:
-        """Whether none of its steps runs now."""
+        """True if its steps wait."""
         return not self.is_dead and (self.is_paused or (self._is_starved and not self._in_window))
 
     def pause(self) -> None:
-        """Stop it until ``go_on`` was called as often."""
+        """Stop it until ``go_on`` is called as often."""
         self._settle()
         self._pauses += 1
 
@@ -75,36 +75,36 @@ class SimulatedProcess:
         self._catch_up()
 
     def starve(self, until_s: float, gap_s: float) -> None:
-        """Let it have a processor only for a moment every ``gap_s`` until that time."""
+        """Give it a processor only for a moment every ``gap_s`` until this time."""
         self._settle()
         self._starved_until_s = max(until_s, self._starved_until_s)
         self._is_starved = True
-        first_s = self._loop.time() + gap_s * (1 + self.pid % 7) / 7  # not all processes of a machine at once
+        first_s = self._loop.time() + gap_s * (1 + self.pid % 7) / 7  # processes run at different moments
         self._loop.call_at(first_s, self._open_window, gap_s, context=_NO_PROCESS)
         self._loop.call_at(until_s, self._end_starving, context=_NO_PROCESS)
 
     def die(self) -> None:
-        """Let it do what is left to do: whoever kills it sees to it that nothing of that gets away."""
+        """Run its remaining steps; the caller keeps their messages from leaving."""
         self.is_dead = True
         self._catch_up()
 
     def end_tasks(self) -> list[asyncio.Task[Any]]:
-        """Cancel what is left of a dead process and return it."""
+        """Cancel and return the tasks of a dead process."""
         for task in self.tasks:
             task.cancel()
         return list(self.tasks)
 
     def forget(self, task: asyncio.Task[Any]) -> None:
-        """Take note that a task has ended."""
+        """Record that a task has ended."""
         self.tasks.pop(task, None)
 
     def vitals(self) -> Vitals:
-        """Return what the system shows of it."""
+        """Return its vitals."""
         self._settle()
         return Vitals(self._beats, 0.0, self._queued_s)
 
     def keep(self, step: _Step, *, is_timer: bool) -> None:
-        """Have this done when the process goes on."""
+        """Keep a step until the process continues."""
         (self._due if is_timer else self._arrived).append(step)
 
     def _end_starving(self) -> None:
@@ -128,7 +128,7 @@ class SimulatedProcess:
         self._in_window = False
 
     def _settle(self) -> None:
-        """Count the time since the last change as what it was."""
+        """Count the time since the last change as running, queued or stopped."""
         now_s = self._loop.time()
         elapsed_s, self._since_s = now_s - self._since_s, now_s
         if self.is_paused:
@@ -147,7 +147,7 @@ class SimulatedProcess:
 
 
 current_process: ContextVar[SimulatedProcess | None] = ContextVar("current_process", default=None)
-"""The process whose step this is; None: of the simulation itself."""
+"""The process of the present step; None: the simulation itself."""
 
 
 class _Step(asyncio.Handle):
@@ -156,18 +156,18 @@ class _Step(asyncio.Handle):
     timer: asyncio.TimerHandle | None = None
 
     def do(self) -> None:
-        """Do it unless it was cancelled meanwhile."""
+        """Run the step unless it was cancelled meanwhile."""
         if not self.cancelled() and not (self.timer is not None and self.timer.cancelled()):
             self._run()
 
 
 class ProcessLoop(VirtualLoop):
-    """An event loop on virtual time that lets the steps of stopped processes wait."""
+    """An event loop on virtual time; the steps of stopped processes wait."""
 
     def call_soon(
         self, callback: Callable[[*Ts], object], *args: *Ts, context: Context | None = None
     ) -> asyncio.Handle:
-        """Call it soon, or when its process goes on; see ``asyncio.AbstractEventLoop.call_soon``."""
+        """Call the callback soon, or when its process continues; see ``asyncio.AbstractEventLoop.call_soon``."""
         process = current_process.get() if context is None else context.get(current_process)
         if process is None or not process.is_stopped:
             return super().call_soon(callback, *args, context=context)
@@ -178,7 +178,7 @@ class ProcessLoop(VirtualLoop):
     def call_at(
         self, when: float, callback: Callable[[*Ts], object], *args: *Ts, context: Context | None = None
     ) -> asyncio.TimerHandle:
-        """Call it at this time, or when its process goes on after it; see ``asyncio.AbstractEventLoop.call_at``."""
+        """Call the callback at this time, or when its process continues; see ``asyncio.AbstractEventLoop.call_at``."""
         process = current_process.get() if context is None else context.get(current_process)
         if process is None:
             return super().call_at(when, callback, *args, context=context)
@@ -193,7 +193,7 @@ class ProcessLoop(VirtualLoop):
         name: object = None,
         context: Context | None = None,
     ) -> asyncio.Task[R]:
-        """Begin a task of the process whose step this is; see ``asyncio.AbstractEventLoop.create_task``."""
+        """Begin a task of the present process; see ``asyncio.AbstractEventLoop.create_task``."""
         task: asyncio.Task[R] = super().create_task(coro, name=None if name is None else str(name), context=context)
         process = current_process.get() if context is None else context.get(current_process)
         if process is not None:
@@ -202,7 +202,7 @@ class ProcessLoop(VirtualLoop):
         return task
 
     def begin(self, step: _Step) -> None:
-        """Do a step that waited."""
+        """Run a step that waited."""
         super().call_soon(step.do, context=_NO_PROCESS)
 
     @staticmethod

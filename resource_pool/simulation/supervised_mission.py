@@ -1,7 +1,7 @@
-"""One supervised mission from a seed: real launcher, keepers, creators, placer and owners, on played machines.
+"""One supervised mission from a seed: real launcher, keepers, creators, placer and owners, on simulated machines.
 
-Where ``mission_run`` loses messages between components that a played creator restarts, here the deciding code of
-supervision is in the loop, and processes, links and machines are what fails.
+``mission_run`` has faults of messages and a simulated creator. Here the creator's real decisions run, and the faults
+are those of processes, links and machines.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ def run_supervised(
     """Run the supervised mission of this seed to its end and judge it; the same arguments give the same bytes.
 
     Args:
-        seed: Of the mission and its faults.
-        chaos: Whether anything goes wrong on purpose.
-        faults: Only these faults, instead of those the seed means.
-        shape: Another mission than the seed means.
+        seed: Seed of the mission and its faults.
+        chaos: True: inject faults.
+        faults: Only these faults, instead of the seed's.
+        shape: This mission, instead of the seed's.
     """
     shape = shape or draw_supervised_shape(seed)
     if faults is None:
@@ -65,22 +65,22 @@ def run_supervised(
 
 
 class _Observer:
-    """Watches nothing: what is to be seen is in the audit."""
+    """Shows nothing, because the audit has all events."""
 
     def began(self, step: str) -> None:
-        """Take note of nothing."""
+        """Do nothing."""
 
     def done(self, step: str, took_s: float) -> None:
-        """Take note of nothing."""
+        """Do nothing."""
 
     def announce(self, line: str) -> None:
         """Show nothing."""
 
     def connected(self, bus: Bus) -> None:
-        """Listen to nothing."""
+        """Do nothing."""
 
     async def up(self, bus: Bus, clock: Clock) -> None:  # noqa: ARG002  the protocol's names
-        """Let the mission run until it is told to end."""
+        """Wait until the mission ends."""
         await asyncio.Event().wait()
 
 
@@ -142,7 +142,7 @@ class _Mission:
 
     # ------------------------------------------------------------------ bring-up, as ``bring_up.run_mission`` does it
     async def _begin(self, folder: str) -> asyncio.Task[None]:
-        """Return the launcher's life when all of the mission is ready."""
+        """Return the launcher's task when the whole mission is ready."""
         own = self._launch("launcher", "", folder)
         process = self._machines.begin(own.name, own.host)
         ready: asyncio.Future[Launcher] = asyncio.get_running_loop().create_future()

@@ -1,4 +1,4 @@
-"""Which supervised mission a seed means: the pool and owners of ``shape``, on hosts, with a behavior tree beside them.
+"""The supervised mission of a seed: the pool and owners of ``shape``, on hosts, with a behavior tree beside them.
 
 Pure: the same seed gives the same mission, in every process and on every machine.
 """
@@ -52,10 +52,10 @@ class SupervisedShape:
     """One supervised mission.
 
     Attributes:
-        seed: It was made from.
+        seed: Its seed.
         pool: Hardware, owners and times.
         hosts: The first has the core services.
-        places: RC → host its hardware is at.
+        places: RC → host of its hardware.
         trees: Roots of the behavior tree beside the owners.
     """
 
@@ -66,7 +66,7 @@ class SupervisedShape:
     trees: tuple[Behavior, ...]
 
     def groups(self) -> list[list[str]]:
-        """Return what can be struck, by kind: core services, creators, RCs, ARCs, owners, nodes of the tree."""
+        """Return the targets of faults, by kind: core services, creators, RCs, ARCs, owners, nodes of the tree."""
         nodes = list(walk(self.trees))
         return [
             ["nameserver", *(name for name in CORE if name != "creator")],
@@ -88,12 +88,12 @@ class SupervisedShape:
         ]
 
     def hearers(self) -> list[str]:
-        """Return whoever hears numbers that matter: the RC manager, RCs and ARCs."""
+        """Return the targets of hostile messages: the RC manager, RCs and ARCs."""
         _, _, rcs, arcs, _, _ = self.groups()
         return ["rc_manager", *rcs, *arcs]
 
     def description(self) -> MissionDescription:
-        """Return the mission as a mission file would say it."""
+        """Return the mission as a description, as from a mission file."""
         core = Subsystem.BACKBONE
         types = [ComponentType(name, path, core, core=True) for name, path in CLASSES.items()]
         types += [ComponentType(name, path, Subsystem.RESOURCE_POOL) for name, path in RCS.items()]

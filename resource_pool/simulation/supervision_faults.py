@@ -1,6 +1,6 @@
-"""What goes wrong with processes, links and machines of a supervised mission. Pure: a seed gives the faults.
+"""Injected faults of a supervised mission: processes, links and machines. Pure: a seed gives the faults.
 
-Every fault is known by its time and target alone, so a run can be repeated with some of its faults only.
+The id of a fault is its time and target, so a run can be repeated with some of its faults only.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from resource_pool.simulation.supervised_shape import SupervisedShape
 
 SHORTEST_S, LONGEST_S = 0.1, 30.0  # of pauses and cuts
 LONGEST_STARVED_S = 10.0  # chosen: longer than every time-out of a second or five
-GAPS_S = (0.3, 1.0, 2.5)  # chosen: 20 busy processes beside it; a machine that swaps; one that is as good as hung
-MOST_FAULTS = 5  # chosen: a broken law with so few is understood; more faults only hide what one does
+GAPS_S = (0.3, 1.0, 2.5)  # chosen: 20 busy processes beside it; a machine that swaps; a machine that almost hangs
+MOST_FAULTS = 5  # chosen: so few faults are understandable; more faults hide the effect of one
 END = Literal["killed", "politely"]
 
 
@@ -26,9 +26,9 @@ class Pause:
     """A process that is stopped as by SIGSTOP and continued.
 
     Attributes:
-        at_s: When.
-        target: Component in it.
-        lasts_s: How long.
+        at_s: Mission time of its begin.
+        target: A component in the process.
+        lasts_s: Its duration.
     """
 
     at_s: float
@@ -40,7 +40,7 @@ class Pause:
 
     @property
     def over_s(self) -> float:
-        """When it is over."""
+        """Mission time of its end."""
         return self.at_s + self.lasts_s
 
 
@@ -49,10 +49,10 @@ class End:
     """A process that ends.
 
     Attributes:
-        at_s: When.
-        target: Component in it.
+        at_s: Mission time of its begin.
+        target: A component in the process.
         how: As by SIGKILL, or in good order as by SIGTERM.
-        again_after_s: Its successor ends the same way so long after it was forked; negative: it does not.
+        again_after_s: Time from the fork of its successor to the successor's end in the same way; negative: none.
     """
 
     at_s: float
@@ -67,7 +67,7 @@ class End:
 
     @property
     def over_s(self) -> float:
-        """When it is over; a successor's end is not known beforehand."""
+        """Mission time of its end; the end of a successor is not known beforehand."""
         return self.at_s
 
 
@@ -76,9 +76,9 @@ class Cut:
     """A link that is cut and heals.
 
     Attributes:
-        at_s: When.
+        at_s: Mission time of its begin.
         target: Component whose process is cut off, or host, whose processes cannot reach the hub.
-        lasts_s: How long.
+        lasts_s: Its duration.
     """
 
     at_s: float
@@ -90,19 +90,19 @@ class Cut:
 
     @property
     def over_s(self) -> float:
-        """When it is over."""
+        """Mission time of its end."""
         return self.at_s + self.lasts_s
 
 
 @dataclass(frozen=True, slots=True)
 class Starve:
-    """A machine on which each process gets a processor only for a moment now and then.
+    """A machine whose processes get a processor only for moments.
 
     Attributes:
-        at_s: When.
+        at_s: Mission time of its begin.
         target: The host.
-        lasts_s: How long.
-        gap_s: Time between two such moments.
+        lasts_s: Its duration.
+        gap_s: Time between two moments.
     """
 
     at_s: float
@@ -115,18 +115,18 @@ class Starve:
 
     @property
     def over_s(self) -> float:
-        """When it is over."""
+        """Mission time of its end."""
         return self.at_s + self.lasts_s
 
 
 @dataclass(frozen=True, slots=True)
 class Hostile:
-    """A message with numbers that cannot be, said in the name of one who may say it.
+    """A message with impossible numbers, in the name of a component that may send such a message.
 
     Attributes:
-        at_s: When.
-        target: Component that hears it.
-        number: Which one of ``hostile_numbers``.
+        at_s: Mission time of its begin.
+        target: Its receiver.
+        number: Its number in ``hostile_numbers``.
     """
 
     at_s: float
@@ -138,7 +138,7 @@ class Hostile:
 
     @property
     def over_s(self) -> float:
-        """When it is over."""
+        """Mission time of its end."""
         return self.at_s
 
 
@@ -146,7 +146,7 @@ SupervisionFault = Pause | End | Cut | Starve | Hostile
 
 
 def draw_supervision_faults(shape: SupervisedShape) -> list[SupervisionFault]:
-    """Return what goes wrong in this mission, in order of time."""
+    """Return the faults of this mission, in order of time."""
     dice = Random(f"supervision {shape.seed}")
     found = [_draw(dice, shape) for _ in range(dice.randint(1, MOST_FAULTS))]
     return sorted(found, key=lambda fault: (fault.at_s, fault.target))
@@ -172,10 +172,10 @@ def _draw(dice: Random, shape: SupervisedShape) -> SupervisionFault:
 
 
 def _lasts_s(dice: Random, longest_s: float) -> float:
-    """As many short ones as long ones: what matters are leases and patience, from 0.1 to 20 s."""
+    """Draw a duration, as many short as long ones: leases and time-outs are between 0.1 and 20 s."""
     return round(SHORTEST_S * math.exp(dice.uniform(0.0, math.log(longest_s / SHORTEST_S))), 6)
 
 
 def storm_over_s(faults: Sequence[SupervisionFault]) -> float:
-    """Return when the last of them is over; 0 without any."""
+    """Return the end of the last fault; 0 without faults."""
     return max((fault.over_s for fault in faults), default=0.0)

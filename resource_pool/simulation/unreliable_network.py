@@ -1,13 +1,13 @@
-"""A network inside one process on which messages get lost, come late or come twice.
+"""A network inside one process with lost, late and doubled messages.
 
 Rules of this file:
 
-* A link keeps its order, as a TCP connection does: what is said after a late message comes after it.
-  A doubled message comes twice in a row.
-* A question and its answer travel apart. Whoever asked cannot tell which of them was lost.
-* Whoever is cut off gets nothing, and nothing gets away from it; when that ends all of it travels on.
-* What is said to the placer and by it always arrives: it is played here, not judged.
-* The rise and fall of liveliness tokens is never lost, since a hub keeps them; it may come late.
+* A link keeps its order, as a TCP connection does: messages after a late message arrive after it. A doubled message
+  arrives twice in a row.
+* A question and its answer have separate faults. The requester cannot know which of them was lost.
+* A component that is cut off neither gets nor sends messages; when the cut ends, all of them travel on.
+* Messages to and from the placer always arrive, because the placer is simulated and not judged.
+* The rise and fall of liveliness tokens may be late, but is never lost, because a hub keeps tokens.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from backbone.placer.messages import ADDRESS as PLACER
 from backbone.wire import Envelope
 from resource_pool.simulation.faults import Fates, MessageFault
 
-ORDER_STEP_S = 1e-6  # chosen: far below every time that means something, far above the loop's resolution
+ORDER_STEP_S = 1e-6  # chosen: far below every meaningful time, far above the loop's resolution
 
 
 class UnreliableNetwork(LocalNetwork):
@@ -31,8 +31,8 @@ class UnreliableNetwork(LocalNetwork):
 
     Args:
         mission: One network is one mission.
-        fates: What becomes of each message.
-        begin_s: Mission time from which messages suffer.
+        fates: Decides the fault of each message.
+        begin_s: Mission time from which messages have faults.
         end_s: Mission time from which they all arrive again.
     """
 
@@ -45,16 +45,16 @@ class UnreliableNetwork(LocalNetwork):
         self._link_free_s: dict[tuple[str, str], float] = {}
 
     def cut_off(self, address: str, until_s: float) -> None:
-        """Let nothing arrive at this address nor get away from it until then."""
+        """Stop all messages to and from this address until this time."""
         self._cut_until_s[address] = max(until_s, self._cut_until_s.get(address, 0.0))
 
     def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
-        """Carry it as its fate says, and the answer as the answer's does."""
+        """Carry question and answer, each with its own fault."""
         source = asked.source
         fault = self._fault(source, address, type(asked.body).__name__)
 
         def travel_back(outcome: Envelope[Any] | None) -> None:
-            if outcome is None:  # the one asked died over it, which its link's fall tells
+            if outcome is None:  # the component died over it, which the fall of its link reports
                 answered(None)
                 return
             name = f"answer {type(outcome.body).__name__}"
@@ -78,7 +78,7 @@ class UnreliableNetwork(LocalNetwork):
             self._travel(source, address, None, lambda: self._ask_again(ask))
 
     def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
-        """Carry it to this listener as its fate says."""
+        """Carry the publication to this listener with its fault."""
         source, target = envelope.source, listening.owner.source
         fault = self._fault(source, target, type(envelope.body).__name__)
         self._travel(source, target, fault, lambda: listening.deliver(address, envelope))
@@ -86,12 +86,12 @@ class UnreliableNetwork(LocalNetwork):
             self._travel(source, target, None, lambda: listening.deliver(address, envelope))
 
     def carry_life(self, watching: Watching, address: str, alive: bool) -> None:
-        """Carry it, late to one that is cut off."""
+        """Carry the change of a token, late to a component that is cut off."""
         self._travel("", watching.owner.source, None, lambda: watching.notify(address, alive))
 
     @staticmethod
     def _ask_again(ask: Callable[[Answered], None]) -> None:
-        """Let the copy of a question be answered; nobody waits for what is said to it."""
+        """Deliver the copy of a question; its answer is dropped."""
         try:
             ask(lambda _outcome: None)
         except NoResponder:
@@ -120,7 +120,7 @@ class UnreliableNetwork(LocalNetwork):
         )
 
     def _travel(self, source: str, target: str, fault: MessageFault | None, arrive: Callable[[], None]) -> None:
-        """Let it arrive after everything said before on this link."""
+        """Deliver a message after all earlier messages of this link."""
         if fault is not None and fault.effect == "lost":
             return
         loop = asyncio.get_running_loop()

@@ -1,10 +1,10 @@
-"""A mission file's whole mission in one process on a virtual clock: everybody real but placer and creators.
+"""A mission file's whole mission in one process on a virtual clock; only placer and creators are simulated.
 
-Nameserver, databases, RC manager, world, RCs, ARCs, behaviors and whoever else is started are the very
-classes the mission file names. They speak over a ``LocalNetwork`` and wait on a ``VirtualClock``, so the
-mission runs as fast as the machine can, and the same mission gives the same run to the byte.
+Nameserver, databases, RC manager, world, RCs, ARCs, behaviors and all other components are the classes that the mission
+file names. They use a ``LocalNetwork`` and a ``VirtualClock``, so the mission runs as fast as the machine can, and the
+same mission gives the same run to the byte.
 
-Rule of this file: it brings up and hands out; it decides nothing and judges nothing.
+Rule of this file: it brings the mission up, and neither decides nor judges.
 """
 
 from __future__ import annotations
@@ -55,15 +55,15 @@ from backbone.wire import Envelope, Message
 from resource_pool.simulation.audit import Audit, Happening
 from resource_pool.simulation.played_hosts import HOST, PlayedHosts, Role
 
-START_TIME_S = 60.0  # chosen: of virtual time, in which only settling and back-offs pass
-REPLY_TIME_S = 5.0  # chosen: of virtual time; an answer takes none
+START_TIME_S = 60.0  # chosen: virtual time, in which only settling and back-offs pass
+REPLY_TIME_S = 5.0  # chosen: virtual time; an answer takes none
 MEETING_AT = "backbone/launcher"
 FRAMEGRABBER, SIMULATED = "framegrabber", "simulated"
 FELL = frozenset({"fails", "gives up"})
 
 
 class MissionFell(BackboneError):
-    """A component of a mission in one process fell; the text names the first and why."""
+    """A component of a mission in one process fell; the text names the first one and the reason."""
 
 
 @dataclass(slots=True)
@@ -73,11 +73,11 @@ class RunningMission:
     Attributes:
         description: The mission.
         network: Its network; ``network.join(source, clock)`` gives one more bus.
-        bus: A bus to ask and listen with, as the launcher's.
-        clock: The mission's time, which is the event loop's.
+        bus: A bus like the launcher's.
+        clock: The mission's clock, which shows the event loop's time.
         hosts: All its components by name.
-        trace: The RC manager's decisions until now, lines of the schedule trace; the first is ``meta``.
-        placer: Address of who starts and stops components.
+        trace: Lines of the schedule trace until now; the first is ``meta``.
+        placer: Address of the placer.
     """
 
     description: MissionDescription
@@ -89,18 +89,18 @@ class RunningMission:
     placer: str = PLACER
 
     async def start(self, order: Start) -> Started:
-        """Have the placer start a component of one of the mission's types; return when it is ready.
+        """Ask the placer to start a component; return when it is ready.
 
         Raises:
-            Refusal: It cannot be started.
+            Refusal: The placer refused.
         """
         return await self.bus.ask(PLACER, order, Started, within_s=START_TIME_S)
 
     async def stop(self, name: str, reason: str = "no longer needed") -> Ended:
-        """Have the placer end a component; return when it is gone.
+        """Ask the placer to end a component; return when it has ended.
 
         Raises:
-            NotPlaced: There is none of this name.
+            NotPlaced: No component has this name.
         """
         return await self.bus.ask(PLACER, StopComponent(name, reason), Ended, within_s=START_TIME_S)
 
@@ -108,7 +108,7 @@ class RunningMission:
         """Return the component of this name.
 
         Raises:
-            NotPlaced: None lives now.
+            NotPlaced: No living component has this name.
         """
         found = self.hosts.running(name)
         if found is None:
@@ -116,10 +116,10 @@ class RunningMission:
         return found
 
     async def statistics(self, name: str) -> dict[str, float]:
-        """Return a component's counters, asked for over the bus as by everybody.
+        """Return a component's counters, as an answer over the bus.
 
         Raises:
-            NotPlaced: None of this name lives now.
+            NotPlaced: No living component has this name.
         """
         at = self.component(name).address
         return (await self.bus.ask(at, AskStatistics(), Statistics, within_s=REPLY_TIME_S)).values
@@ -135,18 +135,18 @@ async def mission_in_one_process(
     camera: Literal["paint", "gl"] = "paint",
     may_fall: bool = False,
 ) -> AsyncIterator[RunningMission]:
-    """Give the mission, up and ready, on the running loop's time; end everybody at the end of the block.
+    """Yield the mission, up and ready, on the running loop's time; end all components at the end of the block.
 
-    Run it under ``run_virtual``. At the end hardware is closed in good order, all others end as by SIGKILL.
+    Run it under ``run_virtual``. At the end hardware is closed in good order; all other components end as by SIGKILL.
 
     Args:
-        description: A checked mission; hosts and shared processes mean nothing here.
+        description: A checked mission; hosts and shared processes are ignored.
         trace: Also called with each line of the schedule trace, in order.
-        network: To run it on, one that loses messages on purpose for instance; default: a new one.
-        consoles: Component type → what makes a console of it; a mission file has none.
-        camera: What draws the simulated framegrabbers' pictures, whatever the mission says; the painter's are the
-            same on every machine. ``gl`` needs ``scout_model.gl_probe.prepare`` to have run in this process.
-        may_fall: True: components that fall are restarted, as their creators would, and nothing is raised.
+        network: Its network, for instance one with faults; default: a new one.
+        consoles: Component type → factory of its consoles; a mission file has no consoles.
+        camera: Camera of the simulated framegrabbers, instead of the mission's; the painter's pictures are the same on
+            every machine. ``gl`` needs an earlier ``scout_model.gl_probe.prepare`` in this process.
+        may_fall: True: components that fall are restarted, as by their creators, and no error is raised.
 
     Raises:
         MissionFell: A component fell; raised at the end of the block, also in place of what came of the fall.
@@ -244,7 +244,7 @@ async def _bring_up(
 
 
 class WholePlacer(Component[NoParameters]):
-    """Starts and stops everything that is no core service, in this process; speaks as the real placer does."""
+    """Starts and stops all components but core services, in this process, with the real placer's messages."""
 
     accepts = PlacerQuestion
 
@@ -267,7 +267,7 @@ class WholePlacer(Component[NoParameters]):
         self._placements: dict[str, Placement] = {}
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Start, stop, or tell of a component."""
+        """Answer ``Start``, ``StopComponent`` and ``AskPlacement``."""
         match asked.body:
             case Start() as order:
                 return await self._start(order, asked.source)
@@ -311,7 +311,7 @@ def component_class(class_path: str) -> type[Component[Any]]:
     """Return the class behind ``package.module:Class``.
 
     Raises:
-        MissionFell: There is none, or it is no component.
+        MissionFell: No component class has this path.
     """
     module, _, name = class_path.partition(":")
     found = getattr(importlib.import_module(module), name, None)

@@ -144,7 +144,7 @@ def test_who_wants_and_never_gets_breaks_progress_unless_somebody_is_above_it() 
 @pytest.mark.parametrize(
     ("what", "values", "law"), [("fails", {"error": "x"}, "no-bug"), ("promise broken", {"promise": "x"}, "schedule")]
 )
-def test_bugs_and_broken_promises_are_told(what: str, values: dict[str, str], law: str) -> None:
+def test_bugs_and_broken_invariants_are_reported(what: str, values: dict[str, str], law: str) -> None:
     assert broken_law((1, "rc_manager", what, values)) == law
 
 

@@ -58,7 +58,7 @@ def test_one_no_keeps_the_stop(answers: list[bool]) -> None:
 
 
 def test_a_stop_that_nobody_can_be_asked_about_is_lifted_by_anybody() -> None:
-    stop = StopState("scout1", True, 1, "nobody knows", "what was kept of an earlier stop cannot be read", 0.0)
+    stop = StopState("scout1", True, 1, "unknown", "the file of an earlier stop cannot be read", 0.0)
     assert decide_lift(stop, 1, "anna", "ui_console/anna") == LiftNow()
 
 
