@@ -33,23 +33,28 @@ from resource_pool.arc_client import StopState
 from ui_console.model.consent import Settled, Sought, Topic
 
 
-# ---------------------------------------------------------------------- of its own robot
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A robot was asked for."""
+class Event:
+    """Something happened at this mission time."""
 
     at_s: float
+
+
+# ---------------------------------------------------------------------- of its own robot
+@dataclass(frozen=True, slots=True)
+class Asked(Event):
+    """A robot was asked for."""
+
     robot: str
     kind: str
     priority: int
 
 
 @dataclass(frozen=True, slots=True)
-class Granted:
+class Granted(Event):
     """The RCs are held; told again, with ``again``, after each suspension.
 
     Attributes:
-        at_s: Mission time.
         rcs: Kind → name of what is held.
         epochs: RC → epoch.
         until_s: The slice lasts at least until then.
@@ -57,7 +62,6 @@ class Granted:
         again: True if it was held before.
     """
 
-    at_s: float
     rcs: Mapping[str, str]
     epochs: Mapping[str, int]
     until_s: float
@@ -71,28 +75,25 @@ class Granted:
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class Lost(Event):
     """The RCs went to somebody else.
 
     Attributes:
-        at_s: Mission time.
         reason: Why.
         by: Because of whom.
         expected_start_s: Next expected slot; negative: unknown.
     """
 
-    at_s: float
     reason: str
     by: str
     expected_start_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class CommandApplied:
+class CommandApplied(Event):
     """A robot did what it was told, perhaps clipped.
 
     Attributes:
-        at_s: When it was applied.
         rc: The robot.
         epoch: Of the grant.
         command: ``drive``, ``halt`` or ``jump``.
@@ -100,7 +101,6 @@ class CommandApplied:
         took_s: From the wish to the answer, seconds of the machine; negative: not measured.
     """
 
-    at_s: float
     rc: str
     epoch: int
     command: str
@@ -109,10 +109,9 @@ class CommandApplied:
 
 
 @dataclass(frozen=True, slots=True)
-class CommandRefused:
+class CommandRefused(Event):
     """Somebody said no; with ``ends_claim`` to the claim itself, so that nothing is waited for any more."""
 
-    at_s: float
     code: str
     detail: str
     remedy: str
@@ -120,92 +119,79 @@ class CommandRefused:
 
 
 @dataclass(frozen=True, slots=True)
-class LinkTrouble:
+class LinkTrouble(Event):
     """A peer did not answer: what was asked may or may not have happened.
 
     Attributes:
-        at_s: When.
         detail: What was not answered, for people.
         command: The command of this console's hands that was not answered; empty: something else.
     """
 
-    at_s: float
     detail: str
     command: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class GivenBack:
+class GivenBack(Event):
     """The robot was given back.
 
     Attributes:
-        at_s: When.
         reason: Why.
         confirmed: False if nobody confirmed it.
         wanted: False if the operator did not ask for it: a robot that is lost.
     """
 
-    at_s: float
     reason: str
     confirmed: bool
     wanted: bool = True
 
 
 @dataclass(frozen=True, slots=True)
-class LetGoNeeded:
+class LetGoNeeded(Event):
     """A control that is held moves nothing before it is let go, or no longer so.
 
     Attributes:
-        at_s: When.
         is_needed: True: let go, then press anew.
     """
 
-    at_s: float
     is_needed: bool
 
 
 @dataclass(frozen=True, slots=True)
-class MomentBegan:
+class MomentBegan(Event):
     """A stop, a lift, a grant, a loss, or a broken link: what was pressed before it moves nothing any more."""
-
-    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class PictureSeen:
+class PictureSeen(Event):
     """A picture arrived."""
 
-    at_s: float
     captured_s: float
     robot: str
 
 
 @dataclass(frozen=True, slots=True)
-class Attention:
+class Attention(Event):
     """The operator touched the console, or turned away from it.
 
     Attributes:
-        at_s: When.
         is_there: False: nobody is at the console.
     """
 
-    at_s: float
     is_there: bool
 
 
 @dataclass(frozen=True, slots=True)
-class ConsentAsked:
+class ConsentAsked(Event):
     """This console asked whether it may have what others hold, or lift what others stopped.
 
     Attributes:
-        at_s: When.
         robot: What it is about.
         of: Names of those who were asked.
         until_s: Silence is a no from then on.
         topic: What was asked for.
     """
 
-    at_s: float
     robot: str
     of: Sequence[str]
     until_s: float
@@ -213,11 +199,10 @@ class ConsentAsked:
 
 
 @dataclass(frozen=True, slots=True)
-class ConsentHeard:
+class ConsentHeard(Event):
     """Somebody who was asked decided, or did not in time.
 
     Attributes:
-        at_s: When.
         robot: What it was about.
         user: Who decided.
         is_given: True: it is being given back, or may move.
@@ -225,7 +210,6 @@ class ConsentHeard:
         topic: What was asked for.
     """
 
-    at_s: float
     robot: str
     user: str
     is_given: bool
@@ -258,32 +242,28 @@ Said = (
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(Event):
     """A message arrived.
 
     Attributes:
-        at_s: When.
         body: The message.
         source: Address of the component that said it, where the message does not say of whom it speaks.
     """
 
-    at_s: float
     body: Said
     source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class LinkHeard:
+class LinkHeard(Event):
     """This console's link to the hub came or went, or was measured.
 
     Attributes:
-        at_s: When.
         is_up: Whether messages pass.
         latency_s: There and back, seconds of the machine; negative: not measured now.
         until_s: The link counts as down if nothing more was heard of it by then.
     """
 
-    at_s: float
     is_up: bool
     latency_s: float = -1.0
     until_s: float = math.inf

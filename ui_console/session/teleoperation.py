@@ -38,18 +38,9 @@ from resource_pool.arc_client import (
     arc_name,
     claim_parameters,
 )
+from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, Drive, Halt, Jump
-from ui_console.model.events import (
-    Asked,
-    CommandRefused,
-    ConsoleEvent,
-    GivenBack,
-    Granted,
-    Heard,
-    Lost,
-    PictureSeen,
-)
 from ui_console.model.lifting import AskLift
 from ui_console.model.team import ROBOT_KIND
 from ui_console.session.consent_answers import ConsentAnswers
@@ -110,7 +101,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         bus: Bus,
         clock: Clock,
         *,
-        show: Callable[[ConsoleEvent], None],
+        show: Callable[[events.ConsoleEvent], None],
         see: Callable[[Frame], None] | None = None,
         work: Callable[[Teleoperation], Awaitable[None]] | None = None,
         takes: bool = True,
@@ -181,7 +172,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._asked_s, self._grants, self.refusal = self.clock.now_s(), 0, None
         self._decided.clear()
         self.acted(OperatorAction.TAKE, wished.robot or ANY_ROBOT, f"with priority {wished.priority}")
-        self.show(Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
+        self.show(events.Asked(self._asked_s, wished.robot, wished.kind, wished.priority))
         self._keeping = self.start_task(self._keep(arc, rested), "arc")
 
     async def switch(self, robot: str) -> None:
@@ -307,7 +298,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         robot, self._holding = self._holding or self.parameters.robot or ANY_ROBOT, ""
         self.acted(OperatorAction.RELEASE, robot, f"{reason}{'' if confirmed else ', which nobody confirmed'}")
         self.report("holds no robot")
-        self.show(GivenBack(self.clock.now_s(), reason, confirmed, wanted))
+        self.show(events.GivenBack(self.clock.now_s(), reason, confirmed, wanted))
 
     # ------------------------------------------------------------------ consent
     def begin_ask_consent(self, why: str = "") -> None:
@@ -397,7 +388,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not again:
             self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
-        self.show(Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
+        self.show(events.Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 
     async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
@@ -412,14 +403,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.answers.ended(False, f"it was lost: {because}")
             self._controls.tell_drive_ended(self._holding, because)
             self.report(f"waits: {notice.reason} by {notice.by}")
-            self.show(Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
+            self.show(events.Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
 
     def _heard_stop(self, state: StopState) -> None:
         """The robot that is held was stopped or may move again: whoever drives it has to know that first."""
         if self._arc is not None and self._arc.heard_stop(state):
             self.require_let_go()
         if not self._watches and state.number > 0:  # 0: it never was stopped
-            self.show(Heard(self.clock.now_s(), state))
+            self.show(events.Heard(self.clock.now_s(), state))
 
     def _claim_parameters(self) -> dict[str, Any]:
         wished = self.parameters
@@ -450,11 +441,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     def _tell_refusal(self, refusal: Refusal) -> None:
         now_s, code = self.clock.now_s(), code_of(refusal)
-        self.show(CommandRefused(now_s, code, refusal.detail, refusal.remedy, ends_claim=True))
+        self.show(events.CommandRefused(now_s, code, refusal.detail, refusal.remedy, ends_claim=True))
 
     def _saw(self, frame: Frame) -> None:
         if self._see is not None:
-            self.show(PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
+            self.show(events.PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
             self._see(frame)
 
     async def _ask_why(self) -> None:
@@ -465,7 +456,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             log.info("why: %s", error)
         else:
             if not self.is_held:
-                self.show(Heard(self.clock.now_s(), why))
+                self.show(events.Heard(self.clock.now_s(), why))
                 await self._settle_with_other_screens()
         finally:
             self._asking_why = None
