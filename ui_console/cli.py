@@ -39,7 +39,7 @@ app = typer.Typer(
 
 def complete_robot(ctx: typer.Context) -> list[str]:
     """Return the robots of the mission that is up, for a shell."""
-    from ui_console.model.team import ROBOT_KIND
+    from ui_console.model.robot_board import ROBOT_KIND
 
     picture = picture_for(ctx)
     rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []

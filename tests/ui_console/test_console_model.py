@@ -270,9 +270,9 @@ def test_what_is_wrong_is_an_alarm_while_it_is_so(events: list[ConsoleEvent], ki
 def test_an_older_word_on_a_stop_changes_nothing() -> None:
     lifted = StopState("scout1", False, 1, "ben", "", 12.0)
     shown = model(Heard(11.0, STOP), Heard(12.0, lifted), Heard(12.1, STOP))
-    assert shown.team.stop_of("scout1") is None
+    assert shown.team.robots.stop_of("scout1") is None
     shown.apply(Heard(13.0, StopState("scout1", True, 2, "eve", "", 13.0)))
-    assert shown.team.stop_of("scout1") is not None
+    assert shown.team.robots.stop_of("scout1") is not None
 
 
 def test_what_was_refused_is_told_once_and_counted_and_an_operators_stop_is_no_second_alarm() -> None:

@@ -22,7 +22,8 @@ from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
 from ui_console.model.consent import Settled, Sought, Topic
 from ui_console.model.lifting import question_line
-from ui_console.model.team import ROBOT_KIND, TeamModel
+from ui_console.model.robot_board import ROBOT_KIND
+from ui_console.model.team import TeamModel
 
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
@@ -134,7 +135,7 @@ class ConsoleModel:
             requests=team.requests(),
             timeline=team.timeline(now_s),
             alarms=self.alarm_views(),
-            hosts=team.hosts(now_s),
+            hosts=team.links.hosts(now_s),
             links=self.links(now_s),
             videos=self.videos(now_s),
             parameters=team.parameters(),
@@ -146,7 +147,7 @@ class ConsoleModel:
     def own(self, now_s: float) -> views.OwnView:
         """Return what this console wants and has."""
         held = self.held
-        link_down_s = self.team.link_down_s(now_s)
+        link_down_s = self.team.links.down_s(now_s)
         return views.OwnView(
             console=self.name,
             user=self.user,
@@ -158,7 +159,7 @@ class ConsoleModel:
             until_s=held.until_s if held is not None else views.NONE_S,
             taken_because=self._why_lost(self.lost) if self.lost is not None else "",
             applied=_applied_line(self.applied),
-            stop=self.team.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
+            stop=self.team.robots.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
             asked=self.asked_line(now_s),
@@ -212,9 +213,9 @@ class ConsoleModel:
                 row,
                 is_mine=row.robot == mine,
                 video=videos.get(row.robot),
-                stop=self.team.stop_view(row.robot, now_s, self.user, self._address),
+                stop=self.team.robots.stop_view(row.robot, now_s, self.user, self._address),
             )
-            for row in self.team.robots(now_s)
+            for row in self.team.robots.views(now_s)
         ]
 
     def videos(self, now_s: float) -> list[views.VideoView]:
@@ -223,7 +224,7 @@ class ConsoleModel:
 
     def links(self, now_s: float) -> list[views.LinkView]:
         """Return the ways messages go; commands of this console among them."""
-        links = self.team.links(now_s)
+        links = self.team.links.views(now_s)
         if self.applied is not None and self.applied.took_s >= 0:
             line = f"{self.applied.command} was applied {max(0.0, now_s - self.applied.at_s):.1f} s ago"
             links.insert(1, views.LinkView(f"commands to {self.applied.rc}", True, self.applied.took_s, line))
@@ -235,12 +236,12 @@ class ConsoleModel:
 
     def status_line(self, now_s: float) -> str:
         """Return in one line whether this console has its robot, and if not, why."""
-        down_s = self.team.link_down_s(now_s)
+        down_s = self.team.links.down_s(now_s)
         if down_s >= 0:
             mine = f"; {self.robot} is given back there by itself" if self.held is not None else ""
             return f"NO LINK to the mission for {now_s - down_s:.0f} s: nothing can be stopped from here{mine}"
         if self.held is not None:
-            stop = self.team.stop_of(self.robot)
+            stop = self.team.robots.stop_of(self.robot)
             if stop is not None:
                 return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
             slice_end = _slice_end(self.held.until_s, now_s)
@@ -331,13 +332,13 @@ class ConsoleModel:
 
     def _is_held(self, now_s: float) -> bool:
         """Return whether keys move a robot, as far as can be known now."""
-        return self.held is not None and self.team.link_down_s(now_s) < 0
+        return self.held is not None and self.team.links.down_s(now_s) < 0
 
     def _lost_view(self, now_s: float) -> views.LostView | None:
         went = self._went
         if went is None:
             return None
-        is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots(now_s))
+        is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots.views(now_s))
         return msgspec.structs.replace(went, may_retake=is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:

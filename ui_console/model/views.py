@@ -11,13 +11,16 @@ from typing import Any
 
 import msgspec
 
-from backbone.component.messages import ComponentState, StoryEvent
+from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.creator.messages import HostLoad
 from backbone.scheduling.views import RequestView
 from backbone.wire import plain
 
 NONE_S = -1.0
 """In place of a time, an age or a rest: there is none."""
+
+LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
+"""States of a component that is not missed when it is gone."""
 
 
 class Severity(StrEnum):

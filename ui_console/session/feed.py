@@ -46,7 +46,7 @@ from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
-from ui_console.model.team import ROBOT_KIND
+from ui_console.model.robot_board import ROBOT_KIND
 
 log = logging.getLogger(__name__)
 

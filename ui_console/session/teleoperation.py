@@ -42,7 +42,7 @@ from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, Drive, Halt, Jump
 from ui_console.model.lifting import AskLift
-from ui_console.model.team import ROBOT_KIND
+from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls

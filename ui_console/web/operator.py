@@ -278,7 +278,7 @@ class Operator:
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""
         self._with_robot(Teleoperation.require_let_go)
-        is_known = robot in self._hands.team.robot_names()
+        is_known = robot in self._hands.team.robots.names()
         is_stopped = is_known and await self._hands.observer.stop_robot(robot, "", self.welcome.user)
         self._tell_unsure([] if is_stopped else [robot])
 
