@@ -28,17 +28,8 @@ from ui_console.design.views import (
     ProblemRow,
     RehearsalView,
 )
-from ui_console.model.views import (
-    AlarmView,
-    HealthView,
-    HostView,
-    LinkView,
-    NodeView,
-    OwnView,
-    ParameterView,
-    RobotView,
-    TimelineView,
-)
+from ui_console.model import views
+from ui_console.model.timeline import TimelineView
 from ui_console.web.door import Beat, Hello
 from ui_console.web.protocol import Intent
 
@@ -83,17 +74,17 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """All sections of the view; a message has those that changed."""
 
     welcome: Welcomed
-    own: OwnView
-    robots: list[RobotView]
-    links: list[LinkView]
-    alarms: list[AlarmView]
+    own: views.OwnView
+    robots: list[views.RobotView]
+    links: list[views.LinkView]
+    alarms: list[views.AlarmView]
     drawn: dict[str, float]
-    tree: list[NodeView]
+    tree: list[views.NodeView]
     requests: list[RequestView]
     timeline: TimelineView
-    hosts: list[HostView]
-    health: HealthView | None
-    parameters: list[ParameterView]
+    hosts: list[views.HostView]
+    health: views.HealthView | None
+    parameters: list[views.ParameterView]
     components: list[ComponentState]
     log: list[LoggedEvent]
     now_s: float
