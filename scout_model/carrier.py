@@ -1,6 +1,6 @@
 """The carrier: a bigger robot that brings Scouts in and sets them down; pure functions of time.
 
-It drives its path once (and back if so told), stops where each place it serves is nearest, and there
+It drives its path once (and back with ``there_and_back``), stops where each place it serves is nearest, and there
 an arm lifts the Scouts of this place off its deck, one after the other, and lowers them to the floor.
 Until a Scout stands on the floor it goes wherever the carrier holds it.
 

@@ -255,7 +255,7 @@ def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
     x_m, y_m, z_m = model.geom_size[geom].tolist()
     mesh = _solid(kind, (x_m, y_m, z_m), is_mark=bool(model.geom_group[geom] == _MARKS))
     if mesh is None:
-        raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which nobody taught the painter")
+        raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which the painter cannot draw")
     return mesh
 
 

@@ -1,4 +1,4 @@
-"""The Scout's firmware: what the robot does with the packets it hears.
+"""The Scout's firmware: the robot's reactions to packets.
 
 Packets and time go in, positions of the actuators come out; physics is the world's business.
 
@@ -7,7 +7,7 @@ Rules:
 * A packet that is none changes nothing, also not the watchdog.
 * Without a packet for ``COMMAND_TIMEOUT_S`` the wheels stop and the transmitter goes off.
 * A jump is preload, kick, rewind.  Until the spring is wound another jump is refused.  Halt, safe
-  and the watchdog stop a jump that has not kicked yet; a released spring stops for nobody.
+  and the watchdog stop a jump that has not kicked yet; a released spring cannot be stopped.
 
 Source: IROS 2001, section 2: the on-board processors do communications and actuator control only.
 """

@@ -125,7 +125,7 @@ class _Path:
         self.length_m = path_length_m(points)
 
     def along(self, walked_m: float) -> TargetPose:
-        """Return where one is who walked so far from the first point."""
+        """Return the place at this distance along the path from the first point."""
         left_m, last = walked_m, self._segments[-1]
         for segment in self._segments:
             if left_m <= segment[2] or segment is last:

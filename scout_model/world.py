@@ -109,7 +109,7 @@ class World:
     def hear(self, network_id: int, payload: bytes) -> None:
         """Let a radio packet reach the robots: the one with this id obeys from the next frame on, others never.
 
-        A packet to an id nobody has is lost in the air; malformed bytes are ignored and counted by the robot.
+        A packet to an unknown id is lost; a robot ignores and counts malformed bytes.
         """
         robot = self._by_network_id.get(network_id)
         if robot is not None:
@@ -139,7 +139,7 @@ class World:
         """Advance by one frame, a thirtieth of a second."""
         driven = [self._drive(robot) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
-            # Nothing to integrate: one step notices whom a target touches, and wakes it.
+            # Nothing to integrate: one step detects robots that a target touches, and wakes them.
             self._step += STEPS_PER_FRAME
             self._place_targets()
             mujoco.mj_step(self._model, self._data)
@@ -287,7 +287,7 @@ class World:
         return bool((self._data.tree_asleep >= 0).all()) and not self._data.qvel.any()
 
     def _drive(self, robot: _Body) -> bool:
-        """Hand the actuators what the robot's program says; say whether that is anything, and wake its body if so."""
+        """Apply the robot program's outputs to the actuators; return whether any is not 0, which wakes the body."""
         controls, data = robot.program.controls(self.time_s), self._data
         for actuator, control in controls.items():
             number = robot.actuators.get(actuator)

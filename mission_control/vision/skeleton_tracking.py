@@ -44,7 +44,7 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """What one picture said.
+    """The result of one picture.
 
     Attributes:
         phase: ``TRACKING``: here it is.  ``SEARCHING``: not found, stop and keep the camera still.
@@ -97,7 +97,7 @@ class TargetTracker:
         return Track(Phase.ACQUIRING, None, match)
 
     def forget(self) -> None:
-        """Begin again with acquisition: somebody else may have moved the robot."""
+        """Begin again with acquisition, because the robot may have been moved."""
         self._model = None
 
     def _acquire(self, frame: Picture) -> Track:

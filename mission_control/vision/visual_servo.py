@@ -1,4 +1,4 @@
-"""From pictures to commands: tracker, pose and servo law in one; what a behavior holds.
+"""Visual servo: tracker, pose and servo law in one, from pictures to commands, for a behavior.
 
 Source: RAM 2002, "Visual Servoing".
 """
@@ -21,7 +21,7 @@ LONGEST_GAP_S = 0.5  # chosen: the robots' own watchdog has stopped the wheels b
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """What one picture led to.
+    """The decision of one picture.
 
     Attributes:
         command: What the robot shall do now.
@@ -75,7 +75,7 @@ class VisualServo:
 
     @property
     def searched_rad(self) -> float:
-        """How far the robot turned since it last saw the target; a full turn and more means it is not there."""
+        """The robot's turn since it last saw the target; after a full turn the target is not there."""
         return self._approach.searched_rad
 
     @property
@@ -84,7 +84,7 @@ class VisualServo:
         return self._tracker
 
     def see(self, frame: Picture, elapsed_s: float) -> Step:
-        """Return what to do after this picture.
+        """Return the decision of this picture.
 
         Args:
             frame: Grey levels 0 to 255, shape (240, 320), row 0 on top.
@@ -96,7 +96,7 @@ class VisualServo:
         if elapsed_s < 0:
             raise ValueError(f"a picture comes {-elapsed_s} s before the one before it")
         if self._is_fresh:
-            # What passed while somebody else had the robot is no time in which it looked or drove.
+            # The time between two grants counts neither as search nor as motion.
             self._is_fresh, elapsed_s = False, 0.0
         self._dead_reckon(elapsed_s)
         track = self._tracker.look(frame)
