@@ -101,6 +101,10 @@ class PeopleKnown(Message, frozen=True):
     consoles: Annotated[dict[Mention, Mention], MANY]
 
 
+Told = StoryEvent | OperatorActed | Log | ComponentState | PeopleKnown
+"""Messages of which a log, and who is spoken of in it, is made."""
+
+
 class MissionLog:
     """The newest events. Pure.
 
@@ -114,17 +118,25 @@ class MissionLog:
         self.people = People()
         """People at consoles, whose names replace the consoles' names in answers."""
 
+    def take(self, said: Told, source: str = "", cause: str = "") -> None:
+        """Take in a message, said by this component because of another message."""
+        match said:
+            case StoryEvent():
+                self.add(said)
+            case OperatorActed():
+                self.add(said.event(source, cause))
+            case Log():
+                self._recall(said.events)
+            case ComponentState():
+                self.people.heard(said)
+            case PeopleKnown():
+                self.people.remember(said.consoles)
+
     def add(self, event: StoryEvent) -> None:
         """Add an event."""
         if len(self._events) == self._events.maxlen:
             self._since_s = self._events[1].at_s
         self._events.append(event)
-
-    def recall(self, events: Sequence[StoryEvent]) -> None:
-        """Keep earlier events, too; an event that is kept already is in it once."""
-        known = {(event.at_s, event.where) for event in events}
-        own = [event for event in self._events if (event.at_s, event.where) not in known]
-        self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=self._events.maxlen)
 
     def newest(self, count: int) -> list[StoryEvent]:
         """Return the newest, oldest first, by the names of people."""
@@ -135,6 +147,12 @@ class MissionLog:
         """Return the events that match, with the names of people."""
         found = chosen(map(self.people.named_event, filter(asked.reaches, self._events)), asked)
         return Log(found[-asked.most :], max(0, len(found) - asked.most), self._since_s)
+
+    def _recall(self, events: Sequence[StoryEvent]) -> None:
+        """Keep earlier events, too; an event that is kept already is in it once."""
+        known = {(event.at_s, event.where) for event in events}
+        own = [event for event in self._events if (event.at_s, event.where) not in known]
+        self._events = deque(sorted([*events, *own], key=lambda event: event.at_s), maxlen=self._events.maxlen)
 
 
 def chosen(events: Iterable[StoryEvent], asked: AskLog) -> list[StoryEvent]:
@@ -151,18 +169,12 @@ class LogKeeper:
 
     def __init__(self, bus: Bus) -> None:
         self.log = MissionLog()
-        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard_event)
-        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard_act)
-        bus.subscribe(f"{Subsystem.UI_CONSOLE}/*", Conversation.STATUS, ComponentState, self._heard_status, latest=True)
+        bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
+        bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
+        bus.subscribe(f"{Subsystem.UI_CONSOLE}/*", Conversation.STATUS, ComponentState, self._heard, latest=True)
 
-    def _heard_event(self, envelope: Envelope[Any]) -> None:
-        self.log.add(printable_all(envelope.body))
-
-    def _heard_act(self, envelope: Envelope[Any]) -> None:
-        self.log.add(printable_all(envelope.body).event(envelope.source, envelope.cause))
-
-    def _heard_status(self, envelope: Envelope[Any]) -> None:
-        self.log.people.heard(printable_all(envelope.body))
+    def _heard(self, envelope: Envelope[Any]) -> None:
+        self.log.take(printable_all(envelope.body), envelope.source, envelope.cause)
 
 
 def _is_by_or_about(event: StoryEvent, person: str) -> bool:

@@ -1,7 +1,8 @@
 """Many faults, one after the other, in one mission: what it is like at the end, and what has grown.
 
-What a process uses is taken after a first part of the same faults, and again at the end. A framegrabber fills its
-stores for three minutes; a nameserver grows by a seventh over the first seventy lives that end beside it, and then
+What a process uses is taken after a first part of the same faults, and again at the end; each time all links were
+just lost and regained, and the least of some seconds counts, since links begin and end threads. A framegrabber fills
+its stores for three minutes; a nameserver grows by a seventh over the first seventy lives that end beside it, and then
 stays (measured: 21.3 MB at first, 24.6 after 72, 24.6 after 120). A second life is not as the first: it is not forked
 from a fresh zygote, it watches what it found instead of what it started, and its link, once lost and regained, keeps
 three descriptors more.
@@ -28,7 +29,7 @@ SETTLED_WITHIN_S = 60.0
 GROWTH = 0.1  # the most that a process may have grown
 FEW_THREADS = 2  # chosen: worker threads are begun when there is work for them
 WARM_UP_S = 720.0  # measured: some seventy lives end in that time
-RELINKED_FDS = 3  # measured: a link that was lost and regained keeps three descriptors more, once
+LOOKED_AT_S = 20.0  # measured: worker threads of a link end some ten seconds after the load that began them
 LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
 
 
@@ -39,10 +40,9 @@ def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
         end_each_once(breaking, expected)
         judgement = Judgement(expected, [])
         strike(breaking, judgement, rng, victims, WARM_UP_S)
-        settle(breaking, judgement)
-        before = usage(breaking.mission, breaking.watch.looks[-1])
+        before = relinked_usage(breaking, judgement)
         faults = strike(breaking, judgement, rng, victims, minutes * 60)
-        settle(breaking, judgement)
+        after = relinked_usage(breaking, judgement)
         began_s, mission = expected.before.at_s, breaking.mission
         look = breaking.watch.looks[-1]
         end = {
@@ -52,8 +52,7 @@ def soak(minutes: float, seed: int, victims: Sequence[str]) -> None:
             "unsaid_s": rounded(judgement.unsaid_s),
             "gap_s": rounded(longest_gap_s(breaking.watch.pictures_s, began_s, time.monotonic())),
         }
-        breaking.mission.detach_console()
-        after = usage(mission, look)
+        mission.detach_console()
         for name in sorted(before):
             report("recovery_soak_usage", **compared(name, before[name], after.get(name, {})))
         report("recovery_soak", faults=faults, minutes=minutes, seed=seed, **end, **breaking.end())
@@ -120,6 +119,23 @@ def settle(breaking: Breaker, judgement: Judgement) -> None:
             return
 
 
+def relinked_usage(breaking: Breaker, judgement: Judgement) -> dict[str, dict[str, float]]:
+    """Return the least that each process uses for a while after all have lost their link once more and are whole."""
+    settle(breaking, judgement)
+    fault = breaking.fault("nameserver", "SIGKILL")
+    breaking.strike([fault])
+    judgement.faults = [*judgement.faults, fault]
+    settle(breaking, judgement)
+    least: dict[str, dict[str, float]] = {}
+    ends_s = time.monotonic() + LOOKED_AT_S
+    while time.monotonic() < ends_s:
+        wait(breaking, judgement, time.monotonic() + 1.0)
+        for name, now in usage(breaking.mission, breaking.watch.looks[-1]).items():
+            known = least.setdefault(name, now)
+            least[name] = {kind: min(known[kind], value) for kind, value in now.items()}
+    return least
+
+
 def usage(mission: BenchMission, look: Look) -> dict[str, dict[str, float]]:
     """Return what each process uses, and how long its log is, by the name of a component in it."""
     logs, found, seen = mission.logs(), dict[str, dict[str, float]](), set[int]()
@@ -155,7 +171,6 @@ def compared(name: str, before: dict[str, float], after: dict[str, float]) -> di
     """
     both = {kind: [before[kind], after.get(kind)] for kind in before}
     most = {kind: was * (1 + GROWTH) for kind, was in before.items()} | {"log_kb": LOG_KB}
-    most["fds"] = max(most["fds"], before["fds"] + RELINKED_FDS)
     most["threads"] = max(most["threads"], before["threads"] + FEW_THREADS)
     grown = [kind for kind, (_, now) in both.items() if now is not None and now > most[kind]]
     return {"process": name, **both, "grown": grown}

@@ -43,7 +43,7 @@ def complete_robot(ctx: typer.Context) -> list[str]:
     rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
     if not rcs:
         return []
-    from ui_console.model.team import ROBOT_KIND
+    from ui_console.model.robot_board import ROBOT_KIND
 
     return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
 

@@ -87,16 +87,10 @@ class MissionPicture:
         match said:
             case Schedule():
                 self.schedule = said
-            case StoryEvent():
-                self.log.add(said)
-            case OperatorActed():
-                self.log.add(said.event(source))
-            case Log():
-                self.log.recall(said.events)
-            case PeopleKnown():
-                self.people.remember(said.consoles)
             case ComponentState():
                 self._meet(said)
+            case StoryEvent() | OperatorActed() | Log() | PeopleKnown():
+                self.log.take(said, source)
             case Components():
                 for one in self.changes(said):
                     self.take(one)
@@ -157,23 +151,14 @@ class MissionPicture:
 
     def to_json(self) -> dict[str, Any]:
         """Return the whole picture as plain data."""
+        shown = ("type", "host", "pid", "state", "since_s", "feedback", "requester")
         components = [
-            {
-                "name": component_of(c.address),
-                "subsystem": c.address.partition("/")[0],
-                "type": c.type,
-                "host": c.host,
-                "pid": c.pid,
-                "state": str(c.state),
-                "since_s": c.since_s,
-                "restarts": self.restarts(c),
-                "feedback": c.feedback,
-                "requester": c.requester,
-                "person": c.user,
-            }
-            for _, c in sorted(self.components.items())
+            {"name": component_of(at), "subsystem": at.partition("/")[0], "person": one.user}
+            | {field: getattr(one, field) for field in shown}
+            | {"restarts": self.restarts(one)}
+            for at, one in sorted(self.components.items())
         ]
-        schedule = plain(self.schedule) if self.schedule else {"rcs": [], "requests": [], "groups": []}
+        schedule = self.schedule or Schedule(self.at_s, [], [], [])
         return {
             "mission": self.mission,
             "at_s": self.at_s,
@@ -181,9 +166,9 @@ class MissionPicture:
             "stale_since_s": self.stale_since_s,
             "stops": [{"name": name, **plain(stop)} for name, stop in self.stops.items()],
             "components": components,
-            "rcs": schedule["rcs"],
-            "requests": schedule["requests"],
-            "groups": schedule["groups"],
+            "rcs": plain(schedule.rcs),
+            "requests": plain(schedule.requests),
+            "groups": schedule.groups,
             "problems": list(self.problems),
         }
 

@@ -6,7 +6,7 @@ Imported by the command line only.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from rich.console import Group, RenderableType
 from rich.panel import Panel
@@ -35,6 +35,7 @@ _TROUBLES_SHARE = 4  # chosen: a quarter of the terminal; the rest still shows c
 _FRAME_LINES = 2  # a panel's upper and lower edge
 _EVENTS_MOST = 12  # chosen: more than a glance takes in would push components off the picture
 _EVENTS_LEAST = 3
+_NUMBERS = ("pid", "restarts")
 _NEXT_MOST = 3  # chosen: who comes after these is seen in the schedule
 
 
@@ -176,54 +177,53 @@ def screen(picture: MissionPicture) -> RenderableType:
         line.no_wrap = False
     parts: list[RenderableType] = [_head(picture), *troubles]
     if picture.components:
-        parts.append(components_table(picture))
+        parts.append(_components_table(picture))
     if (schedule := picture.people.named_all(picture.schedule)) is not None:
-        parts += [rcs_table(schedule), requests_table(schedule, picture.at_s)]
+        parts += [_rcs_table(schedule), _requests_table(schedule, picture.at_s)]
     return Group(*parts)
 
 
-def components_table(picture: MissionPicture) -> Table:
-    """Return every component under its subsystem."""
-    table = Table(title="components", title_justify="left", expand=False)
-    for column in ("subsystem", "component", "type", "host", "pid", "state", "restarts", "doing"):
-        table.add_column(
-            column, justify="right" if column in ("pid", "restarts") else "left", no_wrap=column != "doing"
-        )
-    people = picture.people
-    for subsystem in Subsystem:
-        for number, c in enumerate(picture.of_subsystem(subsystem)):
-            first = str(subsystem) if number == 0 else ""
-            restarts = picture.restarts(c)
-            table.add_row(
-                first,
-                component_of(c.address),
-                c.type,
-                c.host,
-                str(c.pid),
-                str(c.state),
-                str(restarts or ""),
-                people.doing(c),
-            )
+def _table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> Table:
+    """Return a table whose last column alone goes on below."""
+    table = Table(title=title, title_justify="left")
+    for column in columns:
+        table.add_column(column, justify="right" if column in _NUMBERS else "left", no_wrap=column != columns[-1])
+    for row in rows:
+        table.add_row(*row)
     return table
 
 
-def rcs_table(schedule: Schedule) -> Table:
+def _components_table(picture: MissionPicture) -> Table:
+    """Return every component under its subsystem."""
+
+    def row(first: str, one: ComponentState) -> tuple[str, ...]:
+        restarts = str(picture.restarts(one) or "")
+        does = picture.people.doing(one)
+        return first, component_of(one.address), one.type, one.host, str(one.pid), str(one.state), restarts, does
+
+    rows = (
+        row(str(subsystem) if number == 0 else "", one)
+        for subsystem in Subsystem
+        for number, one in enumerate(picture.of_subsystem(subsystem))
+    )
+    return _table("components", ("subsystem", "component", "type", "host", "pid", "state", "restarts", "doing"), rows)
+
+
+def _rcs_table(schedule: Schedule) -> Table:
     """Return who holds what now and who is next."""
-    table = Table(title="resources", title_justify="left")
-    for column in ("RC", "kind", "state", "holder", "epoch", "since", "until", "next"):
-        table.add_column(column, no_wrap=column != "next")
-    for rc in schedule.rcs:
-        table.add_row(
-            rc.rc,
-            rc.kind,
-            rc.state,
-            ", ".join(holder.arc for holder in rc.holders) or "–",
+
+    def row(rc: RcView) -> tuple[str, ...]:
+        until = (f"{until_s:.1f} s" if until_s >= 0 else "being freed" for until_s in rc.until_s)
+        return (
+            *(rc.rc, rc.kind, rc.state, ", ".join(holder.arc for holder in rc.holders) or "–"),
             ", ".join(str(holder.epoch) for holder in rc.holders),
             ", ".join(f"{holder.since_s:.1f} s" for holder in rc.holders),
-            ", ".join(f"{until_s:.1f} s" if until_s >= 0 else "being freed" for until_s in rc.until_s),
+            ", ".join(until),
             ", ".join(_coming(rc)),
         )
-    return table
+
+    columns = ("RC", "kind", "state", "holder", "epoch", "since", "until", "next")
+    return _table("resources", columns, map(row, schedule.rcs))
 
 
 def _coming(rc: RcView) -> list[str]:
@@ -235,22 +235,15 @@ def _coming(rc: RcView) -> list[str]:
     return [*first, f"{len(rc.next) - len(first)} more"] if len(rc.next) > len(first) else first
 
 
-def requests_table(schedule: Schedule, now_s: float) -> Table:
+def _requests_table(schedule: Schedule, now_s: float) -> Table:
     """Return who runs and who waits, since when, until when, and why."""
-    table = Table(title="schedule", title_justify="left")
-    for column in ("ARC", "state", "for", "until / expected", "turns", "priority", "why"):
-        table.add_column(column, no_wrap=column != "why")
-    for request in schedule.requests:
-        table.add_row(
-            request.arc,
-            Text(str(request.state), style=_STATE_STYLE[request.state]),
-            f"{now_s - request.since_s:.1f} s",
-            _when(request, now_s),
-            str(request.turns),
-            request.priority + _risen(request),
-            _reason(request),
-        )
-    return table
+
+    def row(one: RequestView) -> tuple[str | Text, ...]:
+        state, lasts = Text(str(one.state), style=_STATE_STYLE[one.state]), f"{now_s - one.since_s:.1f} s"
+        return one.arc, state, lasts, _when(one, now_s), str(one.turns), one.priority + _risen(one), _reason(one)
+
+    columns = ("ARC", "state", "for", "until / expected", "turns", "priority", "why")
+    return _table("schedule", columns, (row(request) for request in schedule.requests))
 
 
 def _risen(request: RequestView) -> str:

@@ -156,7 +156,7 @@ class Stage:
                 await sleep_s(self.rng.uniform(0.0, 0.6))
                 self.begin(console.stop_robot("scout1"))
             case "lift":
-                stop = who.model.team.stop_of("scout1")
+                stop = who.model.team.robots.stop_of("scout1")
                 if stop is not None:
                     self.begin(console.lift_stop("scout1", stop.number))
             case "cut":

@@ -19,16 +19,8 @@ from ui_console.design.draft import Draft
 from ui_console.design.following import follower
 from ui_console.design.offers import Offer, offer_at
 from ui_console.design.properties import Property, properties
-from ui_console.design.protocol import (
-    Change,
-    MoveElement,
-    Redo,
-    RemoveElement,
-    SetProperty,
-    TakeOffer,
-    Undo,
-)
-from ui_console.design.views import offer_view, palette, places, problems_view, tree_view
+from ui_console.design.protocol import Change, MoveElement, Redo, RemoveElement, SetProperty, TakeOffer, Undo
+from ui_console.design.views import palette, places, problems_view, tree_view
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*\.xml")
 
@@ -120,11 +112,6 @@ def sections(draft: Draft, facts: Mapping[str, ClassFacts]) -> dict[str, bytes]:
         "places": places(),
     }
     return {name: msgspec.json.encode(view) for name, view in told.items()}
-
-
-def question(change: TakeOffer, offer: Offer) -> dict[str, object]:
-    """Return what a page has to ask before it takes an offer."""
-    return {"ask": msgspec.to_builtins(offer_view(offer)), "path": change.path}
 
 
 def _property(draft: Draft, change: SetProperty) -> Property:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable, Sequence
-from typing import Any, assert_never
+from typing import assert_never
 
 import msgspec
 
@@ -16,8 +16,17 @@ from backbone.errors import Refusal
 from backbone.mission.class_facts import ClassFacts, shipped_classes
 from backbone.mission.edit import Path, outline
 from backbone.mission.reader import MissionInvalid
+from ui_console.design.answers import (
+    AskAnswer,
+    DesignAnswer,
+    FileChangedAnswer,
+    NoticeAnswer,
+    RefusalAnswer,
+    SavedAnswer,
+    TextAnswer,
+)
 from ui_console.design.catalogue import entries
-from ui_console.design.changes import ChangedMeanwhile, MustAsk, changed, question, sections, sibling_file, touched_by
+from ui_console.design.changes import ChangedMeanwhile, MustAsk, changed, sections, sibling_file, touched_by
 from ui_console.design.commands import DesignRefused
 from ui_console.design.draft import Draft
 from ui_console.design.file import FileChanged, save
@@ -39,7 +48,14 @@ from ui_console.design.protocol import (
     TakeOffer,
     Undo,
 )
-from ui_console.design.views import RehearsalView, element_view, rehearsal_view
+from ui_console.design.views import (
+    DesignerWelcomed,
+    RehearsalView,
+    element_view,
+    offer_view,
+    rehearsal_view,
+    status_view,
+)
 from ui_console.web.door import Offence, Welcome
 from ui_console.web.outbox import Outbox
 
@@ -67,13 +83,13 @@ class Designer:
         self.handled = 0
         """How much that names a revision was done or refused; the page says one such thing at a time."""
 
-    def tell(self, name: str, view: Any) -> None:
+    def tell(self, name: str, view: object) -> None:
         """Have a section of the view told."""
         self.outbox.put_section(name, msgspec.json.encode(view))
         self.news.set()
 
-    def answer(self, **answer: Any) -> None:
-        """Have an answer told."""
+    def answer(self, answer: DesignAnswer) -> None:
+        """Have an answer sent."""
         self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
         self.news.set()
 
@@ -106,7 +122,7 @@ class DesignRoom:
         """Return a new designer, who is told everything there is."""
         guest = Designer(welcome)
         self.guests[guest] = None
-        guest.tell("welcome", {"user": welcome.user})
+        guest.tell("welcome", DesignerWelcomed(welcome.user))
         if self._told:
             self._tell(guest)
         self._tell_people()
@@ -125,7 +141,7 @@ class DesignRoom:
         """Have the designers know of a visitor that did what it must not."""
         log.warning("%s %s", who, offence.line)
         for guest in self.guests:
-            guest.answer(notice=f"{who} {offence.line}", remedy=offence.remedy)
+            guest.answer(NoticeAnswer(f"{who} {offence.line}", offence.remedy))
 
     # ------------------------------------------------------------------ what pages ask for
     async def obey(self, guest: Designer, intent: DesignIntent) -> None:
@@ -136,13 +152,13 @@ class DesignRoom:
                 await self._do(guest, intent)
         except MustAsk as must:
             if isinstance(intent, TakeOffer):
-                guest.answer(**question(intent, must.offer))
+                guest.answer(AskAnswer(offer_view(must.offer), intent.path))
         except FileChanged as refusal:
-            guest.answer(file_changed=refusal.detail, name=intent.name if isinstance(intent, SaveFile) else "")
+            guest.answer(FileChangedAnswer(refusal.detail, intent.name if isinstance(intent, SaveFile) else ""))
         except MissionInvalid as invalid:
-            guest.answer(refused=str(invalid.faults[0]), remedy="Mend the file, or save over it.", is_change=is_change)
+            guest.answer(RefusalAnswer(str(invalid.faults[0]), "Mend the file, or save over it.", is_change))
         except Refusal as refusal:
-            guest.answer(refused=refusal.detail, remedy=refusal.remedy, is_change=is_change)
+            guest.answer(RefusalAnswer(refusal.detail, refusal.remedy, is_change))
         if is_change:
             guest.handled += 1
             guest.tell("handled", guest.handled)
@@ -166,11 +182,8 @@ class DesignRoom:
             case LookUp(type=name):
                 await self._learn_type(name)
             case ReadText():
-                guest.answer(
-                    text=self.draft.text.decode("utf-8-sig"),
-                    line=self.draft.mission.at(guest.at).line,
-                    source=self.draft.source,
-                )
+                text, line = self.draft.text.decode("utf-8-sig"), self.draft.mission.at(guest.at).line
+                guest.answer(TextAnswer(text, line, self.draft.source))
             case _:
                 assert_never(intent)
 
@@ -191,7 +204,7 @@ class DesignRoom:
             self._kept = DraftFile(kept.source)
         await self._show(kept, guest.welcome.user)
         await self._keep(kept)
-        guest.answer(saved=kept.source, problems=len(kept.problems))
+        guest.answer(SavedAnswer(kept.source, len(kept.problems)))
 
     def _must_be(self, revision: int) -> None:
         if revision != self.revision:
@@ -238,7 +251,7 @@ class DesignRoom:
         except DraftNotKept as refusal:
             log.warning("%s", refusal)
             for guest in self.guests:
-                guest.answer(notice=refusal.detail, remedy=refusal.remedy)
+                guest.answer(NoticeAnswer(refusal.detail, refusal.remedy))
 
     async def _learn(self, class_paths: Sequence[str]) -> None:
         await self._known(await self._look_up(class_paths))
@@ -281,20 +294,9 @@ class DesignRoom:
             guest.tell("rehearsal", self._rehearsal[1])
 
     def _tell(self, guest: Designer) -> None:
-        draft = self.draft
         for name, body in self._told.items():
             guest.outbox.put_section(name, body)
-        status = {
-            "source": draft.source,
-            "revision": self.revision,
-            "is_changed": draft.is_changed,
-            "is_new": draft.saved is None,
-            "problems": len(draft.problems),
-            "can_undo": bool(draft.past),
-            "can_redo": bool(draft.future),
-            "changed_by": self._changed_by,
-        }
-        guest.tell("status", status)
+        guest.tell("status", status_view(self.draft, self.revision, self._changed_by))
         self._tell_element(guest)
 
     def _tell_element(self, guest: Designer) -> None:

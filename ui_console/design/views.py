@@ -25,6 +25,36 @@ GROUPS = {Role.BEHAVIOR: "behaviors", Role.ARC: "ARCs", Role.RESOURCE: "resource
 WISHES, ROOM = "wishes", "the room"
 
 
+class DesignerWelcomed(msgspec.Struct, frozen=True):
+    """Who came in."""
+
+    user: str
+
+
+class DraftStatus(msgspec.Struct, frozen=True):
+    """How the draft is.
+
+    Attributes:
+        source: The mission file.
+        revision: Counts changes; a change names the one it was meant for.
+        is_changed: Whether the file holds something else.
+        is_new: Whether there is no such file yet.
+        problems: How many ``scout-backbone check`` would find.
+        can_undo: Whether there is a change to take back.
+        can_redo: Whether there is one that was taken back.
+        changed_by: Who changed it last; empty: nobody yet.
+    """
+
+    source: str
+    revision: int
+    is_changed: bool
+    is_new: bool
+    problems: int
+    can_undo: bool
+    can_redo: bool
+    changed_by: str
+
+
 class ElementRow(msgspec.Struct, frozen=True):
     """One element of the tree.
 
@@ -173,6 +203,26 @@ class RehearsalView(msgspec.Struct, frozen=True):
     rows: tuple[RehearsalRow, ...]
     told: tuple[str, ...]
     never: tuple[str, ...]
+
+
+def status_view(draft: Draft, revision: int, changed_by: str) -> DraftStatus:
+    """Return how a draft is.
+
+    Args:
+        draft: The draft.
+        revision: How often it was changed.
+        changed_by: Who changed it last.
+    """
+    return DraftStatus(
+        draft.source,
+        revision,
+        draft.is_changed,
+        is_new=draft.saved is None,
+        problems=len(draft.problems),
+        can_undo=bool(draft.past),
+        can_redo=bool(draft.future),
+        changed_by=changed_by,
+    )
 
 
 def tree_view(draft: Draft) -> list[ElementRow]:

@@ -17,42 +17,13 @@ from backbone.component.messages import StoryEvent
 from backbone.naming import Subsystem, component_of
 from backbone.picture.words import UNDECIDED, WANTED, why_lost
 from backbone.scheduling.views import Why
-from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
+from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop, Suspended
+from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
 from ui_console.model.consent import Settled, Sought, Topic
-from ui_console.model.events import (
-    Asked,
-    Attention,
-    CommandApplied,
-    CommandRefused,
-    ConsentAsked,
-    ConsentHeard,
-    ConsoleEvent,
-    GivenBack,
-    Granted,
-    Heard,
-    LetGoNeeded,
-    LinkHeard,
-    LinkTrouble,
-    Lost,
-    MomentBegan,
-    OwnEvent,
-    PictureSeen,
-)
 from ui_console.model.lifting import question_line
-from ui_console.model.team import ROBOT_KIND, TeamModel
-from ui_console.model.views import (
-    NONE_S,
-    AlarmKind,
-    AlarmView,
-    ConsentView,
-    ConsoleView,
-    LinkView,
-    LostView,
-    OwnView,
-    RobotView,
-    VideoView,
-)
+from ui_console.model.robot_board import ROBOT_KIND
+from ui_console.model.team import TeamModel
 
 STALE_S = 1.0  # chosen: at a walk of 0.3 m/s a Scout is three of its lengths on
 SILENT_S = 3.0  # chosen: a picture is expected this long after the grant: frequencies settle, drivers open
@@ -86,34 +57,36 @@ class ConsoleModel:
         self.team = team or TeamModel()
         self.robot = ""
         """Robot asked for or held; empty: any, or none."""
-        self.held: Granted | None = None
-        self.lost: Lost | None = None
-        self.asked: Asked | None = None
+        self.held: events.Granted | None = None
+        self.lost: Suspended | None = None
+        self.asked: events.Asked | None = None
         self.why: Why | None = None
-        self.applied: CommandApplied | None = None
+        self.applied: events.CommandApplied | None = None
         self.sees = sees
         """Whether pictures are to come while a robot is held; settable: a page may show others meanwhile."""
         self._address = f"{Subsystem.UI_CONSOLE}/{name}"
-        self._pictures: dict[str, deque[PictureSeen]] = {}
+        self._pictures: dict[str, deque[events.PictureSeen]] = {}
         self._sought: dict[tuple[str, Topic], Sought] = {}
         self.moment = 0
         """Grows whenever presses from before count no more."""
         self._must_let_go = False
-        self._went: LostView | None = None
-        self._asked_whom: ConsentAsked | None = None
-        self._heard: list[ConsentHeard] = []
+        self._went: views.LostView | None = None
+        self._asked_whom: events.ConsentAsked | None = None
+        self._heard: list[events.ConsentHeard] = []
         self._refused = ""  # why the last claim was refused, if it was
         self._blind = ""  # robot that is held without pictures to drive by
         self.alarms = alarms or AlarmBook(beside=self.team.alarms)
         """What concerns this console alone."""
 
     # ------------------------------------------------------------------ events in
-    def apply(self, event: ConsoleEvent) -> None:
+    def apply(self, event: events.ConsoleEvent) -> None:
         """Take the event in; what concerns the whole mission goes to ``team``."""
         match event:
-            case Heard(body=Why() as why):
+            case events.Heard(body=Why() as why):
                 self.why = why
-            case Heard() | LinkHeard():
+            case events.Heard(body=Suspended() as lost):
+                self._take_loss(lost, event.at_s)
+            case events.Heard() | events.LinkHeard():
                 self.team.apply(event)
             case _:
                 self._apply_own(event)
@@ -125,13 +98,13 @@ class ConsoleModel:
         stale = self._stale_line(now_s)
         blind = self.robot if stale else ""
         if self._blind not in ("", blind):
-            self.alarms.end(AlarmKind.STALE_VIDEO, self._blind, now_s)
+            self.alarms.end(views.AlarmKind.STALE_VIDEO, self._blind, now_s)
         self._blind = blind
         if blind:
             remedy = "Stop; do not drive by an old picture."
-            self.alarms.begin(AlarmKind.STALE_VIDEO, blind, stale, now_s, remedy)
+            self.alarms.begin(views.AlarmKind.STALE_VIDEO, blind, stale, now_s, remedy)
 
-    def alarm_views(self) -> list[AlarmView]:
+    def alarm_views(self) -> list[views.AlarmView]:
         """Return what this console's operator must know; right after ``look``."""
         return self.team.alarm_views(self.alarms)
 
@@ -151,11 +124,11 @@ class ConsoleModel:
         self._went = None
 
     # ------------------------------------------------------------------ views out
-    def view(self, now_s: float) -> ConsoleView:
+    def view(self, now_s: float) -> views.ConsoleView:
         """Return all that there is to show."""
         self.look(now_s)
         team = self.team
-        return ConsoleView(
+        return views.ConsoleView(
             mission=team.picture.mission,
             now_s=now_s,
             own=self.own(now_s),
@@ -164,7 +137,7 @@ class ConsoleModel:
             requests=team.requests(),
             timeline=team.timeline(now_s),
             alarms=self.alarm_views(),
-            hosts=team.hosts(now_s),
+            hosts=team.links.hosts(now_s),
             links=self.links(now_s),
             videos=self.videos(now_s),
             parameters=team.parameters(),
@@ -173,11 +146,11 @@ class ConsoleModel:
             health=team.health(now_s),
         )
 
-    def own(self, now_s: float) -> OwnView:
+    def own(self, now_s: float) -> views.OwnView:
         """Return what this console wants and has."""
         held = self.held
-        link_down_s = self.team.link_down_s(now_s)
-        return OwnView(
+        link_down_s = self.team.links.down_s(now_s)
+        return views.OwnView(
             console=self.name,
             user=self.user,
             robot=self.robot,
@@ -185,10 +158,10 @@ class ConsoleModel:
             is_asked=self.asked is not None,
             status=self.status_line(now_s),
             epoch=max(held.epochs.values(), default=0) if held is not None else 0,
-            until_s=held.until_s if held is not None else NONE_S,
+            until_s=held.until_s if held is not None else views.NONE_S,
             taken_because=self._why_lost(self.lost) if self.lost is not None else "",
             applied=_applied_line(self.applied),
-            stop=self.team.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
+            stop=self.team.robots.stop_view(self.robot, now_s, self.user, self._address) if held is not None else None,
             away_since_s=self.team.alarms.away_since_s,
             consent=self.consent(now_s),
             asked=self.asked_line(now_s),
@@ -204,12 +177,12 @@ class ConsoleModel:
         own = [screen for screen in self.team.screens_of(self.user) if component_of(screen.address) != self.name]
         return [f"your other screen on {screen.host} {screen.feedback or 'watches'}" for screen in own]
 
-    def consent(self, now_s: float) -> ConsentView | None:
+    def consent(self, now_s: float) -> views.ConsentView | None:
         """Return what this operator is to decide first; None: nobody asks."""
         if not self._sought:
             return None
         first, *others = self._sought.values()
-        return ConsentView(
+        return views.ConsentView(
             user=first.user,
             robot=first.robot,
             why=first.why,
@@ -233,7 +206,7 @@ class ConsoleModel:
             said.append(f"asked {whom} for {what}: {left_s:.0f} s left")
         return "; ".join(said)
 
-    def robots(self, now_s: float) -> list[RobotView]:
+    def robots(self, now_s: float) -> list[views.RobotView]:
         """Return one row for each robot, sorted by name; this console's own and its pictures are marked."""
         videos = {video.robot: video for video in self.videos(now_s)}
         mine = self.robot if self._is_held(now_s) else ""
@@ -242,21 +215,21 @@ class ConsoleModel:
                 row,
                 is_mine=row.robot == mine,
                 video=videos.get(row.robot),
-                stop=self.team.stop_view(row.robot, now_s, self.user, self._address),
+                stop=self.team.robots.stop_view(row.robot, now_s, self.user, self._address),
             )
-            for row in self.team.robots(now_s)
+            for row in self.team.robots.views(now_s)
         ]
 
-    def videos(self, now_s: float) -> list[VideoView]:
+    def videos(self, now_s: float) -> list[views.VideoView]:
         """Return how the pictures arrive, by robot; of a robot that was given back there are none."""
         return [_video(robot, seen, now_s) for robot, seen in sorted(self._pictures.items())]
 
-    def links(self, now_s: float) -> list[LinkView]:
+    def links(self, now_s: float) -> list[views.LinkView]:
         """Return the ways messages go; commands of this console among them."""
-        links = self.team.links(now_s)
+        links = self.team.links.views(now_s)
         if self.applied is not None and self.applied.took_s >= 0:
             line = f"{self.applied.command} was applied {max(0.0, now_s - self.applied.at_s):.1f} s ago"
-            links.insert(1, LinkView(f"commands to {self.applied.rc}", True, self.applied.took_s, line))
+            links.insert(1, views.LinkView(f"commands to {self.applied.rc}", True, self.applied.took_s, line))
         return links
 
     def log(self, count: int = LOG_SHOWN) -> list[StoryEvent]:
@@ -265,12 +238,12 @@ class ConsoleModel:
 
     def status_line(self, now_s: float) -> str:
         """Return in one line whether this console has its robot, and if not, why."""
-        down_s = self.team.link_down_s(now_s)
+        down_s = self.team.links.down_s(now_s)
         if down_s >= 0:
             mine = f"; {self.robot} is given back there by itself" if self.held is not None else ""
             return f"NO LINK to the mission for {now_s - down_s:.0f} s: nothing can be stopped from here{mine}"
         if self.held is not None:
-            stop = self.team.stop_of(self.robot)
+            stop = self.team.robots.stop_of(self.robot)
             if stop is not None:
                 return f"{self.robot} is STOPPED by {stop.by}{f': {stop.reason}' if stop.reason else ''}"
             slice_end = _slice_end(self.held.until_s, now_s)
@@ -290,69 +263,70 @@ class ConsoleModel:
         return f"waiting for {wanted}"
 
     # ------------------------------------------------------------------ within
-    def _apply_own(self, event: OwnEvent) -> None:
+    def _apply_own(self, event: events.OwnEvent) -> None:
         alarms = self.alarms
         match event:
-            case ConsentAsked():
+            case events.ConsentAsked():
                 self._asked_whom, self._heard = event, []
-            case ConsentHeard():
+            case events.ConsentHeard():
                 self._heard.append(event)
             case Sought(asker=asker, topic=topic):
                 self._sought[asker, topic] = event
             case Settled(sought=sought):
                 self._sought.pop((sought.asker, sought.topic), None)
-            case LetGoNeeded(is_needed=is_needed):
+            case events.LetGoNeeded(is_needed=is_needed):
                 self._must_let_go = is_needed
-            case MomentBegan():
+            case events.MomentBegan():
                 self.moment += 1
-            case Asked(robot=robot):
+            case events.Asked(robot=robot):
                 self._asked_whom = self._went = None
                 self._refused = ""
                 self.asked, self.robot, self.held, self.lost, self.why = event, robot, None, None, None
-            case Granted(rcs=rcs):
+            case events.Granted(rcs=rcs):
                 self.held, self.lost, self.why, self._asked_whom = event, None, None, None
-                alarms.mended((AlarmKind.TAKEN, AlarmKind.REFUSED, AlarmKind.NO_ANSWER))
+                alarms.mended((views.AlarmKind.TAKEN, views.AlarmKind.REFUSED, views.AlarmKind.NO_ANSWER))
                 self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
-            case Lost(at_s=at_s):
-                self.held, self.lost = None, event
-                if event.reason in UNDECIDED:
-                    self._went = LostView(self.robot, "the link to it was away for too long", at_s, False)
-                self._pictures.clear()
-                if event.reason != WANTED:
-                    line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
-                    alarms.happened(AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
-            case CommandApplied():
+            case events.CommandApplied():
                 self.applied = event
-                alarms.mended((AlarmKind.NO_ANSWER,))
-            case CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy, ends_claim=ends_claim):
+                alarms.mended((views.AlarmKind.NO_ANSWER,))
+            case events.CommandRefused(at_s=at_s, code=code, detail=detail, remedy=remedy, ends_claim=ends_claim):
                 if ends_claim:
                     self.asked, self._refused = None, detail
                 if code not in (EmergencyStopped.code, GivenBeforeStop.code):  # these are told in other words
                     alarms.happened(
-                        AlarmKind.REFUSED, self.robot, f"refused: {detail}", at_s, remedy, f"refused:{code}"
+                        views.AlarmKind.REFUSED, self.robot, f"refused: {detail}", at_s, remedy, f"refused:{code}"
                     )
-            case LinkTrouble(at_s=at_s, detail=detail):
-                alarms.happened(AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
-            case GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
-                self._went = None if wanted else LostView(self.robot, reason, at_s, False)
+            case events.LinkTrouble(at_s=at_s, detail=detail):
+                alarms.happened(views.AlarmKind.NO_ANSWER, self.robot, f"no answer: {detail}", at_s)
+            case events.GivenBack(at_s=at_s, reason=reason, confirmed=confirmed, wanted=wanted):
+                self._went = None if wanted else views.LostView(self.robot, reason, at_s, False)
                 self.held = self.asked = self.lost = self.why = self.applied = self._asked_whom = None
                 self._pictures.clear()
                 if not confirmed:
                     line = f"{self.robot} was given back, but nobody confirmed it"
-                    alarms.happened(AlarmKind.NO_ANSWER, self.robot, line, at_s, key="given_back")
-            case PictureSeen(robot=robot, at_s=at_s):
+                    alarms.happened(views.AlarmKind.NO_ANSWER, self.robot, line, at_s, key="given_back")
+            case events.PictureSeen(robot=robot, at_s=at_s):
                 seen = self._pictures.setdefault(robot, deque())
                 seen.append(event)
                 while at_s - seen[0].at_s > RATE_OVER_S:
                     seen.popleft()
-            case Attention(at_s=at_s, is_there=is_there):
+            case events.Attention(at_s=at_s, is_there=is_there):
                 self.team.alarms.attention(is_there, at_s)
 
-    def _why_lost(self, lost: Lost) -> str:
+    def _take_loss(self, lost: Suspended, at_s: float) -> None:
+        self.held, self.lost = None, lost
+        if lost.reason in UNDECIDED:
+            self._went = views.LostView(self.robot, "the link to it was away for too long", at_s, False)
+        self._pictures.clear()
+        if lost.reason != WANTED:
+            line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(lost)}"
+            self.alarms.happened(views.AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
+
+    def _why_lost(self, lost: Suspended) -> str:
         return why_lost(lost.reason, self.team.person(lost.by))
 
-    def _answer_line(self, heard: ConsentHeard) -> str:
+    def _answer_line(self, heard: events.ConsentHeard) -> str:
         who, reason = self.team.person(heard.user), f": {self.team.people.named(heard.reason)}" if heard.reason else ""
         if heard.topic is Topic.LIFT:
             what = f"lets {heard.robot} move" if heard.is_given else f"keeps {heard.robot} stopped"
@@ -361,13 +335,13 @@ class ConsoleModel:
 
     def _is_held(self, now_s: float) -> bool:
         """Return whether keys move a robot, as far as can be known now."""
-        return self.held is not None and self.team.link_down_s(now_s) < 0
+        return self.held is not None and self.team.links.down_s(now_s) < 0
 
-    def _lost_view(self, now_s: float) -> LostView | None:
+    def _lost_view(self, now_s: float) -> views.LostView | None:
         went = self._went
         if went is None:
             return None
-        is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots(now_s))
+        is_up = any(row.robot == went.robot and row.is_up for row in self.team.robots.views(now_s))
         return msgspec.structs.replace(went, may_retake=is_up and self.asked is None)
 
     def _stale_line(self, now_s: float) -> str:
@@ -382,12 +356,12 @@ class ConsoleModel:
         return f"the picture of {self.robot} is {age_s:.1f} s old" if age_s > STALE_S else ""
 
 
-def _video(robot: str, seen: deque[PictureSeen], now_s: float) -> VideoView:
+def _video(robot: str, seen: deque[events.PictureSeen], now_s: float) -> views.VideoView:
     newest = seen[-1]
     age_s = max(0.0, now_s - newest.captured_s)
     span_s = newest.at_s - seen[0].at_s
     rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
-    return VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
+    return views.VideoView(robot, age_s, rate_hz, max(0.0, newest.at_s - newest.captured_s), age_s > STALE_S)
 
 
 def _slice_end(until_s: float, now_s: float) -> str:
@@ -404,7 +378,7 @@ def _question_line(sought: Sought) -> str:
     return f"{sought.user} asks for {sought.robot}{f': {sought.why}' if sought.why else ''}"
 
 
-def _applied_line(applied: CommandApplied | None) -> str:
+def _applied_line(applied: events.CommandApplied | None) -> str:
     if applied is None:
         return ""
     values = " ".join(f"{value:+.1f}" for value in applied.values.values())

@@ -12,15 +12,9 @@ from typing import Any
 
 import msgspec
 
-from backbone.component.messages import (
-    ComponentState,
-    MissionTime,
-    Parameters,
-    SetParameter,
-    Statistics,
-    StoryEvent,
-)
+from backbone.component.messages import ComponentState, MissionTime, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log import Log, PeopleKnown
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.operators import OperatorActed
@@ -29,27 +23,32 @@ from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import StopState, Suspended
 from ui_console.model.consent import Settled, Sought, Topic
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something happened at this mission time."""
+
+    at_s: float
 
 
 # ---------------------------------------------------------------------- of its own robot
 @dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(Event):
     """A robot was asked for."""
 
-    at_s: float
     robot: str
     kind: str
     priority: int
 
 
 @dataclass(frozen=True, slots=True)
-class Granted:
+class Granted(Event):
     """The RCs are held; told again, with ``again``, after each suspension.
 
     Attributes:
-        at_s: Mission time.
         rcs: Kind → name of what is held.
         epochs: RC → epoch.
         until_s: The slice lasts at least until then.
@@ -57,7 +56,6 @@ class Granted:
         again: True if it was held before.
     """
 
-    at_s: float
     rcs: Mapping[str, str]
     epochs: Mapping[str, int]
     until_s: float
@@ -71,28 +69,10 @@ class Granted:
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
-    """The RCs went to somebody else.
-
-    Attributes:
-        at_s: Mission time.
-        reason: Why.
-        by: Because of whom.
-        expected_start_s: Next expected slot; negative: unknown.
-    """
-
-    at_s: float
-    reason: str
-    by: str
-    expected_start_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class CommandApplied:
+class CommandApplied(Event):
     """A robot did what it was told, perhaps clipped.
 
     Attributes:
-        at_s: When it was applied.
         rc: The robot.
         epoch: Of the grant.
         command: ``drive``, ``halt`` or ``jump``.
@@ -100,7 +80,6 @@ class CommandApplied:
         took_s: From the wish to the answer, seconds of the machine; negative: not measured.
     """
 
-    at_s: float
     rc: str
     epoch: int
     command: str
@@ -109,10 +88,9 @@ class CommandApplied:
 
 
 @dataclass(frozen=True, slots=True)
-class CommandRefused:
+class CommandRefused(Event):
     """Somebody said no; with ``ends_claim`` to the claim itself, so that nothing is waited for any more."""
 
-    at_s: float
     code: str
     detail: str
     remedy: str
@@ -120,92 +98,86 @@ class CommandRefused:
 
 
 @dataclass(frozen=True, slots=True)
-class LinkTrouble:
+class LinkTrouble(Event):
     """A peer did not answer: what was asked may or may not have happened.
 
     Attributes:
-        at_s: When.
         detail: What was not answered, for people.
         command: The command of this console's hands that was not answered; empty: something else.
     """
 
-    at_s: float
     detail: str
     command: str = ""
 
 
+def failed(at_s: float, error: Refusal | LinkError) -> CommandRefused | LinkTrouble:
+    """Return that something was refused, or not answered."""
+    if isinstance(error, Refusal):
+        return CommandRefused(at_s, code_of(error), error.detail, error.remedy)
+    return LinkTrouble(at_s, str(error))
+
+
 @dataclass(frozen=True, slots=True)
-class GivenBack:
+class GivenBack(Event):
     """The robot was given back.
 
     Attributes:
-        at_s: When.
         reason: Why.
         confirmed: False if nobody confirmed it.
         wanted: False if the operator did not ask for it: a robot that is lost.
     """
 
-    at_s: float
     reason: str
     confirmed: bool
     wanted: bool = True
 
 
 @dataclass(frozen=True, slots=True)
-class LetGoNeeded:
+class LetGoNeeded(Event):
     """A control that is held moves nothing before it is let go, or no longer so.
 
     Attributes:
-        at_s: When.
         is_needed: True: let go, then press anew.
     """
 
-    at_s: float
     is_needed: bool
 
 
 @dataclass(frozen=True, slots=True)
-class MomentBegan:
+class MomentBegan(Event):
     """A stop, a lift, a grant, a loss, or a broken link: what was pressed before it moves nothing any more."""
-
-    at_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class PictureSeen:
+class PictureSeen(Event):
     """A picture arrived."""
 
-    at_s: float
     captured_s: float
     robot: str
 
 
 @dataclass(frozen=True, slots=True)
-class Attention:
+class Attention(Event):
     """The operator touched the console, or turned away from it.
 
     Attributes:
-        at_s: When.
         is_there: False: nobody is at the console.
     """
 
-    at_s: float
     is_there: bool
 
 
 @dataclass(frozen=True, slots=True)
-class ConsentAsked:
+class ConsentAsked(Event):
     """This console asked whether it may have what others hold, or lift what others stopped.
 
     Attributes:
-        at_s: When.
         robot: What it is about.
         of: Names of those who were asked.
         until_s: Silence is a no from then on.
         topic: What was asked for.
     """
 
-    at_s: float
     robot: str
     of: Sequence[str]
     until_s: float
@@ -213,11 +185,10 @@ class ConsentAsked:
 
 
 @dataclass(frozen=True, slots=True)
-class ConsentHeard:
+class ConsentHeard(Event):
     """Somebody who was asked decided, or did not in time.
 
     Attributes:
-        at_s: When.
         robot: What it was about.
         user: Who decided.
         is_given: True: it is being given back, or may move.
@@ -225,7 +196,6 @@ class ConsentHeard:
         topic: What was asked for.
     """
 
-    at_s: float
     robot: str
     user: str
     is_given: bool
@@ -252,38 +222,35 @@ Said = (
     | MissionHealth
     | Parameters
     | SetParameter
+    | Suspended
     | Why
 )
 """What components publish or answer, as it came over the bus."""
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Heard(Event):
     """A message arrived.
 
     Attributes:
-        at_s: When.
         body: The message.
         source: Address of the component that said it, where the message does not say of whom it speaks.
     """
 
-    at_s: float
     body: Said
     source: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class LinkHeard:
+class LinkHeard(Event):
     """This console's link to the hub came or went, or was measured.
 
     Attributes:
-        at_s: When.
         is_up: Whether messages pass.
         latency_s: There and back, seconds of the machine; negative: not measured now.
         until_s: The link counts as down if nothing more was heard of it by then.
     """
 
-    at_s: float
     is_up: bool
     latency_s: float = -1.0
     until_s: float = math.inf
@@ -292,7 +259,6 @@ class LinkHeard:
 OwnEvent = (
     Asked
     | Granted
-    | Lost
     | CommandApplied
     | CommandRefused
     | LinkTrouble
@@ -310,7 +276,7 @@ TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
 _WORDS: dict[type[Any], str] = {
-    Lost: "suspended",
+    Suspended: "suspended",
     CommandApplied: "applied",
     CommandRefused: "refused",
     LinkTrouble: "no_answer",
@@ -338,11 +304,16 @@ _WORDS: dict[type[Any], str] = {
 }
 
 
+def said(event: ConsoleEvent) -> ConsoleEvent | Said:
+    """Return the message that was heard; any other event as it is."""
+    return event.body if isinstance(event, Heard) else event
+
+
 def event_word(event: ConsoleEvent) -> str:
     """Return the word of an event in JSON output: ``granted``, ``suspended``, ``resumed`` and so on."""
     if isinstance(event, Granted):
         return "resumed" if event.again else "granted"
-    kind = type(event.body if isinstance(event, Heard) else event)
+    kind = type(said(event))
     return _WORDS.get(kind, kind.__name__.lower())
 
 
@@ -358,13 +329,13 @@ def event_json(event: ConsoleEvent) -> bytes:
     match event:
         case Heard(body=Disappeared(address=address)):
             fields = {"at_s": event.at_s, "address": address}
+        case Heard(body=Suspended(reason=reason, by=by)):
+            fields = {"at_s": event.at_s, **fields["body"], "why": why_lost(reason, by)}
         case Heard():
             where = {"where": event.source} if event.source else {}
             fields = {"at_s": event.at_s, "act" if word == "operator" else word: fields["body"], **where}
         case Granted():
             fields["after_s"] = event.after_s
-        case Lost():
-            fields["why"] = why_lost(event.reason, event.by)
     return msgspec.json.encode({"event": word, **fields})
 
 
@@ -374,5 +345,4 @@ FOR_SCRIPTS = (Schedule, StoryEvent, OperatorActed, StopState, Disappeared, Proc
 
 def for_scripts(event: ConsoleEvent) -> list[bytes]:
     """Return the event as one line of JSON if it is one for programs that watch, else none."""
-    said = event.body if isinstance(event, Heard) else event
-    return [event_json(event)] if isinstance(said, FOR_SCRIPTS) else []
+    return [event_json(event)] if isinstance(said(event), FOR_SCRIPTS) else []

@@ -9,8 +9,7 @@ model calls before it shows it.
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import assert_never
 
 from msgspec.structs import replace
@@ -36,37 +35,21 @@ from backbone.picture.mission import LOG_KEPT, MissionPicture, is_older
 from backbone.picture.words import because
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
-from backbone.scheduling.views import RcView, RequestView, Schedule, Why
-from backbone.spoken import counted, value_text
-from resource_pool.arc_client import Stopper, StopState
+from backbone.scheduling.views import RequestView, Schedule, Why
+from backbone.spoken import value_text
+from resource_pool.arc_client import StopState, Suspended
 from ui_console.model.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.model.events import LinkHeard, Said, TeamEvent
 from ui_console.model.health_board import HealthBoard
-from ui_console.model.lifting import author_name, authors, is_own, lift_line
+from ui_console.model.link_board import LinkBoard
 from ui_console.model.needs import Needs
-from ui_console.model.timeline import Timeline
+from ui_console.model.robot_board import RobotBoard
+from ui_console.model.timeline import Timeline, TimelineView
 from ui_console.model.tree_board import TreeBoard
-from ui_console.model.views import (
-    NONE_S,
-    AlarmKind,
-    AlarmView,
-    HealthView,
-    HostView,
-    LinkView,
-    NodeView,
-    ParameterView,
-    RobotView,
-    Severity,
-    StopView,
-    TimelineView,
-)
+from ui_console.model.views import LEAVING, AlarmKind, AlarmView, HealthView, NodeView, ParameterView, Severity
 
-ROBOT_KIND = "scout"
 STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
-OVERLOAD_CPU = 0.95  # chosen: above it slices and pictures come late
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees
-NO_LINK = "no link to the hub: what is shown is old, and nothing can be stopped from here"
-LEAVING = (LifeState.DRAINING, LifeState.STOPPED)
 
 
 class TeamModel:
@@ -80,26 +63,20 @@ class TeamModel:
     def __init__(self, mission: str = "", lift_remedy: str = "Lift the stop when the robot may move.") -> None:
         self.picture = MissionPicture(mission)
         """What everybody knows of it who listens."""
-        self._lift_remedy = lift_remedy
         self.alarms = AlarmBook()
         self.people = self.picture.people
         """Who sits at which console."""
+        self.links = LinkBoard(self.alarms)
+        """Ways that messages go, and machines."""
+        self.robots = RobotBoard(self.picture, self.alarms, self.links, lift_remedy)
+        """Who holds which robot, and which stop is in force."""
         self._health = HealthBoard(self.alarms)
         self._timeline = Timeline(self.person)
         self._lost: dict[str, tuple[float, ComponentState]] = {}
         self._tree = TreeBoard(self.people)
         self._arcs: set[str] = set()
-        self._leases: Leases | None = None
-        self._leases_s = NONE_S
-        self._renewed: dict[tuple[str, str, int], float] = {}
-        self._stops: dict[str, StopState] = {}
         self._needs = Needs()
         self._left: set[str] = set()
-        self._hosts: dict[str, tuple[float, HostLoad]] = {}
-        self._overruns: dict[tuple[str, str], float] = {}
-        self._radios: dict[str, Mapping[str, float]] = {}
-        self._link = LinkHeard(0.0, True)
-        self._link_heard_s = 0.0
         self._parameters: dict[tuple[str, str], ParameterView] = {}
 
     @property
@@ -111,7 +88,7 @@ class TeamModel:
     def apply(self, event: TeamEvent) -> None:
         """Take the event in."""
         if isinstance(event, LinkHeard):
-            self._take_link(event)
+            self.links.take_link(event)
         else:
             self._take(event.body, event.at_s, event.source)
 
@@ -121,7 +98,8 @@ class TeamModel:
             case Schedule():
                 self._take_schedule(said)
             case Leases():
-                self._take_leases(said, at_s)
+                self.links.take_leases(said, at_s)
+                self.robots.take_leases(said, at_s)
             case StoryEvent():
                 picture.take(said)
                 self._tree.told(said)
@@ -137,11 +115,11 @@ class TeamModel:
             case ProcessFell():
                 self._take_fall(said, at_s)
             case HostLoad():
-                self._take_load(said, at_s)
+                self.links.take_load(said, at_s)
             case StopState():
-                self._take_stop(said, at_s)
+                self.robots.take_stop(said, at_s)
             case Statistics():
-                self._take_counts(component_of(source), said.values, at_s)
+                self.links.take_counts(component_of(source), said.values, at_s)
             case MissionTime():
                 self._health.rate = said.rate
             case MissionHealth():
@@ -150,7 +128,7 @@ class TeamModel:
                 self._take_parameters(said, source, at_s)
             case SetParameter():
                 self._take_change(said, source, at_s)
-            case Why():
+            case Why() | Suspended():
                 """Of one console, which keeps it."""
             case _:
                 assert_never(said)
@@ -159,8 +137,8 @@ class TeamModel:
         """Find out what only time can tell."""
         self.alarms.look(now_s)
         self._health.look(now_s)
+        self.links.look(now_s)
         owners = {request.arc: request.owner for request in self.schedule.requests} if self.schedule else {}
-        self.alarms.hold(self.link_down_s(now_s) >= 0, AlarmKind.LINK, "hub", NO_LINK, now_s)
         for request in self.schedule.requests if self.schedule is not None else ():
             waits_s = now_s - request.since_s
             is_wanted = bool(request.blockers) and all(is_console(owners.get(arc, "")) for arc in request.blockers)
@@ -171,14 +149,6 @@ class TeamModel:
             self.alarms.hold(starves, AlarmKind.STARVING, request.arc, line, now_s, request.would_change)
 
     # ------------------------------------------------------------------ views out
-    def robots(self, now_s: float) -> list[RobotView]:
-        """Return the robots, sorted by name; none of them is anybody's own, and none has pictures."""
-        if self.schedule is None:
-            return []
-        requests = {request.arc: request for request in self.schedule.requests}
-        rcs = sorted((rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND), key=lambda rc: rc.rc)
-        return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
-
     def person(self, console_name: str) -> str:
         """Return the name of the person at a console, also of one that has left; any other name stays as it is.
 
@@ -190,48 +160,6 @@ class TeamModel:
     def screens_of(self, user: str) -> list[ComponentState]:
         """Return the consoles at which this person sits now."""
         return screens_of(user, self.picture.components.values())
-
-    def link_down_s(self, now_s: float) -> float:
-        """Return since when nothing is heard from the mission's hub; negative: the link is up."""
-        link = self._link
-        return NONE_S if link.is_up and now_s <= link.until_s else self._link_heard_s
-
-    def robot_names(self) -> list[str]:
-        """Return every robot heard of, in the schedule or as a component."""
-        in_schedule = {rc.rc for rc in self.schedule.rcs if rc.kind == ROBOT_KIND} if self.schedule else set()
-        registered = {
-            component_of(at) for at, component in self.picture.components.items() if component.type == ROBOT_KIND
-        }
-        return sorted(in_schedule | registered)
-
-    def stop_of(self, robot: str) -> StopState | None:
-        """Return the operator's stop in force on the robot."""
-        stop = self._stops.get(robot)
-        return stop if stop is not None and stop.is_stopped else None
-
-    def stop_view(self, robot: str, now_s: float, user: str = "", console: str = "") -> StopView | None:
-        """Return the same for a screen.
-
-        Args:
-            robot: Which.
-            now_s: Mission time.
-            user: Who looks at it; empty: nobody in particular.
-            console: Address of their console.
-        """
-        stop = self.stop_of(robot)
-        if stop is None:
-            return None
-        by_user, *also = dict.fromkeys(map(author_name, authors(stop)))
-        return StopView(
-            number=stop.number,
-            reason=stop.reason,
-            age_s=max(0.0, now_s - stop.at_s),
-            is_confirmed=stop.is_confirmed,
-            by_user=by_user,
-            also=also,
-            is_mine=is_own(stop, user, console),
-            lift_line=lift_line(stop, user, console, self._is_there),
-        )
 
     def tree(self) -> list[NodeView]:
         """Return the behavior tree, parents before children, siblings of higher priority first."""
@@ -249,21 +177,6 @@ class TeamModel:
     def health(self, now_s: float) -> HealthView | None:
         """Return how the mission is; None: not known yet."""
         return self._health.view(now_s)
-
-    def hosts(self, now_s: float) -> list[HostView]:
-        """Return the machines, sorted by name."""
-        return [HostView(load, max(0.0, now_s - at_s)) for _, (at_s, load) in sorted(self._hosts.items())]
-
-    def links(self, now_s: float) -> list[LinkView]:
-        """Return the link to the hub, the RC manager's renewals, and the radios."""
-        renewed = f"leases renewed {now_s - self._leases_s:.1f} s ago" if self._leases_s >= 0 else ""
-        views = [LinkView("hub", self.link_down_s(now_s) < 0, self._link.latency_s, renewed)]
-        for radio, values in sorted(self._radios.items()):
-            sent, late = values.get("packets_sent", 0.0), values.get("overruns", 0.0)
-            worst_ms = 1e3 * values.get("worst_packet_s", 0.0)
-            feedback = f"{sent:.0f} packets sent, {late:.0f} late or lost, slowest {worst_ms:.1f} ms"
-            views.append(LinkView(radio, not self._is_missing(radio), NONE_S, feedback))
-        return views
 
     def parameters(self) -> list[ParameterView]:
         """Return the parameters of the components that were asked for theirs, by component and name."""
@@ -314,51 +227,7 @@ class TeamModel:
         for rc in schedule.rcs:
             is_down = rc.state == "down" and rc.rc not in self._left  # who was told to end is not missed
             self.alarms.hold(is_down, AlarmKind.RC_DOWN, rc.rc, f"{rc.rc} cannot be reached", schedule.at_s)
-        self._renewed = {
-            (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
-            for rc in schedule.rcs
-            for holder in rc.holders
-        }
-
-    def _take_leases(self, leases: Leases, at_s: float) -> None:
-        self._leases, self._leases_s = leases, at_s
-        for lease in leases.leases:
-            self._renewed[lease.rc, lease.arc, lease.epoch] = at_s
-
-    def _is_missing(self, rc: str) -> bool:
-        return self._leases is not None and rc in self._leases.missing
-
-    def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
-        component = self.picture.components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
-        waiting = [self.person(requests[arc].owner) for arc in rc.next if arc in requests]
-        free = RobotView(
-            rc.rc,
-            number,
-            rc.state != "down" and not self._is_missing(rc.rc),
-            waiting,
-            self.stop_view(rc.rc, now_s),
-            self.people.named(component.feedback) if component is not None else "",
-        )
-        if not rc.holders:
-            return free
-        holder = rc.holders[0]
-        request = requests.get(holder.arc)
-        renewed_s = self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
-        lease_s = self._leases.lease_s if self._leases is not None else holder.lease_until_s - renewed_s
-        age_s = max(0.0, now_s - renewed_s)
-        return replace(
-            free,
-            holder=self.person(request.owner if request else holder.arc),
-            arc=holder.arc,
-            is_console=request is not None and is_console(request.owner),
-            priority=self.people.named(request.priority) if request else "",
-            epoch=holder.epoch,
-            since_s=holder.since_s,
-            until_s=request.until_s if request else NONE_S,
-            lease_left_s=max(0.0, lease_s - age_s),
-            lease_age_s=age_s,
-            because=because(request, self.people) if request else "",
-        )
+        self.robots.take_schedule(schedule)
 
     def _request_row(self, request: RequestView) -> RequestView:
         named = self.people.named
@@ -432,11 +301,6 @@ class TeamModel:
         for key in [key for key in self._parameters if key[0] == name]:
             del self._parameters[key]
 
-    def _take_load(self, load: HostLoad, at_s: float) -> None:
-        self._hosts[load.host] = (at_s, load)
-        line = f"{load.host} is busy at {load.cpu:.0%} of its {load.cores} cores"
-        self.alarms.hold(load.cpu >= OVERLOAD_CPU, AlarmKind.OVERLOAD, load.host, line, at_s)
-
     # ------------------------------------------------------------------ what alarms are about
     def _explained_by(self, subject: str) -> frozenset[str]:
         return self._needs.of(subject, self.schedule)
@@ -446,9 +310,9 @@ class TeamModel:
         where, uses = "", [alarm.subject, *self._explained_by(alarm.subject)]
         if component is not None:
             where = f"{component.type} on {component.host}, process {component.pid}"
-        elif alarm.subject in self._hosts:
+        elif self.links.is_host(alarm.subject):
             where = "machine of the mission"
-        robots = self.robot_names()
+        robots = self.robots.names()
         return replace(
             alarm,
             line=named(alarm.line),
@@ -465,50 +329,7 @@ class TeamModel:
         line = f"{fell.name} fell: {fell.how}; {again}{said}"
         self.alarms.happened(AlarmKind.LOST, fell.name, line, at_s, key=f"fell:{fell.name}", severity=severity)
 
-    def _is_there(self, author: Stopper) -> bool:
-        """Return whether who stopped a robot is there; True as long as nothing was heard of who is."""
-        there = self.picture.components
-        at = {author.console, *(screen.address for screen in self.screens_of(author.by))} & there.keys()
-        return any(there[one].state not in LEAVING for one in at) or not there
-
     # ------------------------------------------------------------------ what happened
-    def _take_link(self, link: LinkHeard) -> None:
-        if link.is_up:
-            self._link_heard_s = link.at_s
-            latency_s = link.latency_s if link.latency_s >= 0 else self._link.latency_s
-            self._link = dataclasses.replace(link, latency_s=latency_s)
-        else:
-            self._link = link
-        self.alarms.hold(not link.is_up, AlarmKind.LINK, "hub", NO_LINK, link.at_s)
-
-    def _take_stop(self, stop: StopState, at_s: float) -> None:
-        former = self._stops.get(stop.rc)
-        if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
-            return
-        self._stops[stop.rc] = stop
-        unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
-        line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
-        if stop.is_stopped:
-            self.alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
-        else:
-            self.alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
-
-    def _take_counts(self, radio: str, values: Mapping[str, float], at_s: float) -> None:
-        self._radios[radio] = values
-        known = {(radio, name.removeprefix("overruns_")) for name in values}
-        self._overruns = {key: count for key, count in self._overruns.items() if key[0] != radio or key in known}
-        for name, count in values.items():
-            arc = name.removeprefix("overruns_")
-            if arc == name:
-                continue
-            before = self._overruns.get((radio, arc), 0.0)
-            self._overruns[radio, arc] = count
-            if count > before:
-                late = int(count)
-                line = f"{counted(late, 'packet')} of {arc} on {radio} {'was' if late == 1 else 'were'} late or lost"
-                remedy = "Claim with a longer period, or use another radio."
-                self.alarms.happened(AlarmKind.DEADLINE, arc, line, at_s, remedy, f"deadline:{radio}:{arc}")
-
     def _take_change(self, change: SetParameter, address: str, at_s: float) -> None:
         """Note who changed a parameter; its new value comes right after, at the same time."""
         key = (component_of(address), change.name)

@@ -7,31 +7,19 @@ import os
 import threading
 from collections.abc import Callable
 
-from backbone.errors import Refusal, code_of
+from backbone.endings import ExitCode
+from backbone.errors import Refusal
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
-from resource_pool.arc_client import StopState, SwappedOut
+from resource_pool.arc_client import StopState, Suspended, SwappedOut
+from ui_console.model import events
 from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
-from ui_console.model.events import (
-    Asked,
-    CommandApplied,
-    CommandRefused,
-    ConsoleEvent,
-    Granted,
-    Heard,
-    LinkTrouble,
-    Lost,
-    MomentBegan,
-    PictureSeen,
-    event_json,
-)
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.session.teleoperation import Teleoperation
 
-DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
-_FOR_SCREENS_ONLY = (Asked, MomentBegan, PictureSeen)
+_FOR_SCREENS_ONLY = (events.Asked, events.MomentBegan, events.PictureSeen)
 
 
 class ScriptDriver:
@@ -56,31 +44,31 @@ class ScriptDriver:
         self._stops: list[StopRobot | StopAll] = []
         self._stopped = self._is_unanswered = False
 
-    def show(self, event: ConsoleEvent) -> None:
+    def show(self, event: events.ConsoleEvent) -> None:
         """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
         if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
             return
-        if isinstance(event, Lost) and event.reason in UNDECIDED:
+        said = events.said(event)
+        if isinstance(said, Suspended) and said.reason in UNDECIDED:
             self._player.require_let_go()
-        stop = event.body if isinstance(event, Heard) else None
-        if isinstance(stop, StopState) and (stop.is_stopped or self._stopped):
-            self._stopped = stop.is_stopped
+        if isinstance(said, StopState) and (said.is_stopped or self._stopped):
+            self._stopped = said.is_stopped
             self._player.require_let_go()
-        if isinstance(event, CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
+        if isinstance(event, events.CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True
-        self._write(event_json(event))
+        self._write(events.event_json(event))
 
     @property
     def must_halt(self) -> bool:
         """Whether its lines move nothing before one that halts."""
         return self._player.must_let_go
 
-    def _is_told(self, event: ConsoleEvent) -> bool:
+    def _is_told(self, event: events.ConsoleEvent) -> bool:
         """Take note of a silence and of its end; return whether the script knows of this silence."""
-        if isinstance(event, LinkTrouble) and event.command:
+        if isinstance(event, events.LinkTrouble) and event.command:
             is_told, self._is_unanswered = self._is_unanswered, True
             return is_told
-        if isinstance(event, CommandApplied | Granted | Lost):
+        if isinstance(events.said(event), events.CommandApplied | events.Granted | Suspended):
             self._is_unanswered = False
         return False
 
@@ -112,7 +100,7 @@ class ScriptDriver:
             detail = f"not granted within {self._within_s:g} s"
             remedy = "Ask 'scout-backbone why' for the reason, use a higher --priority, or wait longer."
             now_s = console.clock.now_s()
-            self._write(event_json(CommandRefused(now_s, "console.not_granted", detail, remedy)))
+            self._write(events.event_json(events.CommandRefused(now_s, "console.not_granted", detail, remedy)))
             await console.give_back("not granted in time")
             return
         except Refusal:
@@ -123,10 +111,10 @@ class ScriptDriver:
     def exit_code(self, console: Teleoperation) -> int:
         """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
         if self._wrong is not None:
-            return USAGE
+            return ExitCode.USAGE
         if console.refusal is not None or self._failed or self._player.held_back:
-            return REFUSED
-        return DONE if self._granted and console.given_back else NO_BACKBONE
+            return ExitCode.REFUSED
+        return ExitCode.DONE if self._granted and console.given_back else ExitCode.NO_BACKBONE
 
     async def _play(self, console: Teleoperation, granted_s: float) -> None:
         clock = console.clock
@@ -179,8 +167,7 @@ class ScriptDriver:
 
     def _tell_wrong(self, now_s: float) -> None:
         if self._wrong is not None:
-            wrong = self._wrong
-            self._write(event_json(CommandRefused(now_s, code_of(wrong), wrong.detail, wrong.remedy)))
+            self._write(events.event_json(events.failed(now_s, self._wrong)))
 
 
 def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:

@@ -173,7 +173,7 @@ class ConsoleDisplay(EndingApp):
     def redraw_if_cut(self) -> None:
         """Show at once that the link is down, or up again: nothing looks fresh that is not."""
         shown = self._view is not None and self._view.own.link_down_s >= 0
-        if (self._session.model.team.link_down_s(self._session.now_s()) >= 0) is not shown:
+        if (self._session.model.team.links.down_s(self._session.now_s()) >= 0) is not shown:
             self.redraw()
 
     def redraw_video(self) -> None:

@@ -17,40 +17,26 @@ from backbone.component.messages import ComponentState, StoryEvent
 from backbone.naming import component_of
 from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
-from ui_console.model.views import (
-    AlarmView,
-    Certainty,
-    ConsoleView,
-    HostView,
-    LinkView,
-    NodeState,
-    NodeView,
-    ParameterView,
-    RobotView,
-    Severity,
-    SliceView,
-    StopView,
-    TimelineView,
-)
+from ui_console.model import views
+from ui_console.model.timeline import Certainty, SliceView, TimelineView
 from ui_console.terminal.tables import PanelName
 
 NODE_MARKS = {
-    NodeState.RUNNING: ("▶", "green"),
-    NodeState.WAITING: ("…", "yellow"),
-    NodeState.IDLE: ("·", "dim"),
-    NodeState.SUCCESS: ("✓", "bold green"),
-    NodeState.FAILURE: ("✗", "bold red"),
-    NodeState.STARTING: ("○", "yellow"),
-    NodeState.LOST: ("!", "bold red"),
+    views.NodeState.RUNNING: ("▶", "green"),
+    views.NodeState.WAITING: ("…", "yellow"),
+    views.NodeState.IDLE: ("·", "dim"),
+    views.NodeState.SUCCESS: ("✓", "bold green"),
+    views.NodeState.FAILURE: ("✗", "bold red"),
+    views.NodeState.STARTING: ("○", "yellow"),
+    views.NodeState.LOST: ("!", "bold red"),
 }
-ALARM_STYLES = {Severity.ALARM: "bold red", Severity.WARNING: "yellow", Severity.NOTICE: "cyan"}
+ALARM_STYLES = {views.Severity.ALARM: "bold red", views.Severity.WARNING: "yellow", views.Severity.NOTICE: "cyan"}
 BUSY_CPU = 0.8  # chosen: from here on a host's load is shown in yellow
 NAME_COLUMNS = 10
 BEYOND_S = 1.0  # chosen: a slice that ends now is not beyond it yet
 HANG = 2  # chosen: a line that goes on is set off from the next row
 LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
 HELD_ELSEWHERE = "hold to lift"  # what a page needs; a terminal has a second key for it
-LONG_NUMBER = 8  # chosen: digits that people read at a glance
 _PAPER = Console(file=io.StringIO())  # Rich wants one to fold text, and asks it nothing
 SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
 SLICE_COLORS = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green", "bright_magenta")
@@ -108,7 +94,7 @@ def _cut(text: Text, columns: int) -> list[Text]:
 
 
 # ---------------------------------------------------------------------- views as rows
-def table_rows(name: PanelName, view: ConsoleView, columns: int) -> list[Row]:
+def table_rows(name: PanelName, view: views.ConsoleView, columns: int) -> list[Row]:
     """Return the rows of a table.
 
     Args:
@@ -140,13 +126,13 @@ def table_rows(name: PanelName, view: ConsoleView, columns: int) -> list[Row]:
             return rows[::-1]
 
 
-def robot_rows(robots: list[RobotView], now_s: float) -> list[Row]:
+def robot_rows(robots: list[views.RobotView], now_s: float) -> list[Row]:
     """Return two lines for each robot: who has it, and for how long, who comes next."""
     wide = max((len(robot.robot) for robot in robots), default=0)
     return [Row(f"robot:{robot.robot}", robot.robot, _robot(robot, now_s, wide)) for robot in robots]
 
 
-def lift_lines(stop: StopView) -> list[str]:
+def lift_lines(stop: views.StopView) -> list[str]:
     """Return whose stop is about to be lifted, since when, why it was set, and what lifting it takes."""
     also = f"; since then also by {', '.join(stop.also)}" if stop.also else ""
     reason = [f"because: {stop.reason}"] if stop.reason else []
@@ -180,7 +166,7 @@ def _event(event: StoryEvent) -> Text:
     return Text.assemble((f"{event.at_s:8.1f} ", "dim"), (f"{event.subject} ", "bold"), event.what)
 
 
-def _robot(robot: RobotView, now_s: float, wide: int) -> Text:
+def _robot(robot: views.RobotView, now_s: float, wide: int) -> Text:
     lines = Text.assemble((f"{robot.number} ", "dim"), (f"{robot.robot:{wide}s}  ", "bold"))
     if not robot.is_up:
         lines.append("down ", style="bold red")
@@ -197,7 +183,7 @@ def _robot(robot: RobotView, now_s: float, wide: int) -> Text:
     return lines
 
 
-def _robot_facts(robot: RobotView, now_s: float) -> Iterator[str]:
+def _robot_facts(robot: views.RobotView, now_s: float) -> Iterator[str]:
     """Yield what else is known of a robot, what matters most first: where room is short, the end is cut."""
     if robot.stop is not None:
         yield robot.stop.reason or f"since {robot.stop.age_s:.0f} s"
@@ -217,13 +203,13 @@ def _slice_end(until_s: float, now_s: float) -> Iterator[str]:
         yield "beyond its slice"
 
 
-def _node(node: NodeView, now_s: float) -> Text:
+def _node(node: views.NodeView, now_s: float) -> Text:
     mark, style = NODE_MARKS[node.state]
     priority = "" if node.priority is None else f":{node.priority}"
     margin = "  " * node.depth
     lines = Text.assemble(margin, (f"{mark} ", style), (node.name, "bold"), (priority, "dim"), f" {node.type} ")
     lines.append(f"{node.state} {max(0.0, now_s - node.since_s):.0f} s", style=style)
-    below = node.because if node.state is NodeState.WAITING and node.because else node.feedback
+    below = node.because if node.state is views.NodeState.WAITING and node.because else node.feedback
     if below:
         lines.append(f"\n{margin}    {below}", style="dim")
     return lines
@@ -240,7 +226,7 @@ def _request(request: RequestView, now_s: float) -> Text:
     return Text.assemble((f"{request.owner}: ", "bold"), (when, style), f"; {request.because}")
 
 
-def _alarm(alarm: AlarmView, now_s: float) -> Text:
+def _alarm(alarm: views.AlarmView, now_s: float) -> Text:
     style = ALARM_STYLES[alarm.severity] if not alarm.acknowledged_by else "dim"
     times = f" ×{alarm.count}" if alarm.count > 1 else ""
     since = "" if alarm.is_active else " (over)"
@@ -253,13 +239,13 @@ def _alarm(alarm: AlarmView, now_s: float) -> Text:
     return lines
 
 
-def _link(link: LinkView) -> Text:
+def _link(link: views.LinkView) -> Text:
     latency = f" {1e3 * link.latency_s:.1f} ms" if link.latency_s >= 0 else ""
     mark, style = ("up  ", "green") if link.is_up else ("DOWN", "bold red")
     return Text.assemble((f"{mark} ", style), (link.name, "bold"), latency, (f"  {link.feedback}", "dim"))
 
 
-def _host(host: HostView) -> Text:
+def _host(host: views.HostView) -> Text:
     load = host.load
     style = "yellow" if load.cpu >= BUSY_CPU else ""
     return Text.assemble(
@@ -271,22 +257,11 @@ def _host(host: HostView) -> Text:
     )
 
 
-def _parameter(parameter: ParameterView) -> Text:
-    line = Text.assemble((f"{parameter.component}.{parameter.name}", "bold"), f" = {_said(parameter.value)}")
+def _parameter(parameter: views.ParameterView) -> Text:
+    line = Text.assemble((f"{parameter.component}.{parameter.name}", "bold"), f" = {parameter.value}")
     if parameter.changed_by:
-        before = _said(parameter.before)
-        line.append(f"  was {before}, set by {parameter.changed_by} at {parameter.changed_s:.0f} s", "dim")
+        line.append(f"  was {parameter.before}, set by {parameter.changed_by} at {parameter.changed_s:.0f} s", "dim")
     return line
-
-
-def _said(value: str) -> str:
-    """Return a value of JSON, a number with more digits than people read as a shorter one."""
-    if len(value) <= LONG_NUMBER or "." not in value:
-        return value
-    try:
-        return f"{float(value):.6g}"
-    except ValueError:  # a text, or a list
-        return value
 
 
 def _component(component: ComponentState) -> Text:

@@ -26,7 +26,8 @@ from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, Heard
-from ui_console.model.team import ROBOT_KIND, TeamModel
+from ui_console.model.robot_board import ROBOT_KIND
+from ui_console.model.team import TeamModel
 from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.observer import Observer
@@ -224,7 +225,6 @@ class WebHub:
             "tree": team.tree(),
             "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),
-            "hosts": plain(team.hosts(now_s)),
             "health": team.health(now_s),
             "parameters": team.parameters(),
             "components": plain(team.components()),

@@ -17,45 +17,16 @@ from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import STICK_LASTS_S, Halt, drive_by_stick
-from ui_console.model.events import (
-    Attention,
-    CommandApplied,
-    CommandRefused,
-    ConsoleEvent,
-    LinkTrouble,
-    PictureSeen,
-)
+from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.observer import Observer
 from ui_console.session.teleoperation import Teleoperation
+from ui_console.web import protocol
 from ui_console.web.door import Welcome
 from ui_console.web.found_log import FoundLog
 from ui_console.web.outbox import Outbox
-from ui_console.web.protocol import (
-    Acknowledge,
-    AskParameters,
-    AskWhy,
-    Decide,
-    DismissLost,
-    Drawn,
-    Here,
-    Intent,
-    JumpOnce,
-    LetGo,
-    LiftStop,
-    MayI,
-    MoreLog,
-    SearchLog,
-    SetParameter,
-    Steer,
-    StopAll,
-    StopRobot,
-    StopWheels,
-    TakeOver,
-    Watch,
-)
 
 log = logging.getLogger(__name__)
 
@@ -64,8 +35,8 @@ LATENCY_STEP = (
     0.2  # chosen: weight of the newest picture in the latency shown: it follows within a second and is readable
 )
 
-Asked = AskWhy | AskParameters | SetParameter | SearchLog
-AtWork = Asked | StopRobot | StopAll | LiftStop | TakeOver | LetGo
+Asked = protocol.AskWhy | protocol.AskParameters | protocol.SetParameter | protocol.SearchLog
+AtWork = Asked | protocol.StopRobot | protocol.StopAll | protocol.LiftStop | protocol.TakeOver | protocol.LetGo
 
 
 class Hands(Protocol):
@@ -111,37 +82,39 @@ class Operator:
         self._work: dict[bytes, asyncio.Task[None]] = {}
 
     # ------------------------------------------------------------------ what the browser says
-    def obey(self, intent: Intent) -> None:
+    def obey(self, intent: protocol.Intent) -> None:
         """Do what the browser asks; what takes time goes on beside."""
         match intent:
-            case Steer(moment, forward, right, speed_rad_s):
+            case protocol.Steer(moment, forward, right, speed_rad_s):
                 drive = drive_by_stick(forward, right, speed_rad_s)
                 self._by_press(moment, lambda console: console.hold(drive, STICK_LASTS_S))
-            case StopWheels():
+            case protocol.StopWheels():
                 self.stop()
-            case JumpOnce(moment):
+            case protocol.JumpOnce(moment):
                 self._by_press(moment, Teleoperation.jump)
-            case Drawn(robot, number):
+            case protocol.Drawn(robot, number):
                 self._drawn(robot, number)
-            case Watch(robots):
+            case protocol.Watch(robots):
                 self.outbox.watch(frozenset(robots))  # also those not heard of yet: a page may be older than the server
                 self._hands.watching_changed()
-            case Acknowledge(key):
+            case protocol.Acknowledge(key):
                 self._acknowledge(key)
-            case MoreLog(number, first):
+            case protocol.MoreLog(number, first):
                 self._hand_out(number, first)
-            case Here(is_there):
+            case protocol.Here(is_there):
                 self._attend(is_there)
-            case MayI(why):
+            case protocol.MayI(why):
                 self._with_robot(lambda console: console.begin_ask_consent(why))
-            case Decide(is_given):
+            case protocol.Decide(is_given):
                 self.answers.decide(is_given)
-            case DismissLost():
+            case protocol.DismissLost():
                 self.model.dismiss_lost()
                 self.refresh(self._hands.clock.now_s())
-            case TakeOver() | LetGo() | StopRobot() | StopAll() | LiftStop():
+            case (
+                protocol.TakeOver() | protocol.LetGo() | protocol.StopRobot() | protocol.StopAll() | protocol.LiftStop()
+            ):
                 self._begin(intent)
-            case AskWhy() | AskParameters() | SetParameter() | SearchLog():
+            case protocol.AskWhy() | protocol.AskParameters() | protocol.SetParameter() | protocol.SearchLog():
                 self._begin(intent)
             case _:
                 assert_never(intent)
@@ -249,34 +222,34 @@ class Operator:
     async def _do(self, intent: AtWork) -> None:
         observer, user = self._hands.observer, self.welcome.user
         match intent:
-            case TakeOver(robot):
+            case protocol.TakeOver(robot):
                 async with self._claiming:
                     await self._take(robot)
-            case LetGo():
+            case protocol.LetGo():
                 async with self._claiming:
                     if self._console is not None and self._console.is_ready:
                         await self._console.give_back(f"{user} released it")
-            case StopRobot(robot):
+            case protocol.StopRobot(robot):
                 await self._stop(robot)
-            case StopAll():
+            case protocol.StopAll():
                 self._with_robot(Teleoperation.require_let_go)
                 self._tell_unsure(await observer.stop_all("", user))
-            case LiftStop(robot, number):
+            case protocol.LiftStop(robot, number):
                 await observer.lift_stop(robot, number, user, self.show)
-            case AskWhy(name):
+            case protocol.AskWhy(name):
                 self._answer({"why": name, "lines": await observer.why(name)})
-            case AskParameters(name):
+            case protocol.AskParameters(name):
                 self._answer({"parameters": name, "told": await observer.feed.ask_parameters(name)})
-            case SearchLog():
+            case protocol.SearchLog():
                 await self._search(intent)
-            case SetParameter(name, parameter, value):
+            case protocol.SetParameter(name, parameter, value):
                 is_set = await observer.set_parameter(name, parameter, value, user)
                 self._answer({"set": name, "parameter": parameter, "done": is_set})
             case _:
                 assert_never(intent)
         self.refresh(self._hands.clock.now_s())
 
-    async def _search(self, wanted: SearchLog) -> None:
+    async def _search(self, wanted: protocol.SearchLog) -> None:
         """Find something in the mission's log; the page fetches the rest of it part by part."""
         clock = self._hands.clock
         now = Now(clock.now_s(), datetime.now(), clock.rate)
@@ -298,7 +271,7 @@ class Operator:
     async def _stop(self, robot: str) -> None:
         """Emergency stop; the wheels this operator turns stop with it."""
         self._with_robot(Teleoperation.require_let_go)
-        is_known = robot in self._hands.team.robot_names()
+        is_known = robot in self._hands.team.robots.names()
         is_stopped = is_known and await self._hands.observer.stop_robot(robot, "", self.welcome.user)
         self._tell_unsure([] if is_stopped else [robot])
 
@@ -315,19 +288,16 @@ class Operator:
             self._console = await self._hands.new_console(self, robot)
             self.model.name = self._console.name  # others of this person are other screens
         except LinkError as error:
-            self.show(LinkTrouble(self._hands.clock.now_s(), str(error)))
+            self.show(failed(self._hands.clock.now_s(), error))
             return
         self._life = asyncio.create_task(self._live(self._console), name=f"life of {self._console.address}")
         self._life.add_done_callback(self._bug_of)
 
     async def _live(self, console: Teleoperation) -> None:
-        now_s = self._hands.clock.now_s
         try:
             await console.run()
-        except LinkError as error:
-            self.show(LinkTrouble(now_s(), str(error)))
-        except Refusal as refusal:
-            self.show(CommandRefused(now_s(), refusal.code, refusal.detail, refusal.remedy))
+        except (Refusal, LinkError) as error:
+            self.show(failed(self._hands.clock.now_s(), error))
 
     def _done(self, same: bytes, task: asyncio.Task[None]) -> None:
         self._work.pop(same, None)

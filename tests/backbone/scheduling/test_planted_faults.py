@@ -21,6 +21,7 @@ def test_a_planted_fault_has_its_place(fault: Planted) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.processes
 @pytest.mark.timeout(600)
 def test_what_is_not_planted_is_not_caught(tmp_path: Path) -> None:
     done = outcome_of(copied(tmp_path))
@@ -28,6 +29,7 @@ def test_what_is_not_planted_is_not_caught(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.processes
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_planted_fault_is_caught(fault: Planted, tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from backbone.scheduling.events import (
     PriorityChanged,
     RcCameBack,
     RcWentDown,
+    RenewLeases,
     RevokeArc,
     RuntimeChanged,
     WakeAt,
@@ -106,6 +107,19 @@ def test_rank_on_a_sharable_rc_counts_the_higher_holders():
     bench.tell(ask("high", {"r": load(0.1)}, priority=3))
     bench.tell(ask("middle", {"r": load(0.1)}, priority=2))
     assert [order.ranks["r"] for order in all_of(bench, ConnectArc)] == [0, 0, 1]
+    assert len(all_of(bench, RenewLeases)) == 2  # of those whose ranks another's connection may have changed
+
+
+def test_who_stays_for_a_new_slice_comes_behind_who_left_for_another():
+    bench = Bench(manager(), sharable("r"))
+    for arc in ("leaves", "stays", "comes"):
+        bench.tell(ask(arc, {"r": load(0.4)}))
+    bench.at(6.0, ask("high", {"r": RcUse()}, priority=9))
+    bench.at(8.0, Departed("high", "self"))
+    bench.run(9.0)
+    assert [line["arc"] for line in bench.trace if line["ev"] == "slice"] == ["stays"]
+    assert [line["arc"] for line in bench.trace if line["ev"] == "connect"][-2:] == ["comes", "leaves"]
+    assert bench.verdict() == []
 
 
 def test_a_lone_arc_runs_on_and_hears_nothing():

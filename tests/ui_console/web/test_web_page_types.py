@@ -2,69 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
-from typing import Any
-
-import msgspec
+import pytest
 from msgspec import inspect
+from sent_types import fits, odd
 from web_stage import Stage
 
 from backbone.component.messages import StoryEvent
-from ui_console.web.page_types import ANSWERS, FILE, LogFound, LogRefused, View, declarations
+from ui_console.page_types import CONSOLE, DESIGNER, Page, View, declarations
 
 
-def fits(answer: dict[str, Any], kinds: tuple[type[msgspec.Struct], ...]) -> list[type[msgspec.Struct]]:
-    """Return which of these structs the answer is."""
-    fitting = []
-    for kind in kinds:
-        try:
-            msgspec.convert(answer, kind)
-        except msgspec.ValidationError:
-            continue
-        fitting.append(kind)
-    return fitting
-
-
-def odd(value: Any, kind: inspect.Type, where: str = "view") -> list[str]:
-    """Return where a value is not of this type; messages of the bus come as dictionaries of their fields."""
-    match kind:
-        case inspect.StructType(fields=fields) if isinstance(value, dict):
-            wrong = value.keys() ^ {field.encode_name for field in fields}
-            there = [field for field in fields if field.encode_name in value]
-            inside = [odd(value[field.encode_name], field.type, f"{where}.{field.name}") for field in there]
-            return [*(f"{where}.{name}" for name in wrong), *itertools.chain(*inside)]
-        case inspect.ListType(item_type=item) if isinstance(value, list):
-            return [wrong for one in value for wrong in odd(one, item, f"{where}[]")]
-        case inspect.UnionType(types=kinds):
-            return [] if any(not odd(value, one) for one in kinds) else [where]
-        case inspect.StructType() | inspect.ListType():
-            return [where]
-        case _:
-            return [] if fits_plain(value, kind) else [where]
-
-
-def fits_plain(value: Any, kind: inspect.Type) -> bool:
-    """Say whether a value that is no struct and no list is of this type."""
-    match kind:
-        case inspect.StrType():
-            return isinstance(value, str)
-        case inspect.BoolType():
-            return isinstance(value, bool)
-        case inspect.IntType():
-            return isinstance(value, int)
-        case inspect.FloatType():
-            return isinstance(value, int | float)
-        case inspect.NoneType():
-            return value is None
-        case inspect.EnumType(cls=cls):
-            return value in [one.value for one in cls]
-        case inspect.DictType():
-            return isinstance(value, dict)
-    return False
-
-
-def test_the_file_of_types_is_made_from_the_structs() -> None:
-    assert FILE.read_text() == declarations(), "run python -m ui_console.web.page_types"
+@pytest.mark.parametrize("page", [CONSOLE, DESIGNER], ids=lambda page: page.file.name)
+def test_the_file_of_types_is_made_from_the_structs(page: Page) -> None:
+    assert page.file.read_text() == declarations(page), "run python -m ui_console.page_types"
 
 
 async def test_what_a_server_sends_has_the_types_that_the_page_is_checked_by(stage: Stage) -> None:
@@ -86,6 +35,4 @@ async def test_what_a_server_sends_has_the_types_that_the_page_is_checked_by(sta
         await anna.say(do="set", name="scout1", parameter="speed", value=1)
         await anna.wait(lambda: len(anna.answers) == 5, "answers")
         for answer in anna.answers:
-            found = answer.get("log")
-            kinds = fits(answer, ANSWERS) if found is None else fits(found, (LogFound, LogRefused))
-            assert len(kinds) == 1, answer
+            assert len(fits(answer, CONSOLE.answers)) == 1, answer

@@ -2,7 +2,7 @@
 
 import { set } from "./text.js";
 
-/** @import { Link } from "./link.js" */
+/** @import { Connection } from "./types.d.ts" */
 
 const LOOK_EVERY_MS = 250;
 
@@ -12,7 +12,7 @@ const LOOK_EVERY_MS = 250;
  */
 export class Blindness {
   /**
-   * @param {{ link: Link, root: HTMLElement, title: Element, why: Element, areas: HTMLElement[],
+   * @param {{ link: Connection, root: HTMLElement, title: Element, why: Element, areas: HTMLElement[],
    *   stops: () => Iterable<HTMLButtonElement> }} given
    */
   constructor({ link, root, title, why, areas, stops }) {

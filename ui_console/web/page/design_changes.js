@@ -1,5 +1,7 @@
 // One change of the draft after the other.
 
+/** @import { DraftChange, MakeChange } from "./design_types.d.ts" */
+
 /**
  * Says a change as soon as the one before it was done; what it is about is looked at only then, or refused as too old.
  *
@@ -7,15 +9,21 @@
  * change cannot be said.
  */
 export class Changes {
+  /**
+   * @param {{ say: (change: DraftChange) => boolean, revision: () => number | undefined,
+   *   refused: (text: string, remedy: string) => void }} given
+   */
   constructor({ say, revision, refused }) {
     this.say = say;
     this.revision = revision;
     this.refused = refused;
+    /** @type {MakeChange[]} */
     this.waiting = [];
+    /** @type {DraftChange | null} */
     this.underway = null; // what was said and is neither done nor refused yet
   }
 
-  /** `make` returns the change when its turn comes; null: nothing is to be done any more. */
+  /** @param {MakeChange} make */
   add(make) {
     this.waiting.push(make);
     this.pump();
@@ -34,10 +42,13 @@ export class Changes {
   }
 
   pump() {
-    while (this.underway === null && this.waiting.length && this.revision() !== undefined) {
-      const message = this.waiting.shift()();
+    const revision = this.revision();
+    if (revision === undefined) return;
+    while (this.underway === null) {
+      const message = this.waiting.shift()?.();
+      if (message === undefined) return;
       if (message === null) continue;
-      this.underway = { revision: this.revision(), ...message };
+      this.underway = { ...message, revision: message.revision ?? revision };
       if (this.say(this.underway)) return;
       this.refused("NOT CONNECTED: this was not done", "");
       this.drop();

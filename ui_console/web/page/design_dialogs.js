@@ -1,26 +1,31 @@
 // Questions: one dialog to answer, one to choose, one to read. Each is a promise; null means that nothing was chosen.
 
-import { find } from "./dom.js";
+import { find, make, makeButton, query } from "./dom.js";
+
+/** @import { AskedView } from "./design_messages.d.ts" */
+/** @import { Input } from "./design_types.d.ts" */
 
 /**
- * Ask for each of `asks` ({name, doc, proposed, choices, is_required}); resolves to the answers in their order, or to
- * null.
- * `refused` says why earlier answers were not taken.
+ * Ask all of `asks`; resolves to the answers in their order, or to null.
+ *
+ * @param {string} title
+ * @param {string} doc
+ * @param {AskedView[]} asks
+ * @param {string} [refused] Why earlier answers were not taken.
+ * @returns {Promise<string[] | null>}
  */
 export function ask(title, doc, asks, refused = "") {
   const dialog = find("ask", HTMLDialogElement),
-    form = dialog.querySelector("form");
+    form = find("ask-form", HTMLFormElement),
+    cancel = find("ask-cancel", HTMLButtonElement);
   find("ask-title").textContent = title;
   find("ask-doc").textContent = doc;
   find("ask-refused").textContent = refused;
   const fields = asks.map((asked, number) => field(asked, `answer-${number}`));
   find("ask-fields").replaceChildren(...fields.map((one) => one.label));
-  /** @type {HTMLButtonElement} */
-  const cancel = form.querySelector("button[value=cancel]");
-  /** @type {HTMLButtonElement} */
-  const done = form.querySelector("button[value=done]");
+  const first = fields[0]?.input;
   return new Promise((resolve) => {
-    const close = (answers) => {
+    const close = (/** @type {string[] | null} */ answers) => {
       dialog.onclose = form.onsubmit = cancel.onclick = null;
       dialog.close();
       resolve(answers);
@@ -32,12 +37,19 @@ export function ask(title, doc, asks, refused = "") {
     cancel.onclick = () => close(null);
     dialog.onclose = () => close(null);
     dialog.showModal();
-    (fields[0]?.input ?? done).focus();
-    if (fields[0]?.input instanceof HTMLInputElement) fields[0].input.select();
+    (first ?? find("ask-done")).focus();
+    if (first instanceof HTMLInputElement) first.select();
   });
 }
 
-/** Let one of `options` ({label, doc}) be chosen; resolves to it, or null. */
+/**
+ * Let one of `options` be chosen; resolves to it, or to null.
+ *
+ * @template {{ label: string, doc: string }} Option
+ * @param {string} title
+ * @param {Option[]} options
+ * @returns {Promise<Option | null>}
+ */
 export function choose(title, options) {
   const dialog = find("choose", HTMLDialogElement),
     filter = find("choose-find", HTMLInputElement),
@@ -45,7 +57,7 @@ export function choose(title, options) {
   find("choose-title").textContent = title;
   filter.value = "";
   return new Promise((resolve) => {
-    const close = (option) => {
+    const close = (/** @type {Option | null} */ option) => {
       dialog.onclose = filter.oninput = filter.onkeydown = null;
       dialog.close();
       resolve(option);
@@ -53,26 +65,13 @@ export function choose(title, options) {
     const fill = () => {
       const part = filter.value.trim().toLowerCase();
       const shown = options.filter((one) => one.label.toLowerCase().includes(part));
-      list.replaceChildren(
-        ...shown.map((one) => {
-          const item = document.createElement("li"),
-            button = document.createElement("button"),
-            doc = document.createElement("span");
-          button.type = "button";
-          button.textContent = one.label;
-          button.onclick = () => close(one);
-          doc.className = "quiet";
-          doc.textContent = one.doc;
-          item.append(button, doc);
-          return item;
-        }),
-      );
+      list.replaceChildren(...shown.map((one) => item(one, () => close(one))));
     };
     filter.oninput = fill;
     filter.onkeydown = (event) => {
       if (event.key !== "Enter") return;
       event.preventDefault();
-      list.querySelector("button")?.click();
+      query(list, "button", HTMLButtonElement)?.click();
     };
     dialog.onclose = () => close(null);
     fill();
@@ -81,7 +80,13 @@ export function choose(title, options) {
   });
 }
 
-/** Show a text, from a line on. */
+/**
+ * Show a text, from a line on.
+ *
+ * @param {string} title
+ * @param {string} text
+ * @param {number} [line]
+ */
 export function read(title, text, line = 1) {
   find("reading-title").textContent = title;
   const shown = find("reading-text");
@@ -90,29 +95,49 @@ export function read(title, text, line = 1) {
   shown.scrollTop = (shown.scrollHeight * (line - 1)) / Math.max(1, text.split("\n").length);
 }
 
-/** A labelled input, or a select where the answers can be listed; Enter in either is the form's. */
+/**
+ * Makes an input, or a select where what can be meant can be listed.
+ *
+ * @param {string[]} choices
+ * @returns {Input}
+ */
+export function makeInput(choices) {
+  const input = make(choices.length ? "select" : "input");
+  if (input instanceof HTMLSelectElement) input.append(...choices.map((one) => new Option(one, one)));
+  input.autocomplete = "off";
+  return input;
+}
+
+/**
+ * @param {{ label: string, doc: string }} option
+ * @param {() => void} choose
+ */
+function item(option, choose) {
+  const made = make("li");
+  made.append(makeButton(option.label, choose), make("span", "quiet", option.doc));
+  return made;
+}
+
+/**
+ * A labelled input; Enter in a select is the form's, as in any other.
+ *
+ * @param {AskedView} asked
+ * @param {string} id
+ */
 function field(asked, id) {
-  const label = document.createElement("label"),
-    name = document.createElement("span"),
-    doc = document.createElement("span");
-  const input = asked.choices.length ? document.createElement("select") : document.createElement("input");
-  input.append(...asked.choices.map((one) => new Option(one, one)));
+  const label = make("label"),
+    input = makeInput(asked.choices);
   input.id = id;
   input.name = asked.name;
   input.value = asked.proposed;
   input.required = asked.is_required;
-  input.autocomplete = "off";
-  if (asked.choices.length) {
-    input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
-      if (event.key === "Enter") {
-        event.preventDefault();
-        input.form.requestSubmit();
-      }
-    });
+  if (input instanceof HTMLSelectElement) {
+    input.onkeydown = (event) => {
+      if (event.key !== "Enter") return;
+      event.preventDefault();
+      input.form?.requestSubmit();
+    };
   }
-  name.textContent = asked.name;
-  doc.className = "quiet";
-  doc.textContent = asked.doc;
-  label.append(name, input, doc);
+  label.append(make("span", "", asked.name), input, make("span", "quiet", asked.doc));
   return { label, input };
 }

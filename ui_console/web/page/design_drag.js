@@ -1,23 +1,37 @@
 // Dragging by mouse, pen or finger: one path for all of them, for a finger drags nothing by the browser's own means.
 
+import { around, make } from "./dom.js";
+
+/** @import { Dragged, DropPlace, RowPart } from "./design_types.d.ts" */
+
 const BEGINS_AFTER_PX = 6; // chosen: a click that shakes is still a click
 const EDGE_PX = 48; // chosen: about a finger; nearer to the edge than this the tree scrolls
 const SCROLL_PX = 10; // a frame
 const BORDER_SHARE = 0.28; // chosen: of a row's height, above and below, where the place between rows is meant
 
 /**
+ * What is held by a pointer; it is dragged once it has a ghost.
+ *
+ * @typedef {{ pointer: number, x: number, y: number, source: HTMLElement, what: Dragged, ghost: HTMLElement | null,
+ *   place: DropPlace | null }} Held
+ */
+
+/**
  * Whatever has `data-drag` can be dragged: by a mouse anywhere, by a finger at its `.handle`, so that fingers still
  * scroll.
  *
- * `place(what, row, part)` says what a drop there would mean, or null; part is "before", "into" or "after".
- * `drop(place)` does it.
+ * `what(source)` says what is dragged, or null; `place(what, row, part)` says what a drop there would mean, or null.
  */
 export class Drag {
-  constructor({ tree, what, place, drop }) {
+  /**
+   * @param {{ tree: HTMLElement, what: (source: HTMLElement) => Dragged | null,
+   *   place: (what: Dragged, row: HTMLElement, part: RowPart) => DropPlace | null }} given
+   */
+  constructor({ tree, what, place }) {
     this.tree = tree;
     this.what = what;
     this.place = place;
-    this.drop = drop;
+    /** @type {Held | null} */
     this.held = null;
     document.addEventListener("pointerdown", (event) => this.down(event));
     document.addEventListener("pointermove", (event) => this.move(event));
@@ -36,41 +50,35 @@ export class Drag {
     addEventListener("blur", () => this.end());
   }
 
+  /** @param {PointerEvent} event */
   down(event) {
     if (this.held || !event.isPrimary || (event.pointerType === "mouse" && event.button !== 0)) return;
-    const source = event.target.closest("[data-drag]");
-    if (!source || event.target.closest("button, input, select")) return;
-    if (event.pointerType !== "mouse" && !event.target.closest(".handle")) return;
-    if (event.target.hasPointerCapture?.(event.pointerId)) event.target.releasePointerCapture(event.pointerId);
-    this.held = {
-      pointer: event.pointerId,
-      x: event.clientX,
-      y: event.clientY,
-      source,
-      what: this.what(source),
-      ghost: null,
-      place: null,
-    };
+    const source = around(event, "[data-drag]");
+    if (!source || around(event, "button, input, select")) return;
+    if (event.pointerType !== "mouse" && !around(event, ".handle")) return;
+    const { pointerId: pointer, clientX: x, clientY: y, target } = event;
+    const what = this.what(source);
+    if (!what) return;
+    if (target instanceof Element && target.hasPointerCapture(pointer)) target.releasePointerCapture(pointer);
+    this.held = { pointer, x, y, source, what, ghost: null, place: null };
   }
 
+  /** @param {PointerEvent} event */
   move(event) {
     const held = this.held;
     if (!held || event.pointerId !== held.pointer) return;
-    if (!held.ghost) {
-      if (Math.hypot(event.clientX - held.x, event.clientY - held.y) < BEGINS_AFTER_PX) return;
-      this.begin();
-    }
+    const isShaking = Math.hypot(event.clientX - held.x, event.clientY - held.y) < BEGINS_AFTER_PX;
+    if (!held.ghost && isShaking) return;
     [held.x, held.y] = [event.clientX, event.clientY];
+    held.ghost ??= this.begin(held);
     held.ghost.style.transform = `translate(${held.x + 12}px, ${held.y + 12}px)`;
-    this.look();
+    this.look(held, held.ghost);
   }
 
-  begin() {
-    const held = this.held;
-    held.ghost = document.createElement("div");
-    held.ghost.className = "ghost";
-    held.ghost.textContent = held.what.told;
-    document.body.append(held.ghost);
+  /** @param {Held} held */
+  begin(held) {
+    const ghost = make("div", "ghost", held.what.told);
+    document.body.append(ghost);
     document.body.classList.add("is-dragging");
     held.source.classList.add("is-dragged");
     const scroll = () => {
@@ -80,29 +88,39 @@ export class Drag {
         if (held.y < box.top + EDGE_PX) this.tree.scrollTop -= SCROLL_PX;
         else if (held.y > box.bottom - EDGE_PX) this.tree.scrollTop += SCROLL_PX;
       }
-      this.look();
+      this.look(held, ghost);
       requestAnimationFrame(scroll);
     };
     requestAnimationFrame(scroll);
+    return ghost;
   }
 
-  /** Show where it would go now. */
-  look() {
-    const held = this.held;
-    const row = document.elementFromPoint(held.x, held.y)?.closest("#tree .element") ?? null;
-    let place = null;
-    if (row) {
-      const box = row.getBoundingClientRect();
-      const share = (held.y - box.top) / box.height;
-      const part = share < BORDER_SHARE ? "before" : share > 1 - BORDER_SHARE ? "after" : "into";
-      place = this.place(held.what, row, part) ?? (part === "into" ? null : this.place(held.what, row, "into"));
-    }
+  /**
+   * Show where it would go now.
+   *
+   * @param {Held} held
+   * @param {HTMLElement} ghost
+   */
+  look(held, ghost) {
+    const row = document.elementFromPoint(held.x, held.y)?.closest("#tree .element");
+    held.place = row instanceof HTMLElement ? this.placeAt(held, row) : null;
     this.unmark();
-    held.place = place;
-    held.ghost.classList.toggle("is-refused", place === null);
-    place?.row.classList.add(`drop-${place.part}`);
+    ghost.classList.toggle("is-refused", held.place === null);
+    held.place?.row.classList.add(`drop-${held.place.part}`);
   }
 
+  /**
+   * @param {Held} held
+   * @param {HTMLElement} row
+   */
+  placeAt({ y, what }, row) {
+    const box = row.getBoundingClientRect();
+    const share = (y - box.top) / box.height;
+    const part = share < BORDER_SHARE ? "before" : share > 1 - BORDER_SHARE ? "after" : "into";
+    return this.place(what, row, part) ?? (part === "into" ? null : this.place(what, row, "into"));
+  }
+
+  /** @param {PointerEvent} event */
   up(event) {
     const held = this.held;
     if (!held || event.pointerId !== held.pointer) return;
@@ -110,7 +128,7 @@ export class Drag {
     if (held.ghost) addEventListener("click", stopClick, { capture: true, once: true });
     setTimeout(() => removeEventListener("click", stopClick, { capture: true }));
     this.end();
-    if (place) this.drop(place);
+    place?.do();
   }
 
   end() {
@@ -128,6 +146,7 @@ export class Drag {
   }
 }
 
+/** @param {Event} event */
 function stopClick(event) {
   event.stopPropagation();
   event.preventDefault();

@@ -1,22 +1,23 @@
 // Panes of the designer: beside each other where there is room, one at a time where there is not.
 
-import { find } from "./dom.js";
+import { around, find, queryAll } from "./dom.js";
+
+/** @type {Record<string, number | undefined>} */
+const STEPS = { ArrowLeft: -1, ArrowRight: 1 };
 
 /** Shows the panes that tabs choose; `rehearse(isShown)` is called when the first minute comes into sight or leaves. */
 export class Panes {
+  /** @param {{ rehearse: (isShown: boolean) => void }} given */
   constructor({ rehearse }) {
     this.rehearse = rehearse;
-    this.show = (pane) => this.choose(pane);
     for (const list of [find("panes"), find("below-tabs")]) {
-      list.addEventListener("click", (event) => {
-        const tab = /** @type {Element} */ (event.target).closest("[role=tab]");
-        if (tab) this.choose(tab.getAttribute("data-pane"));
-      });
+      list.addEventListener("click", (event) => this.press(around(event, "[role=tab]")));
       list.addEventListener("keydown", (event) => this.step(list, event));
     }
   }
 
-  choose(pane) {
+  /** @param {string} pane */
+  show(pane) {
     document.body.dataset.pane = pane;
     mark("#panes", pane);
     if (pane !== "problems" && pane !== "minute") return;
@@ -27,18 +28,32 @@ export class Panes {
     find("problems").hidden = isMinute;
   }
 
+  /** @param {HTMLElement | null} tab */
+  press(tab) {
+    if (tab?.dataset.pane) this.show(tab.dataset.pane);
+  }
+
+  /**
+   * @param {HTMLElement} list
+   * @param {KeyboardEvent} event
+   */
   step(list, event) {
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    const tabs = [...list.children];
-    const at = tabs.indexOf(document.activeElement);
+    const step = STEPS[event.key];
+    const tabs = queryAll(list, "[role=tab]", HTMLElement);
+    const active = document.activeElement;
+    const at = active instanceof HTMLElement ? tabs.indexOf(active) : -1;
     if (!step || at < 0) return;
     event.preventDefault();
     const next = tabs[(at + step + tabs.length) % tabs.length];
     next.focus();
-    this.choose(next.dataset.pane);
+    this.press(next);
   }
 }
 
+/**
+ * @param {string} list
+ * @param {string} pane
+ */
 function mark(list, pane) {
   for (const tab of document.querySelectorAll(`${list} [role=tab]`)) {
     tab.setAttribute("aria-selected", String(tab.getAttribute("data-pane") === pane));

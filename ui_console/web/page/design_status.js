@@ -1,12 +1,25 @@
 // What the designer's page says in passing: how the draft is, who else is here, and notices.
 
-import { find } from "./dom.js";
+import { find, make, makeButton } from "./dom.js";
+
+/** @import { DraftStatus } from "./design_messages.d.ts" */
 
 const NOTICES = 3;
 
-/** Show how the draft is, and which commands it allows. */
+/**
+ * The mission file without its folder.
+ *
+ * @param {DraftStatus} status
+ */
+export const titleOf = ({ source }) => source.slice(source.lastIndexOf("/") + 1);
+
+/**
+ * Show how the draft is, and which commands it allows.
+ *
+ * @param {DraftStatus} status
+ */
 export function showStatus(status) {
-  const name = status.source.split("/").at(-1);
+  const name = titleOf(status);
   const count = status.problems ? `${status.problems} problem${status.problems === 1 ? "" : "s"}` : "fine";
   find("mission").textContent = name;
   find("state").textContent = `${status.is_changed ? "changed" : "saved"}, ${count}`;
@@ -18,24 +31,30 @@ export function showStatus(status) {
   find("save", HTMLButtonElement).disabled = !status.is_changed;
 }
 
-/** Show who else works on the draft. */
+/**
+ * Show who else works on the draft.
+ *
+ * @param {string[]} people
+ * @param {string} [user] Who this is.
+ */
 export function showPeople(people, user) {
-  const others = people.filter((_one, at) => at !== people.indexOf(user));
+  const others = people.filter((one, at) => one !== user || at !== people.indexOf(one));
   find("people").textContent = people.length > 1 ? `with ${others.join(", ")}` : "";
 }
 
-/** Say something that a person has seen when they say so, or when newer ones need its place. */
+/**
+ * Say something that a person has seen when they say so, or when newer ones need its place.
+ *
+ * @param {string} text
+ * @param {string} remedy
+ * @param {"bad" | "good"} [kind]
+ */
 export function notice(text, remedy, kind = "bad") {
-  const made = document.createElement("p"),
-    seen = document.createElement("button");
-  made.className = kind;
-  made.textContent = remedy ? `${text} (${remedy})` : text;
-  seen.type = "button";
-  seen.textContent = "✕";
+  const made = make("p", kind, remedy ? `${text} (${remedy})` : text);
+  const seen = makeButton("✕", () => made.remove());
   seen.setAttribute("aria-label", "Seen");
-  seen.addEventListener("click", () => made.remove());
   made.append(seen);
   const root = find("notices");
   root.append(made);
-  while (root.children.length > NOTICES) root.firstChild.remove();
+  while (root.children.length > NOTICES) root.children[0].remove();
 }

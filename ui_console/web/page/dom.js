@@ -30,14 +30,67 @@ export function make(tag, className = "", text = "") {
 }
 
 /**
- * Makes a button that does this.
+ * Makes a button that does this; with a key it keeps the focus when it is drawn anew, see `keepingFocus`.
  *
  * @param {string} label
  * @param {() => void} press
+ * @param {string} [key]
  */
-export function makeButton(label, press) {
+export function makeButton(label, press, key = "") {
   const button = make("button", "", label);
   button.type = "button";
+  if (key) button.dataset.key = key;
   button.addEventListener("click", press);
   return button;
+}
+
+/**
+ * Returns the first element in `root` that a selector finds; null: there is none, or it is of another kind.
+ *
+ * @template {Element} T
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @param {new () => T} kind
+ * @returns {T | null}
+ */
+export function query(root, selector, kind) {
+  const found = root.querySelector(selector);
+  return found instanceof kind ? found : null;
+}
+
+/**
+ * Returns all elements of a kind in `root` that a selector finds.
+ *
+ * @template {Element} T
+ * @param {ParentNode} root
+ * @param {string} selector
+ * @param {new () => T} kind
+ * @returns {T[]}
+ */
+export function queryAll(root, selector, kind) {
+  return [...root.querySelectorAll(selector)].flatMap((one) => (one instanceof kind ? [one] : []));
+}
+
+/**
+ * Returns the nearest element of a selector around what an event happened to; null: there is none.
+ *
+ * @param {Event} event
+ * @param {string} selector
+ */
+export function around(event, selector) {
+  const found = event.target instanceof Element ? event.target.closest(selector) : null;
+  return found instanceof HTMLElement ? found : null;
+}
+
+/**
+ * Draws what is in `root` anew; the focus stays on the element with the same `data-key`.
+ *
+ * @param {HTMLElement} root
+ * @param {() => void} draw
+ */
+export function keepingFocus(root, draw) {
+  const active = document.activeElement;
+  const key = active !== null && root.contains(active) ? active.getAttribute("data-key") : null;
+  draw();
+  if (key) query(root, `[data-key="${CSS.escape(key)}"]`, HTMLElement)?.focus();
 }

@@ -2,6 +2,7 @@
 
 import { Freshness, makeClock } from "./freshness.js";
 
+/** @import { Beat } from "./messages.d.ts" */
 /** @import { LinkChange, LinkState, Picture } from "./types.d.ts" */
 
 const AGAIN_FIRST_MS = 500; // chosen: a server that was restarted is back soon
@@ -15,10 +16,13 @@ const NOT_LET_IN = 1008;
 /**
  * One connection at a time; `heard` gets objects, `saw` gets pictures, `changed` gets {is, why, ageMs}, where `is` says
  * whether what is shown is "fresh", "old" (nothing came back for most of a second), "down", or "refused" (wrong token).
+ *
+ * @template {{ view?: { beat?: number } }} Heard
+ * @template {object} Said
  */
 export class Link {
   /**
-   * @param {{ heard: (message: any) => void, saw: (picture: Picture) => void, changed: (to: LinkChange) => void,
+   * @param {{ heard: (message: Heard) => void, saw: (picture: Picture) => void, changed: (to: LinkChange) => void,
    *   silentMs?: number, oldMs?: number }} given
    */
   constructor({ heard, saw, changed, silentMs = SILENT_MS, oldMs = OLD_MS }) {
@@ -77,6 +81,7 @@ export class Link {
         return;
       }
       if (!this.isUp) this.came();
+      /** @type {Heard} */
       const message = JSON.parse(event.data);
       if (message.view?.beat !== undefined) this.freshness.returned(message.view.beat);
       this.heard(message);
@@ -140,7 +145,7 @@ export class Link {
   /**
    * Say something if it can be said now: nothing is kept for later, least of all a drive.
    *
-   * @param {object} message A page has its own: see `Said` of the console.
+   * @param {Said | Beat} message
    */
   say(message) {
     if (!this.isUp || this.socket?.readyState !== WebSocket.OPEN) return false;

@@ -22,6 +22,7 @@ const TOUCHED_EVERY_MS = 5000; // chosen: far below the two minutes after which 
 /** @type {Partial<View>} */
 const view = {};
 
+/** @type {Link<Heard, Said>} */
 const link = new Link({ heard, saw: (picture) => cards.saw(picture), changed });
 /** @type {Say} */
 const say = (message) => link.say(message);

@@ -1,4 +1,4 @@
-// What the page and its server send each other. Written by ui_console/web/page_types.py; change the structs.
+// What the page and its server send each other. Written by ui_console/page_types.py; change the structs.
 
 export interface Absence {
   name: string;
@@ -90,20 +90,6 @@ export interface HealthView {
   lines: string[];
 }
 
-export interface HostLoad {
-  host: string;
-  tags: string[];
-  cpu: number;
-  memory: number;
-  cores: number;
-  components: number;
-}
-
-export interface HostView {
-  load: HostLoad;
-  age_s: number;
-}
-
 export type LifeState =
   | "connecting"
   | "draining"
@@ -128,11 +114,19 @@ export interface LogFound {
   asked_s: number;
 }
 
+export interface LogFoundAnswer {
+  log: LogFound;
+}
+
 export interface LogRefused {
   number: number;
   code: string;
   refused: string;
   remedy: string;
+}
+
+export interface LogRefusedAnswer {
+  log: LogRefused;
 }
 
 export interface LoggedEvent {
@@ -333,13 +327,12 @@ export interface View {
   tree: NodeView[];
   requests: RequestView[];
   timeline: TimelineView;
-  hosts: HostView[];
   health: HealthView | null;
   parameters: ParameterView[];
   components: ComponentState[];
   log: LoggedEvent[];
   now_s: number;
-  beat: number | null;
+  beat: number;
 }
 
 export interface Welcomed {
@@ -476,9 +469,15 @@ export interface Watch {
   robots: string[];
 }
 
-export type Answer = WhyAnswer | RefusedAnswer | ParametersAnswer | SetAnswer | { log: LogFound | LogRefused };
+export type Answer =
+  | WhyAnswer
+  | RefusedAnswer
+  | ParametersAnswer
+  | SetAnswer
+  | LogFoundAnswer
+  | LogRefusedAnswer;
 
-export type Heard = { view: Partial<View>; answer?: undefined } | { answer: Answer };
+export type Heard = { view: Partial<View>; answer?: undefined } | { answer: Answer; view?: undefined };
 
 export type Said =
   | Hello

@@ -1,5 +1,6 @@
 // Tables of the mission. What is shown was decided by the console model; here it only becomes rows.
 
+import { keepingFocus } from "./dom.js";
 import { paragraph, span, table } from "./table.js";
 import { seconds, set } from "./text.js";
 import { timeline } from "./timeline.js";
@@ -119,12 +120,7 @@ export class Tables {
     this.panel.classList.toggle("is-held", isHeld); // somebody is typing or pressing here: it says that it stands still
     const content = isHeld ? [] : this.content();
     if (content.length === 0) return;
-    const active = document.activeElement;
-    const focus = active !== null && this.panel.contains(active) ? active.getAttribute("data-key") : null;
-    this.panel.replaceChildren(...content);
-    if (focus === null) return;
-    const again = this.panel.querySelector(`[data-key="${CSS.escape(focus)}"]`);
-    if (again instanceof HTMLElement) again.focus();
+    keepingFocus(this.panel, () => this.panel.replaceChildren(...content));
   }
 
   /** @param {AlarmView[]} rows */

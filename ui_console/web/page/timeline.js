@@ -1,10 +1,10 @@
 // Who had which resource, who has it, who comes next: drawn as large as it is shown, so that its words can be read.
 
+import { drawn } from "./svg.js";
 import { seconds, shortened } from "./text.js";
 
 /** @import { SliceView, TimelineRow, TimelineView } from "./messages.d.ts" */
 
-const SVG = "http://www.w3.org/2000/svg";
 const ROW_PX = 28,
   LEFT_PX = 110,
   LEAST_PX = 560,
@@ -20,7 +20,7 @@ const ROW_PX = 28,
 export function timeline(view, widthPx) {
   const width = Math.max(LEAST_PX, widthPx) - LEFT_PX,
     height = ROW_PX * view.rows.length;
-  const svg = node("svg", {
+  const svg = drawn("svg", {
     class: "timeline",
     width: LEFT_PX + width,
     height: height + FOOT_PX,
@@ -32,8 +32,8 @@ export function timeline(view, widthPx) {
     LEFT_PX + (width * (within(time) - view.from_s)) / (view.to_s - view.from_s);
   for (const [number, row] of view.rows.entries()) svg.append(...rowOf(row, number * ROW_PX, at));
   const here = at(view.now_s);
-  svg.append(node("line", { x1: here, x2: here, y1: 0, y2: height, class: "here" }));
-  svg.append(node("text", { x: here - 30, y: height + 15 }, seconds(view.now_s)));
+  svg.append(drawn("line", { x1: here, x2: here, y1: 0, y2: height, class: "here" }));
+  svg.append(drawn("text", { x: here - 30, y: height + 15 }, seconds(view.now_s)));
   return svg;
 }
 
@@ -43,8 +43,8 @@ export function timeline(view, widthPx) {
  * @param {(time: number) => number} at
  */
 function rowOf(row, top, at) {
-  const name = node("text", { x: 4, y: top + 18 }, shortened(row.rc, Math.floor(LEFT_PX / LETTER_PX) - 1));
-  name.append(node("title", {}, row.rc));
+  const name = drawn("text", { x: 4, y: top + 18 }, shortened(row.rc, Math.floor(LEFT_PX / LETTER_PX) - 1));
+  name.append(drawn("title", {}, row.rc));
   return [name, ...row.slices.flatMap((slice) => sliceOf(slice, top, at))];
 }
 
@@ -57,20 +57,8 @@ function sliceOf(slice, top, at) {
   const from = at(slice.from_s),
     width = Math.max(1, at(slice.to_s) - from);
   const kind = `${slice.certainty}${slice.is_console ? " console" : ""}`;
-  const bar = node("rect", { x: from, y: top + 3, width, height: ROW_PX - 6, rx: 3, class: kind });
-  bar.append(node("title", {}, `${slice.who}: ${seconds(slice.from_s)} to ${seconds(slice.to_s)}`));
+  const bar = drawn("rect", { x: from, y: top + 3, width, height: ROW_PX - 6, rx: 3, class: kind });
+  bar.append(drawn("title", {}, `${slice.who}: ${seconds(slice.from_s)} to ${seconds(slice.to_s)}`));
   const label = shortened(slice.who, Math.floor((width - 8) / LETTER_PX));
-  return label ? [bar, node("text", { x: from + 4, y: top + 18 }, label)] : [bar];
-}
-
-/**
- * @param {string} tag
- * @param {Record<string, string | number>} attributes
- * @param {string} [text]
- */
-function node(tag, attributes, text = "") {
-  const made = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, String(value));
-  if (text) made.append(text);
-  return made;
+  return label ? [bar, drawn("text", { x: from + 4, y: top + 18 }, label)] : [bar];
 }

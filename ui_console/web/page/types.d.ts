@@ -24,5 +24,13 @@ export interface LinkChange {
   ageMs: number;
 }
 
+/** What is shown of the connection. */
+export interface Connection {
+  readonly is: LinkState;
+  readonly isUp: boolean;
+  readonly why: string;
+  readonly ageMs: number;
+}
+
 /** Forward and right, each from −1 to 1. */
 export type Stick = [number, number];

@@ -353,13 +353,14 @@ def test_rows_say_whose_stop_it_is_and_the_alarm_ends_with_it_for_those_who_came
         await anna.console.stop_robot("scout1", "child in the room")
         await on.clock.sleep_s(0.1)
         for person, is_mine in ((anna, True), (ben, False)):
-            stop = person.model.team.stop_view("scout1", on.clock.now_s(), person.name, f"ui_console/{person.name}")
+            robots, address = person.model.team.robots, f"ui_console/{person.name}"
+            stop = robots.stop_view("scout1", on.clock.now_s(), person.name, address)
             assert stop is not None
             assert (stop.by_user, stop.reason, stop.is_mine, stop.also) == ("anna", "child in the room", is_mine, [])
         assert await on.lift("anna")
         await on.clock.sleep_s(0.1)
         for person in on.people.values():
-            assert person.model.team.stop_of("scout1") is None
+            assert person.model.team.robots.stop_of("scout1") is None
             assert not [alarm for alarm in person.model.alarm_views() if alarm.is_active]
 
     stage(scene)

@@ -125,7 +125,7 @@ def test_one_that_comes_late_hears_how_things_are_and_then_what_changes(stage: C
             async with on.beside(on.observer()):
                 await on.until(lambda: {"schedule", "components", "stop"} <= on.words())
                 assert [row.robot for row in on.model.robots(8.0)] == ["scout1", "scout2"]
-                stop = on.model.team.stop_of("scout1")
+                stop = on.model.team.robots.stop_of("scout1")
                 assert stop is not None
                 assert stop.by == "ben"
                 manager.bus.publish(RC_MANAGER, Conversation.SCHEDULE, Schedule(9.0, [], [], []))
@@ -188,7 +188,7 @@ def test_hosts_and_what_fell_there_are_heard_from_their_creators(stage: Callable
             fell = ProcessFell("scout1", "signal 9", -1.0, [])
             creator.bus.publish(creator.address, Conversation.EVENTS, fell)
             await on.until(lambda: {"load", "fell"} <= on.words())
-            assert on.model.team.hosts(0.0)[0].load.host == "local"
+            assert on.model.team.links.hosts(0.0)[0].load.host == "local"
             assert "given up" in on.model.alarm_views()[0].line
 
     stage(scene)
@@ -222,7 +222,7 @@ def test_all_robots_are_stopped_also_those_not_heard_of_and_a_silent_one_is_name
             lines = [alarm.line for alarm in on.model.alarm_views()]
             assert any("scout2 did not confirm the stop" in line for line in lines)
             assert await console.lift_stop("scout1", one.latch.state.number)
-            assert on.model.team.stop_of("scout1") is None
+            assert on.model.team.robots.stop_of("scout1") is None
             assert not one.latch.state.is_stopped
 
     stage(scene)

@@ -19,6 +19,7 @@ from written_session import WrittenSession, settle
 from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
 from backbone.mission_log import AskLog, Log
+from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Consent, Settled, Sought
 from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.model.events import (
@@ -30,7 +31,6 @@ from ui_console.model.events import (
     Heard,
     LinkHeard,
     LinkTrouble,
-    Lost,
 )
 from ui_console.model.profile import Profile
 from ui_console.session.feed import LogAway
@@ -117,7 +117,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
 
 
 def test_the_reference_names_every_key_and_who_has_it() -> None:
-    page = (Path(__file__).parents[2] / "docs/reference/console-keys.md").read_text()
+    page = (Path(__file__).parents[3] / "docs/reference/console-keys.md").read_text()
     profiles = {"attach": Profile.TERMINAL, "pendant": Profile.PENDANT, "monitor": Profile.MONITOR}
     listed: dict[str, set[str]] = {}
     for keys, who in re.findall(r"^\| ((?:`[^`]+` ?)+)\|[^|]*\| ([a-z, ]+) \|$", page, re.MULTILINE):
@@ -131,7 +131,7 @@ def test_the_reference_names_every_key_and_who_has_it() -> None:
 
 
 def test_the_how_to_names_only_keys_that_there_are() -> None:
-    page = (Path(__file__).parents[2] / "docs/how-to/operate-from-a-terminal.md").read_text().replace("```", "")
+    page = (Path(__file__).parents[3] / "docs/how-to/operate-from-a-terminal.md").read_text().replace("```", "")
     signs = {"plus": "+", "minus": "-", "slash": "/", "question_mark": "?"}
     signs |= {"left_square_bracket": "[", "right_square_bracket": "]"}
     known = {signs.get(binding.key, binding.key) for binding in Binding.make_bindings(KEYS_OF_THE_CONSOLE)}
@@ -555,7 +555,7 @@ async def test_an_old_picture_says_so_across_the_picture() -> None:
 async def test_a_robot_that_was_taken_away_says_by_whom_across_the_picture() -> None:
     session = WrittenSession(shown=held_model())
     session.shown = np.full((30, 40), 200, np.uint8)
-    session.model.apply(Lost(11.9, "higher", "console-2", -1.0))
+    session.model.apply(Heard(11.9, Suspended("arc", "higher", "console-2", -1.0)))
     screen = ConsoleApp(session)
     async with screen.run_test(size=SIZE) as pilot:
         screen.redraw()

@@ -1,12 +1,14 @@
-"""The types of the console page's messages, for the checker of its JavaScript.
+"""The types of the pages' messages, for the checker of their JavaScript.
 
-Run ``python -m ui_console.web.page_types`` after a change of a message: it writes ``page/messages.d.ts`` anew. A test
-compares that file with the structs, and what a server sends with ``View`` and ``Answer``.
+Run ``python -m ui_console.page_types`` after a change of a message: it writes ``messages.d.ts`` of the console and
+``design_messages.d.ts`` of the designer anew. A test compares these files with the structs, and what the servers send
+with ``View``, ``DesignView`` and the answers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import get_args
 
@@ -15,21 +17,23 @@ from msgspec import inspect
 
 from backbone.component.messages import ComponentState
 from backbone.scheduling.views import RequestView
-from ui_console.model.views import (
-    AlarmView,
-    HealthView,
-    HostView,
-    LinkView,
-    NodeView,
-    OwnView,
-    ParameterView,
-    RobotView,
-    TimelineView,
+from ui_console.design.answers import DesignAnswer
+from ui_console.design.protocol import DesignIntent
+from ui_console.design.views import (
+    DesignerWelcomed,
+    DraftStatus,
+    ElementRow,
+    ElementView,
+    PaletteRow,
+    ProblemRow,
+    RehearsalView,
 )
+from ui_console.model import views
+from ui_console.model.timeline import TimelineView
 from ui_console.web.door import Beat, Hello
 from ui_console.web.protocol import Intent
 
-FILE = Path(__file__).parent / "page" / "messages.d.ts"
+FOLDER = Path(__file__).parent / "web" / "page"
 _PLAIN: dict[type[inspect.Type], str] = {
     inspect.IntType: "number",
     inspect.FloatType: "number",
@@ -37,7 +41,7 @@ _PLAIN: dict[type[inspect.Type], str] = {
     inspect.BoolType: "boolean",
     inspect.NoneType: "null",
 }
-HEAD = "// What the page and its server send each other. Written by ui_console/web/page_types.py; change the structs.\n"
+HEAD = "// What the page and its server send each other. Written by ui_console/page_types.py; change the structs.\n"
 
 
 class Welcomed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -70,21 +74,20 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """All sections of the view; a message has those that changed."""
 
     welcome: Welcomed
-    own: OwnView
-    robots: list[RobotView]
-    links: list[LinkView]
-    alarms: list[AlarmView]
+    own: views.OwnView
+    robots: list[views.RobotView]
+    links: list[views.LinkView]
+    alarms: list[views.AlarmView]
     drawn: dict[str, float]
-    tree: list[NodeView]
+    tree: list[views.NodeView]
     requests: list[RequestView]
     timeline: TimelineView
-    hosts: list[HostView]
-    health: HealthView | None
-    parameters: list[ParameterView]
+    health: views.HealthView | None
+    parameters: list[views.ParameterView]
     components: list[ComponentState]
     log: list[LoggedEvent]
     now_s: float
-    beat: int | None = None
+    beat: int
 
 
 class LogFound(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -136,21 +139,81 @@ class SetAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     done: bool
 
 
-ANSWERS = (WhyAnswer, RefusedAnswer, ParametersAnswer, SetAnswer)
+class LogFoundAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a search found."""
+
+    log: LogFound
 
 
-def declarations() -> str:
-    """Return the whole file."""
-    said = [Hello, Beat, *get_args(Intent)]
-    parts = [HEAD]
-    parts += _interfaces([View, LogFound, LogRefused, *ANSWERS], is_sent_whole=True)
-    parts += _interfaces(said, is_sent_whole=False)
-    answers = " | ".join([*(kind.__name__ for kind in ANSWERS), "{ log: LogFound | LogRefused }"])
-    parts.append(f"export type Answer = {answers};\n")
-    parts.append("export type Heard = { view: Partial<View>; answer?: undefined } | { answer: Answer };\n")
-    words = "\n".join(f"  | {kind.__name__}" for kind in said)
-    parts.append(f"export type Said =\n{words};\n")
-    return "\n".join(parts)
+class LogRefusedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Why a search finds nothing."""
+
+    log: LogRefused
+
+
+class DesignView(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """All sections of the designer's view; a message has those that changed."""
+
+    welcome: DesignerWelcomed
+    tree: list[ElementRow]
+    problems: list[ProblemRow]
+    palette: list[PaletteRow]
+    places: dict[str, list[str]]
+    status: DraftStatus
+    selected: int
+    element: ElementView
+    rehearsal: RehearsalView | None
+    people: list[str]
+    handled: int
+    beat: int
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """What a page and its server send each other.
+
+    Attributes:
+        file: Where its types are written.
+        view: All that it shows.
+        answers: To what it asks.
+        said: What it says.
+    """
+
+    file: Path
+    view: type[msgspec.Struct]
+    answers: tuple[type[msgspec.Struct], ...]
+    said: tuple[type[msgspec.Struct], ...]
+
+
+CONSOLE = Page(
+    FOLDER / "messages.d.ts",
+    View,
+    (WhyAnswer, RefusedAnswer, ParametersAnswer, SetAnswer, LogFoundAnswer, LogRefusedAnswer),
+    (Hello, Beat, *get_args(Intent)),
+)
+DESIGNER = Page(
+    FOLDER / "design_messages.d.ts", DesignView, get_args(DesignAnswer), (Hello, Beat, *get_args(DesignIntent))
+)
+
+
+def declarations(page: Page) -> str:
+    """Return the whole file of a page."""
+    news = f"{{ view: Partial<{page.view.__name__}>; answer?: undefined }}"
+    return "\n".join(
+        [
+            HEAD,
+            *_interfaces([page.view, *page.answers], is_sent_whole=True),
+            *_interfaces(page.said, is_sent_whole=False),
+            _union("Answer", page.answers),
+            f"export type Heard = {news} | {{ answer: Answer; view?: undefined }};\n",
+            _union("Said", page.said),
+        ]
+    )
+
+
+def _union(name: str, kinds: Iterable[type[msgspec.Struct]]) -> str:
+    words = "\n".join(f"  | {kind.__name__}" for kind in kinds)
+    return f"export type {name} =\n{words};\n"
 
 
 def _interfaces(kinds: Iterable[type[msgspec.Struct]], *, is_sent_whole: bool) -> list[str]:
@@ -192,7 +255,7 @@ def _type(kind: inspect.Type, declared: dict[str, str], is_sent_whole: bool) -> 
             return cls.__name__
         case inspect.UnionType(types=types):
             return " | ".join(_type(one, declared, is_sent_whole) for one in types)
-        case inspect.ListType(item_type=item):
+        case inspect.ListType(item_type=item) | inspect.VarTupleType(item_type=item):
             of = _type(item, declared, is_sent_whole)
             return f"({of})[]" if " " in of else f"{of}[]"
         case inspect.DictType(value_type=value):
@@ -207,4 +270,5 @@ def _tag(kind: inspect.StructType) -> list[str]:
 
 
 if __name__ == "__main__":
-    FILE.write_text(declarations())
+    for each in (CONSOLE, DESIGNER):
+        each.file.write_text(declarations(each))

@@ -1,0 +1,66 @@
+"""What the designer's server answers one page; the page knows an answer by its fields."""
+
+from __future__ import annotations
+
+import msgspec
+
+from backbone.mission.edit import Path
+from ui_console.design.views import OfferView
+
+
+class AskAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An offer asks for answers before it is taken at an element."""
+
+    ask: OfferView
+    path: Path
+
+
+class RefusalAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The server refuses what the page said.
+
+    Attributes:
+        refused: Why.
+        remedy: What to do about it; may be empty.
+        is_change: Whether the page meant to change, save or read the draft.
+    """
+
+    refused: str
+    remedy: str
+    is_change: bool
+
+
+class FileChangedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The file holds what another program wrote; the draft is not saved.
+
+    Attributes:
+        file_changed: What happened.
+        name: Another file of the same folder that the draft was to be saved as; empty: its own.
+    """
+
+    file_changed: str
+    name: str
+
+
+class NoticeAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A designer has to know this, whatever the page said last."""
+
+    notice: str
+    remedy: str
+
+
+class SavedAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The draft is saved in this file, with so many problems."""
+
+    saved: str
+    problems: int
+
+
+class TextAnswer(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The text as it would be saved, the line of the chosen element, and the mission file."""
+
+    text: str
+    line: int
+    source: str
+
+
+DesignAnswer = AskAnswer | RefusalAnswer | FileChangedAnswer | NoticeAnswer | SavedAnswer | TextAnswer

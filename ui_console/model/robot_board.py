@@ -1,0 +1,149 @@
+"""Robots: who holds which, until when, who waits for it, and which stop is in force.
+
+Rules of this file: no bus, no clock, no screen; messages go in, views and alarms come out; times are arguments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from msgspec.structs import replace
+
+from backbone.naming import Subsystem, component_of
+from backbone.people import is_console, screens_of
+from backbone.picture.mission import MissionPicture
+from backbone.picture.words import because
+from backbone.rc_manager.messages import Leases
+from backbone.scheduling.views import RcView, RequestView, Schedule
+from resource_pool.arc_client import Stopper, StopState
+from ui_console.model.alarms import AlarmBook
+from ui_console.model.lifting import author_name, authors, is_own, lift_line
+from ui_console.model.link_board import LinkBoard
+from ui_console.model.views import LEAVING, NONE_S, AlarmKind, RobotView, StopView
+
+ROBOT_KIND = "scout"
+
+
+class RobotBoard:
+    """What is known of the robots.
+
+    Args:
+        picture: Of the mission.
+        alarms: Where stops begin and end.
+        links: Which RCs are missing.
+        lift_remedy: What an operator of this console does about a stop.
+    """
+
+    def __init__(self, picture: MissionPicture, alarms: AlarmBook, links: LinkBoard, lift_remedy: str) -> None:
+        self._picture, self._alarms, self._links, self._lift_remedy = picture, alarms, links, lift_remedy
+        self._renewed: dict[tuple[str, str, int], float] = {}
+        self._stops: dict[str, StopState] = {}
+
+    # ------------------------------------------------------------------ messages in
+    def take_schedule(self, schedule: Schedule) -> None:
+        """Take in who holds what: a hold that is new counts as renewed when it began."""
+        self._renewed = {
+            (rc.rc, holder.arc, holder.epoch): self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
+            for rc in schedule.rcs
+            for holder in rc.holders
+        }
+
+    def take_leases(self, leases: Leases, at_s: float) -> None:
+        """Take in which holds were renewed."""
+        for lease in leases.leases:
+            self._renewed[lease.rc, lease.arc, lease.epoch] = at_s
+
+    def take_stop(self, stop: StopState, at_s: float) -> None:
+        """Take in that a robot was stopped, or may move again; what is older than what is known changes nothing."""
+        former = self._stops.get(stop.rc)
+        if former is not None and (former.number, not former.is_stopped) > (stop.number, not stop.is_stopped):
+            return
+        self._stops[stop.rc] = stop
+        unsure = "" if stop.is_confirmed else "; the radio did not take it, so the wheels turn for a moment more"
+        line = f"{stop.rc} was stopped by {stop.by}{f': {stop.reason}' if stop.reason else ''}{unsure}"
+        if stop.is_stopped:
+            self._alarms.begin(AlarmKind.STOPPED, stop.rc, line, at_s, self._lift_remedy)
+        else:
+            self._alarms.retract(AlarmKind.STOPPED, stop.rc)  # who lifted it is in the log, and nothing is left to do
+
+    # ------------------------------------------------------------------ views out
+    def views(self, now_s: float) -> list[RobotView]:
+        """Return the robots, sorted by name; none of them is anybody's own, and none has pictures."""
+        if self._picture.schedule is None:
+            return []
+        requests = {request.arc: request for request in self._picture.schedule.requests}
+        rcs = sorted((rc for rc in self._picture.schedule.rcs if rc.kind == ROBOT_KIND), key=lambda rc: rc.rc)
+        return [self._robot(rc, number, requests, now_s) for number, rc in enumerate(rcs, 1)]
+
+    def names(self) -> list[str]:
+        """Return every robot heard of, in the schedule or as a component."""
+        schedule, there = self._picture.schedule, self._picture.components.values()
+        in_schedule = {rc.rc for rc in (schedule.rcs if schedule else []) if rc.kind == ROBOT_KIND}
+        return sorted(in_schedule | {component_of(one.address) for one in there if one.type == ROBOT_KIND})
+
+    def stop_of(self, robot: str) -> StopState | None:
+        """Return the operator's stop in force on the robot."""
+        stop = self._stops.get(robot)
+        return stop if stop is not None and stop.is_stopped else None
+
+    def stop_view(self, robot: str, now_s: float, user: str = "", console: str = "") -> StopView | None:
+        """Return the same for a screen.
+
+        Args:
+            robot: Which.
+            now_s: Mission time.
+            user: Who looks at it; empty: nobody in particular.
+            console: Address of their console.
+        """
+        stop = self.stop_of(robot)
+        if stop is None:
+            return None
+        by_user, *also = dict.fromkeys(map(author_name, authors(stop)))
+        return StopView(
+            number=stop.number,
+            reason=stop.reason,
+            age_s=max(0.0, now_s - stop.at_s),
+            is_confirmed=stop.is_confirmed,
+            by_user=by_user,
+            also=also,
+            is_mine=is_own(stop, user, console),
+            lift_line=lift_line(stop, user, console, self._is_there),
+        )
+
+    def _robot(self, rc: RcView, number: int, requests: Mapping[str, RequestView], now_s: float) -> RobotView:
+        component = self._picture.components.get(f"{Subsystem.RESOURCE_POOL}/{rc.rc}")
+        waiting = [self._picture.people.person(requests[arc].owner) for arc in rc.next if arc in requests]
+        free = RobotView(
+            rc.rc,
+            number,
+            rc.state != "down" and not self._links.is_missing(rc.rc),
+            waiting,
+            self.stop_view(rc.rc, now_s),
+            self._picture.people.named(component.feedback) if component is not None else "",
+        )
+        if not rc.holders:
+            return free
+        holder = rc.holders[0]
+        request = requests.get(holder.arc)
+        renewed_s = self._renewed.get((rc.rc, holder.arc, holder.epoch), holder.since_s)
+        lease_s = self._links.leases.lease_s if self._links.leases is not None else holder.lease_until_s - renewed_s
+        age_s = max(0.0, now_s - renewed_s)
+        return replace(
+            free,
+            holder=self._picture.people.person(request.owner if request else holder.arc),
+            arc=holder.arc,
+            is_console=request is not None and is_console(request.owner),
+            priority=self._picture.people.named(request.priority) if request else "",
+            epoch=holder.epoch,
+            since_s=holder.since_s,
+            until_s=request.until_s if request else NONE_S,
+            lease_left_s=max(0.0, lease_s - age_s),
+            lease_age_s=age_s,
+            because=because(request, self._picture.people) if request else "",
+        )
+
+    def _is_there(self, author: Stopper) -> bool:
+        """Return whether who stopped a robot is there; True as long as nothing was heard of who is."""
+        there = self._picture.components
+        at = {author.console, *(screen.address for screen in screens_of(author.by, there.values()))} & there.keys()
+        return any(there[one].state not in LEAVING for one in at) or not there
