@@ -100,7 +100,7 @@ class Outcome:
         return self.ready_after_s is not None and self.failure is None and not killed
 
 
-class Observer(Protocol):
+class BringUpObserver(Protocol):
     """Shows a mission's bring-up, run and end to a person."""
 
     def began(self, step: str) -> None:
@@ -133,7 +133,7 @@ class Launcher(Component[NoParameters]):
         keeper: ProcessKeeper,
         description: MissionDescription,
         options: UpOptions,
-        observer: Observer,
+        observer: BringUpObserver,
         began_s: float,
     ) -> None:
         super().__init__(launch, bus, clock)
@@ -392,7 +392,7 @@ class Launcher(Component[NoParameters]):
         self._observer.done(step, time.monotonic() - began_s)
 
 
-async def run_mission(description: MissionDescription, options: UpOptions, observer: Observer) -> Outcome:
+async def run_mission(description: MissionDescription, options: UpOptions, observer: BringUpObserver) -> Outcome:
     """Bring the mission up, run it, take it down; return when all its processes and files are gone.
 
     Raises:
@@ -427,7 +427,7 @@ async def _with_hub(
     clock: MissionClock,
     description: MissionDescription,
     options: UpOptions,
-    observer: Observer,
+    observer: BringUpObserver,
     began_s: float,
 ) -> Outcome:
     keeper = ProcessKeeper(zygote, clock)

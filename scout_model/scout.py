@@ -29,7 +29,7 @@ from scout_model.dimensions import (
     WINCH_SPEED_M_S,
 )
 from scout_model.errors import MalformedPacket
-from scout_model.radio_link import Drive, Halt, Jump, Safe, TransmitterOff, TransmitterOn, decode
+from scout_model.radio_link import DrivePacket, HaltPacket, JumpPacket, Safe, TransmitterOff, TransmitterOn, decode
 
 
 class Spring(StrEnum):
@@ -126,11 +126,11 @@ class Firmware:
         self._heard += 1
         self._heard_s = now_s
         match packet:
-            case Drive(left_rad_s, right_rad_s):
+            case DrivePacket(left_rad_s, right_rad_s):
                 self._left_rad_s, self._right_rad_s = clip_wheel_speed(left_rad_s), clip_wheel_speed(right_rad_s)
-            case Halt():
+            case HaltPacket():
                 self._halt(now_s)
-            case Jump():
+            case JumpPacket():
                 self._jump(now_s)
             case TransmitterOn(frequency):
                 self._frequency = frequency

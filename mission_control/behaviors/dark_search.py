@@ -41,7 +41,7 @@ SHIFTS = 8  # chosen: columns of such a view, 8 degrees; a robot that was stoppe
 COMPARED = 10  # chosen: the first pictures after a switch roll
 
 
-class Stage(StrEnum):
+class SearchStage(StrEnum):
     """Stage of the search."""
 
     LOOK = "looks around"
@@ -114,7 +114,7 @@ class DarkSearch:
 
     def __init__(self, *, dark_level: float, leg_m: float, speed_m_s: float, looks: int) -> None:
         self._dark_level, self._leg_m, self._speed_m_s, self._most_looks = dark_level, leg_m, speed_m_s, looks
-        self._stage = Stage.LOOK
+        self._stage = SearchStage.LOOK
         self._looks = 0
         self._left = 0.0  # remaining radians or meters of the stage
         self._turned_rad = 0.0  # since the look around began
@@ -128,7 +128,7 @@ class DarkSearch:
         self._begin_look()
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> SearchStage:
         """The stage of the search."""
         return self._stage
 
@@ -140,7 +140,7 @@ class DarkSearch:
     @property
     def is_final(self) -> bool:
         """True when it is hidden, or has given up."""
-        return self._stage in (Stage.HIDDEN, Stage.FAILED)
+        return self._stage in (SearchStage.HIDDEN, SearchStage.FAILED)
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next pictures show whether it was moved meanwhile."""
@@ -182,30 +182,30 @@ class DarkSearch:
         self._turned_rad += turned_rad
         self._dark_pictures = self._dark_pictures + 1 if seen.ground < self._dark_level else 0
         match self._stage:
-            case Stage.LOOK:
+            case SearchStage.LOOK:
                 self._seen.append((self._turned_rad, seen.ahead, seen.ground))
                 if self._turned_rad >= 2 * math.pi:
                     self._looks += 1
                     self._conclude()
-            case Stage.TURN | Stage.FACE_OUT:
+            case SearchStage.TURN | SearchStage.FACE_OUT:
                 before, self._left = self._left, self._left - turned_rad
                 if before * self._left <= 0 or abs(self._left) < 0.02:
                     self._after_turn()
-            case Stage.GO:
+            case SearchStage.GO:
                 self._left -= gone_m
                 if self._dark_pictures >= CERTAIN_PICTURES:
-                    self._enter(Stage.ENTER, IN_M)
+                    self._enter(SearchStage.ENTER, IN_M)
                 elif self._left <= 0:
                     self._begin_look()
-            case Stage.ENTER:
+            case SearchStage.ENTER:
                 self._left -= gone_m
                 if self._left <= 0:
-                    self._enter(Stage.BACK, BACK_M)
-            case Stage.BACK:
+                    self._enter(SearchStage.BACK, BACK_M)
+            case SearchStage.BACK:
                 self._left -= gone_m
                 if self._left <= 0:
                     self._begin_look()
-            case Stage.HIDDEN | Stage.FAILED:
+            case SearchStage.HIDDEN | SearchStage.FAILED:
                 return
 
     def _conclude(self) -> None:
@@ -213,40 +213,40 @@ class DarkSearch:
         is_dark = [ground < self._dark_level for _angle, _ahead, ground in self._seen]
         if sum(is_dark) >= ALL_AROUND * len(is_dark):
             brightest = sectors(self._seen, brightest=True)[0]
-            self._enter(Stage.FACE_OUT, turned(brightest - self._turned_rad))
+            self._enter(SearchStage.FACE_OUT, turned(brightest - self._turned_rad))
         elif self._looks == self._most_looks:
-            self._enter(Stage.FAILED, 0.0)
+            self._enter(SearchStage.FAILED, 0.0)
         else:
             barred = self._barred_rad
             ways = [way for way in sectors(self._seen) if barred is None or abs(turned(way - barred)) > BARRED_RAD]
             way = ways[(self._looks - 1) % CHOICES]
-            self._enter(Stage.TURN, turned(way - self._turned_rad))
+            self._enter(SearchStage.TURN, turned(way - self._turned_rad))
 
     def _after_turn(self) -> None:
-        if self._stage is Stage.FACE_OUT:
-            self._enter(Stage.HIDDEN, 0.0)
+        if self._stage is SearchStage.FACE_OUT:
+            self._enter(SearchStage.HIDDEN, 0.0)
         else:
-            self._enter(Stage.GO, self._leg_m)
+            self._enter(SearchStage.GO, self._leg_m)
             self._barred_rad = math.pi  # relative to the next look around, which begins straight ahead
 
     def _begin_look(self) -> None:
         self._seen, self._turned_rad = [], 0.0
-        self._enter(Stage.LOOK, 0.0)
+        self._enter(SearchStage.LOOK, 0.0)
 
-    def _enter(self, stage: Stage, left: float) -> None:
+    def _enter(self, stage: SearchStage, left: float) -> None:
         self._stage, self._left, self._dark_pictures = stage, left, 0
 
     def _motion(self) -> Motion:
         match self._stage:
-            case Stage.LOOK:
+            case SearchStage.LOOK:
                 return Motion(0.0, TURN_RAD_S)
-            case Stage.TURN | Stage.FACE_OUT:
+            case SearchStage.TURN | SearchStage.FACE_OUT:
                 return Motion(0.0, math.copysign(TURN_RAD_S, self._left))
-            case Stage.GO | Stage.ENTER:
+            case SearchStage.GO | SearchStage.ENTER:
                 return Motion(self._speed_m_s, 0.0)
-            case Stage.BACK:
+            case SearchStage.BACK:
                 return Motion(-self._speed_m_s, 0.0)
-            case Stage.HIDDEN | Stage.FAILED:
+            case SearchStage.HIDDEN | SearchStage.FAILED:
                 return STILL
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behavior import BehaviorParameters, suspended_because
-from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, Stage, glimpse
+from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, SearchStage, glimpse
 from mission_control.behaviors.driver import Driver
 from mission_control.behaviors.motion import MOST_M_S, STILL
 from mission_control.behaviors.servo_to_target import UnusablePicture
@@ -86,7 +86,7 @@ class Hide(Driver[HideParameters]):
                 raise self._unusable
             await self.move(self._motion)
         await self.held.halt()
-        is_hidden = self._search.stage is Stage.HIDDEN
+        is_hidden = self._search.stage is SearchStage.HIDDEN
         self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self._search.looks})
 
     async def suspended(self, reason: str, by: str) -> None:

@@ -36,7 +36,7 @@ ARRIVED_M = 0.08  # chosen: less than a body
 PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
 
-class Stage(StrEnum):
+class JumpStage(StrEnum):
     """Stage of a jump."""
 
     RUN_UP = "goes to its run-up"
@@ -95,7 +95,7 @@ class JumpCourse:
     def __init__(self, obstacle: Obstacle, *, attempts: int, speed_m_s: float, onward_m: float) -> None:
         self._obstacle, self._attempts = obstacle, attempts
         self._speed_m_s, self._goal_m = speed_m_s, obstacle.depth_m + max(onward_m, BEYOND_M)
-        self._stage = Stage.RUN_UP
+        self._stage = JumpStage.RUN_UP
         self._jumps = 0
         self._jumped_s = -math.inf
         self._is_seen_landing = False
@@ -103,7 +103,7 @@ class JumpCourse:
         self._freeing: Maneuver | None = None
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> JumpStage:
         """The stage of the jump."""
         return self._stage
 
@@ -115,7 +115,7 @@ class JumpCourse:
     @property
     def is_final(self) -> bool:
         """True when the robot is over the obstacle, or the course has failed."""
-        return self._stage in (Stage.OVER, Stage.FAILED)
+        return self._stage in (JumpStage.OVER, JumpStage.FAILED)
 
     def airborne_s(self, now_s: float) -> float:
         """Return the time for which the robot must still get no command, 0: none."""
@@ -125,8 +125,8 @@ class JumpCourse:
         """Record the loss of the robot; the next decision depends only on its position then."""
         self._freeing, self._is_seen_landing = None, False
         self._watchdog.rest()
-        if self._stage is not Stage.AIRBORNE and not self.is_final:
-            self._stage = Stage.RUN_UP
+        if self._stage is not JumpStage.AIRBORNE and not self.is_final:
+            self._stage = JumpStage.RUN_UP
 
     def jumped(self) -> None:
         """Record that the robot obeyed the last ``Act.JUMP``."""
@@ -141,43 +141,43 @@ class JumpCourse:
         """
         if self.is_final or self.airborne_s(now_s) > 0:
             return Act.WAIT
-        if self._stage is Stage.AIRBORNE:
+        if self._stage is JumpStage.AIRBORNE:
             self._land(position)
         if self._freeing is not None:
             motion = self._freeing.motion(now_s)
             if motion is not None:
                 return motion
             self._freeing = None
-        if self._stage is not Stage.ONWARD and self._is_beyond(position):
-            self._enter(Stage.ONWARD)
+        if self._stage is not JumpStage.ONWARD and self._is_beyond(position):
+            self._enter(JumpStage.ONWARD)
         return self._go_on(position, now_s)
 
     def _go_on(self, position: Position, now_s: float) -> Motion | Act:
         obstacle = self._obstacle
         match self._stage:
-            case Stage.OVER | Stage.FAILED:
+            case JumpStage.OVER | JumpStage.FAILED:
                 return Act.WAIT
-            case Stage.ONWARD:
+            case JumpStage.ONWARD:
                 goal = obstacle.ahead(self._goal_m)
                 if obstacle.passed_m(position) >= self._goal_m or goal.distance_m(position) < ARRIVED_M:
-                    self._enter(Stage.OVER)
+                    self._enter(JumpStage.OVER)
                     return Act.WAIT
                 return self._go(goal, position, now_s)
-            case Stage.RUN_UP:
+            case JumpStage.RUN_UP:
                 goal = obstacle.ahead(-TAKE_OFF_M - RUN_UP_M)
                 if goal.distance_m(position) < ARRIVED_M:
-                    self._enter(Stage.APPROACH)
+                    self._enter(JumpStage.APPROACH)
                 return self._go(goal, position, now_s)
-            case Stage.APPROACH:
+            case JumpStage.APPROACH:
                 goal = obstacle.ahead(-TAKE_OFF_M)
                 if goal.distance_m(position) < AT_TAKE_OFF_M:
-                    self._enter(Stage.AIM)
+                    self._enter(JumpStage.AIM)
                 return self._go(goal, position, now_s)
             case _:
                 if obstacle.ahead(-TAKE_OFF_M).distance_m(position) > 2 * AT_TAKE_OFF_M:
-                    self._enter(Stage.RUN_UP)
+                    self._enter(JumpStage.RUN_UP)
                 elif abs(turned(obstacle.heading_rad - position.heading_rad)) < AIMED_RAD:
-                    self._enter(Stage.AIRBORNE)
+                    self._enter(JumpStage.AIRBORNE)
                     self._jumped_s, self._is_seen_landing = now_s, True
                     return Act.JUMP
                 return turn_to(position, obstacle.heading_rad)
@@ -187,14 +187,14 @@ class JumpCourse:
         if self._is_seen_landing and abs(turned(position.heading_rad - self._obstacle.heading_rad)) > math.pi / 2:
             self._freeing = shake_free()
         if self._is_beyond(position):
-            self._enter(Stage.ONWARD)
+            self._enter(JumpStage.ONWARD)
         else:
-            self._enter(Stage.FAILED if self._jumps >= self._attempts else Stage.RUN_UP)
+            self._enter(JumpStage.FAILED if self._jumps >= self._attempts else JumpStage.RUN_UP)
 
     def _is_beyond(self, position: Position) -> bool:
         return self._obstacle.passed_m(position) >= self._obstacle.depth_m + BEYOND_M
 
-    def _enter(self, stage: Stage) -> None:
+    def _enter(self, stage: JumpStage) -> None:
         self._stage = stage
         self._watchdog.rest()
 

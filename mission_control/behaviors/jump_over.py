@@ -16,7 +16,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
-from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, Obstacle, Stage
+from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
 from mission_control.behaviors.motion import MOST_M_S, Motion, read_places
 from mission_control.messages import BehaviorStatus
 
@@ -91,7 +91,7 @@ class JumpOver(Driver[JumpOverParameters]):
                 break
             await self.clock.sleep_s(DECIDE_EVERY_S)
         await self.held.halt()
-        is_over = self._course.stage is Stage.OVER
+        is_over = self._course.stage is JumpStage.OVER
         self.finish(BehaviorStatus.SUCCESS if is_over else BehaviorStatus.FAILURE, {"jumps": self._course.jumps})
 
     def not_now(self) -> float:

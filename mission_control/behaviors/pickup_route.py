@@ -14,7 +14,7 @@ AWAY_M = 1.0  # chosen: a robot left further away than this goes to the neighbor
 PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
 
-class Stage(StrEnum):
+class PickupStage(StrEnum):
     """How the robot navigates."""
 
     UNKNOWN = "asks where it is"
@@ -34,13 +34,13 @@ class PickupRoute:
 
     def __init__(self, near: Place, *, speed_m_s: float, attempts: int) -> None:
         self._near, self._speed_m_s, self._attempts = near, speed_m_s, attempts
-        self._stage = Stage.UNKNOWN
+        self._stage = PickupStage.UNKNOWN
         self._in_vain = 0
         self._watchdog = Watchdog(PATIENCE_S)
         self._freeing: Maneuver | None = None
 
     @property
-    def stage(self) -> Stage:
+    def stage(self) -> PickupStage:
         """How the robot navigates."""
         return self._stage
 
@@ -51,15 +51,15 @@ class PickupRoute:
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision depends on its position then."""
-        if self._stage is not Stage.FAILED:
-            self._stage = Stage.UNKNOWN
+        if self._stage is not PickupStage.FAILED:
+            self._stage = PickupStage.UNKNOWN
         self._freeing = None
         self._watchdog.rest()
 
     def not_found(self) -> None:
         """Record a vain search all around."""
         self._in_vain += 1
-        self._stage = Stage.FAILED if self._in_vain >= self._attempts else Stage.TRAVEL
+        self._stage = PickupStage.FAILED if self._in_vain >= self._attempts else PickupStage.TRAVEL
         self._watchdog.rest()
 
     def decide(self, position: Position, now_s: float) -> Motion:
@@ -70,12 +70,12 @@ class PickupRoute:
             now_s: Mission time; it never decreases.
         """
         distance_m = self._near.distance_m(position)
-        if self._stage is Stage.UNKNOWN:
-            self._stage = Stage.TRAVEL if distance_m > AWAY_M else Stage.BY_SIGHT
-        if self._stage is not Stage.TRAVEL:
+        if self._stage is PickupStage.UNKNOWN:
+            self._stage = PickupStage.TRAVEL if distance_m > AWAY_M else PickupStage.BY_SIGHT
+        if self._stage is not PickupStage.TRAVEL:
             return Motion()
         if distance_m <= NEAR_M:
-            self._stage = Stage.BY_SIGHT
+            self._stage = PickupStage.BY_SIGHT
             return Motion()
         if self._freeing is None and self._watchdog.is_stuck(distance_m, now_s):
             self._freeing = shake_free()

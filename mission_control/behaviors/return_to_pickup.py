@@ -15,7 +15,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behaviors.driver import DECIDE_EVERY_S
 from mission_control.behaviors.motion import MOST_M_S, read_places
-from mission_control.behaviors.pickup_route import PickupRoute, Stage
+from mission_control.behaviors.pickup_route import PickupRoute, PickupStage
 from mission_control.behaviors.servo_to_target import Servo, ServoParameters, TargetNotFound
 from mission_control.vision.servo_law import Stage as Approach
 from resource_pool.arc_client import Frame
@@ -68,13 +68,13 @@ class ReturnToPickup(Servo[PickupParameters]):
 
     def see(self, frame: Frame) -> None:
         """Search and track the mark, while the robot navigates by sight."""
-        if self._route.stage is Stage.BY_SIGHT:
+        if self._route.stage is PickupStage.BY_SIGHT:
             super().see(frame)
 
     async def drive_on(self, robot: str) -> None:
         """Drive to the place ``near``, then by sight; see ``Driver.drive_on``."""
-        while self._route.stage is not Stage.FAILED:
-            if self._route.stage is Stage.BY_SIGHT:
+        while self._route.stage is not PickupStage.FAILED:
+            if self._route.stage is PickupStage.BY_SIGHT:
                 if await self._go_by_sight(robot):
                     return
             else:
@@ -105,7 +105,7 @@ class ReturnToPickup(Servo[PickupParameters]):
         position = await self.locate(self.parameters.localizer, robot)
         await self.move(self._route.decide(position, self.clock.now_s()))
         self.report(f"{robot} {self._route.stage}")
-        if self._route.stage is Stage.BY_SIGHT:
+        if self._route.stage is PickupStage.BY_SIGHT:
             self.look_anew()
         else:
             await self.clock.sleep_s(DECIDE_EVERY_S)

@@ -24,8 +24,8 @@ from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.servo_law import STOP_M, Stage
-from mission_control.vision.skeleton_tracking import Phase
-from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, Step, VisualServo
+from mission_control.vision.skeleton_tracking import TrackingPhase
+from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, ServoStep, VisualServo
 from resource_pool.arc_client import Frame
 
 PICTURE_PX = (320, 240)  # what ``SCOUT_CAMERA`` was measured for
@@ -80,16 +80,16 @@ class Servo(Driver[S]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._servo = self._plan()
-        self._step: Step | None = None
+        self._step: ServoStep | None = None
         self._seen_s: float | None = None
         self._fresh = asyncio.Event()
         self._unusable: UnusablePicture | None = None
         self._acquisitions = 0
         self._counted_rad = 0.0
-        self._phase = Phase.ACQUIRING
+        self._phase = TrackingPhase.ACQUIRING
 
     @property
-    def step(self) -> Step | None:
+    def step(self) -> ServoStep | None:
         """The decision of the last picture; read only."""
         return self._step
 
@@ -129,10 +129,10 @@ class Servo(Driver[S]):
     def look_anew(self) -> None:
         """Begin again with acquisition: the robot stands still, perhaps elsewhere."""
         self._servo.resumed()
-        self._step, self._seen_s, self._phase = None, None, Phase.ACQUIRING
+        self._step, self._seen_s, self._phase = None, None, TrackingPhase.ACQUIRING
         self._fresh.clear()
 
-    async def next_step(self) -> Step:
+    async def next_step(self) -> ServoStep:
         """Wait for a newer picture and return its decision.
 
         Raises:
@@ -145,7 +145,7 @@ class Servo(Driver[S]):
         assert self._step is not None  # noqa: S101  a picture that is fresh was seen
         return self._step
 
-    async def follow(self, robot: str, step: Step) -> None:
+    async def follow(self, robot: str, step: ServoStep) -> None:
         """Send the command of a picture's decision, and report it."""
         await self.held.drive(*step.command.wheels_rad_s())
         self.report(f"{robot} {step.stage}, {step.track.phase}, {self._servo.approaches} approaches until now")
@@ -170,10 +170,10 @@ class Servo(Driver[S]):
     def _plan(self) -> VisualServo:
         return VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
 
-    def _note_phase(self, robot: str, step: Step) -> None:
+    def _note_phase(self, robot: str, step: ServoStep) -> None:
         if step.track.phase is self._phase:
             return
-        if self._phase is Phase.ACQUIRING:
+        if self._phase is TrackingPhase.ACQUIRING:
             self._acquisitions += 1
         self.story.note(robot, f"the target: {self._phase} → {step.track.phase}")
         self._phase = step.track.phase

@@ -39,7 +39,7 @@ class Policy(StrEnum):
     ADAPTIVE = "adaptive"
 
 
-class Target(StrEnum):
+class TargetKind(StrEnum):
     """What passes."""
 
     PIONEER = "pioneer"
@@ -73,7 +73,7 @@ def surveillance(
     extra: Annotated[list[int] | None, typer.Option("--extra", help="Scouts that consoles hold; repeatable.")] = None,
     channels: Annotated[int | None, typer.Option("--channels", help="Video frequencies.")] = None,
     policy: Annotated[list[Policy] | None, typer.Option("--policy", help="How to ask; repeatable.")] = None,
-    target: Annotated[Target | None, typer.Option("--target", help="What passes.")] = None,
+    target: Annotated[TargetKind | None, typer.Option("--target", help="What passes.")] = None,
     speed: Annotated[list[float] | None, typer.Option("--speed", help="Of the target, m/s; repeatable.")] = None,
     slice_s: Annotated[float | None, typer.Option("--slice", help="Minimum run time of all, seconds.")] = None,
     order: Annotated[Order | None, typer.Option("--order", help="Whose turns come first.")] = None,

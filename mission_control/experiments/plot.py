@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from backbone.errors import Refusal
 from mission_control.experiments.conditions import PUBLISHED, Condition
 from mission_control.experiments.intervals import wilson
-from mission_control.experiments.surveillance import Outcome, Row, trials_line
+from mission_control.experiments.surveillance import ConditionRow, SurveillanceOutcome, trials_line
 
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
 """Okabe and Ito, "Color Universal Design", 2008: distinct for all kinds of color vision. Without yellow: too pale."""
@@ -58,7 +58,7 @@ def require_plotting() -> None:
         raise NoPlotting(f"matplotlib cannot be imported: {error}") from error
 
 
-def plot(outcome: Outcome, file: Path, title: str) -> None:
+def plot(outcome: SurveillanceOutcome, file: Path, title: str) -> None:
     """Write a plot of the rates over the number of extra robots, a line for each policy and way of driving.
 
     Each line has its name beside its end; conditions, trials and seed stand above.
@@ -88,7 +88,7 @@ THE_PAPERS = "the papers"
 LEGEND = "bars: Wilson's 95 % intervals; dotted: predicted by geometry and schedule alone"
 
 
-def series(rows: Sequence[Row]) -> Mapping[str, Sequence[Point]]:
+def series(rows: Sequence[ConditionRow]) -> Mapping[str, Sequence[Point]]:
     """Return the points of each line by its name; the papers' counts come last."""
     found: dict[str, list[Point]] = {}
     for row in rows:

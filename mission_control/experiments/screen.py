@@ -14,7 +14,7 @@ from mission_control.experiments.conditions import PUBLISHED
 from mission_control.experiments.harness import Progress as OnProgress
 from mission_control.experiments.intervals import wilson
 from mission_control.experiments.servoing import ServoOutcome, ServoTrial
-from mission_control.experiments.surveillance import Outcome, Row, trials_line
+from mission_control.experiments.surveillance import ConditionRow, SurveillanceOutcome, trials_line
 
 AGREES_WITHIN = 3.0
 """Standard errors between rate and prediction that are no disagreement."""
@@ -26,7 +26,7 @@ BANDS_DEG = (15.0, 30.0, 45.0)
 """Starts off the zero-angle line, in rows of the table."""
 
 
-def table(outcome: Outcome, title: str) -> Table:
+def table(outcome: SurveillanceOutcome, title: str) -> Table:
     """Return the rows as a table: counted rates, predictions and the papers' results."""
     headline = f"{title}: {trials_line(outcome)}"
     found = Table(title=headline, title_justify="left", caption=EXPLAINED, caption_justify="left")
@@ -49,7 +49,7 @@ def table(outcome: Outcome, title: str) -> Table:
     return found
 
 
-def summary(outcome: Outcome) -> str:
+def summary(outcome: SurveillanceOutcome) -> str:
     """Return the duration and the agreement of grants and transmitters, one line."""
     switches = sum(row.switches for row in outcome.rows)
     wrong = sum(len(row.disagreements) for row in outcome.rows)
@@ -72,7 +72,7 @@ def progress_bar(console: Console, what: str) -> Iterator[OnProgress]:
         yield lambda done, of: bar.update(task, completed=done, total=of)
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: ConditionRow) -> list[str]:
     given = PUBLISHED.get(row.condition)
     paper, paper95 = "", ""
     if given is not None:

@@ -74,7 +74,7 @@ _MISSION = f"""<?xml version="1.0" encoding="UTF-8"?>
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class TrialStart:
     """The start of a trial.
 
     Attributes:
@@ -95,7 +95,7 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
-class TrialOrder:
+class ServoOrder:
     """One trial: seed of the experiment, number and noise."""
 
     seed: int
@@ -175,12 +175,12 @@ class ServoOutcome:
         }
 
 
-def draw(seed: int, number: int) -> Start:
+def draw(seed: int, number: int) -> TrialStart:
     """Return the start of this trial: the same for the same arguments, with any noise."""
     dice = Random(f"{seed} servoing {number}")
     range_m, off_axis_rad = dice.uniform(NEAREST_M, FARTHEST_M), dice.uniform(-OFF_AXIS_RAD, OFF_AXIS_RAD)
     x_m, y_m = BOARD_M[0] - range_m * math.cos(off_axis_rad), BOARD_M[1] + range_m * math.sin(off_axis_rad)
-    return Start(range_m, off_axis_rad, x_m, y_m, dice.uniform(-math.pi, math.pi), dice.randrange(2**31))
+    return TrialStart(range_m, off_axis_rad, x_m, y_m, dice.uniform(-math.pi, math.pi), dice.randrange(2**31))
 
 
 def run_servoing(
@@ -196,18 +196,18 @@ def run_servoing(
         progress: Called after each trial.
     """
     began_s = time.monotonic()
-    orders = [TrialOrder(seed, number, noise) for number in range(trials)]
+    orders = [ServoOrder(seed, number, noise) for number in range(trials)]
     return ServoOutcome(
         seed, noise, tuple(run_all(run_trial, orders, jobs=jobs, progress=progress)), time.monotonic() - began_s
     )
 
 
-def run_trial(order: TrialOrder) -> ServoTrial:
+def run_trial(order: ServoOrder) -> ServoTrial:
     """Run one trial to the behavior's end, or to ``LIMIT_S``."""
     return run_virtual(_play(order))
 
 
-async def _play(order: TrialOrder) -> ServoTrial:
+async def _play(order: ServoOrder) -> ServoTrial:
     start = draw(order.seed, order.number)
     async with mission_in_one_process(_mission_from(start, order.noise)) as running:
         behavior = running.component(SERVO)
@@ -247,7 +247,7 @@ def _mission() -> MissionDescription:
         return read_mission(file)
 
 
-def _mission_from(start: Start, noise: float) -> MissionDescription:
+def _mission_from(start: TrialStart, noise: float) -> MissionDescription:
     mission = _mission()
     (world,) = mission.components
     content = dict(world.parameters[WORLD])

@@ -40,7 +40,7 @@ class TrialOrder(msgspec.Struct, frozen=True):
     trace: str = ""
 
 
-class Row(msgspec.Struct, frozen=True):
+class ConditionRow(msgspec.Struct, frozen=True):
     """The result of one condition.
 
     Attributes:
@@ -113,11 +113,11 @@ class Row(msgspec.Struct, frozen=True):
         }
 
 
-class Outcome(msgspec.Struct, frozen=True):
+class SurveillanceOutcome(msgspec.Struct, frozen=True):
     """The result of the experiment; the same seed gives the same result except ``wall_s``."""
 
     seed: int
-    rows: list[Row]
+    rows: list[ConditionRow]
     wall_s: float
 
     @property
@@ -142,7 +142,7 @@ class Outcome(msgspec.Struct, frozen=True):
         }
 
 
-def trials_line(outcome: Outcome) -> str:
+def trials_line(outcome: SurveillanceOutcome) -> str:
     """Return the number of trials of each condition, and the seed."""
     counts = sorted({row.trials for row in outcome.rows})
     return f"{' or '.join(map(str, counts))} trials of each condition, seed {outcome.seed}"
@@ -174,7 +174,7 @@ def run_surveillance(
     jobs: int = 0,
     progress: Progress | None = None,
     traces: Path | None = None,
-) -> Outcome:
+) -> SurveillanceOutcome:
     """Run trials of each condition and return the results.
 
     Args:
@@ -195,7 +195,7 @@ def run_surveillance(
     rows = [
         _row(condition, results[place * trials : (place + 1) * trials]) for place, condition in enumerate(conditions)
     ]
-    return Outcome(seed, rows, time.monotonic() - began_s)
+    return SurveillanceOutcome(seed, rows, time.monotonic() - began_s)
 
 
 def run_order(order: TrialOrder) -> Trial:
@@ -203,8 +203,8 @@ def run_order(order: TrialOrder) -> Trial:
     return run_trial(order.condition, order.seed, order.number, trace=Path(order.trace) if order.trace else None)
 
 
-def _row(condition: Condition, trials: Sequence[Trial]) -> Row:
-    return Row(
+def _row(condition: Condition, trials: Sequence[Trial]) -> ConditionRow:
+    return ConditionRow(
         condition=condition,
         trials=len(trials),
         detected=sum(trial.detected for trial in trials),

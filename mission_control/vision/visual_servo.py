@@ -20,7 +20,7 @@ LONGEST_GAP_S = 0.5  # chosen: the robots' own watchdog has stopped the wheels b
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
+class ServoStep:
     """The decision of one picture.
 
     Attributes:
@@ -83,7 +83,7 @@ class VisualServo:
         """For a look at its models."""
         return self._tracker
 
-    def see(self, frame: Picture, elapsed_s: float) -> Step:
+    def see(self, frame: Picture, elapsed_s: float) -> ServoStep:
         """Return the decision of this picture.
 
         Args:
@@ -103,7 +103,7 @@ class VisualServo:
         pose = None if track.sighting is None else self._filter.saw(track.sighting)
         command = self._approach.step(track.phase, pose, min(elapsed_s, LONGEST_GAP_S))
         self._sent.append((self._now_s + self._latency_s, command))
-        return Step(command, self._approach.stage, track, pose)
+        return ServoStep(command, self._approach.stage, track, pose)
 
     def resumed(self) -> None:
         """Begin again with acquisition, the robot standing still; how often it approached is kept."""

@@ -61,7 +61,7 @@ def run_supervised(
     shape = shape or draw_supervised_shape(seed)
     if faults is None:
         faults = draw_supervision_faults(shape) if chaos else []
-    return run_processes(_Mission(shape, sorted(faults, key=lambda fault: fault.at_s)).run())
+    return run_processes(_SupervisedMission(shape, sorted(faults, key=lambda fault: fault.at_s)).run())
 
 
 class _Observer:
@@ -84,7 +84,7 @@ class _Observer:
         await asyncio.Event().wait()
 
 
-class _Mission:
+class _SupervisedMission:
     def __init__(self, shape: SupervisedShape, faults: list[SupervisionFault]) -> None:
         self._shape, self._faults = shape, faults
         self._audit, self._clock = Audit(), VirtualClock()
