@@ -45,7 +45,7 @@ from mission_control.behavior_tree import (
     StopChild,
     draw,
 )
-from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
@@ -104,7 +104,7 @@ class Behavior(Component[B], Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | Report | AskBehavior
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -274,7 +274,7 @@ class Behavior(Component[B], Generic[B]):
     async def answer(self, asked: Envelope[Any]) -> Message:
         """Answer the ARC, the children, and ``AskBehavior``."""
         match asked.body:
-            case Report(child=child, status=status, payload=payload):
+            case ChildReport(child=child, status=status, payload=payload):
                 if child not in self._nodes or child != component_of(asked.source):
                     raise NotAChild(f"{asked.source} is no child of {self.name}", child=child)
                 self._child_reported(child, status, payload)
@@ -580,7 +580,7 @@ class Behavior(Component[B], Generic[B]):
                 return
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
-    async def _report_once(self, parent: str, report: Report) -> bool:
+    async def _report_once(self, parent: str, report: ChildReport) -> bool:
         """Send the report once; return True if the parent noted or refused it."""
         try:
             await self.bus.ask(parent, report, ReportNoted, within_s=REPLY_TIME_S)
@@ -591,8 +591,8 @@ class Behavior(Component[B], Generic[B]):
             log.warning("%s refused the report: %s", parent, refusal)
         return True
 
-    def _report(self) -> Report:
-        return Report(self.name, self.status, self.payload)
+    def _report(self) -> ChildReport:
+        return ChildReport(self.name, self.status, self.payload)
 
     def _begin(self, work: Coroutine[Any, Any, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""

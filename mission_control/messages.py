@@ -22,7 +22,7 @@ class BehaviorStatus(StrEnum):
         return self is not BehaviorStatus.RUNNING
 
 
-class Report(Message, frozen=True):
+class ChildReport(Message, frozen=True):
     """Progress of a child, sent to its parent.
 
     Attributes:
@@ -37,7 +37,7 @@ class Report(Message, frozen=True):
 
 
 class ReportNoted(Message, frozen=True):
-    """Answer to ``Report``."""
+    """Answer to ``ChildReport``."""
 
 
 class AskBehavior(Message, frozen=True):

@@ -24,7 +24,7 @@ from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.robot import Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
-from scout_model.targets import Route, TargetPose, part_poses, parts
+from scout_model.targets import Route, TargetState, part_poses, parts
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """What of MuJoCo's state a picture depends on."""
@@ -86,7 +86,7 @@ class World:
             for target in description.targets
             for part in part_poses(target, 0.0)
         }
-        self._placed: dict[str, TargetPose] = {}
+        self._placed: dict[str, TargetState] = {}
         self._place_targets()
         self._hold_carried()
         mujoco.mj_forward(self._model, self._data)

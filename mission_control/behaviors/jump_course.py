@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 
 from mission_control.behaviors.motion import (
+    FloorPoint,
     Maneuver,
     Motion,
-    Place,
     Position,
     Watchdog,
     head_for,
@@ -65,13 +65,13 @@ class Obstacle:
         depth_m: Its depth in that direction, at most ``DEEPEST_M``.
     """
 
-    front: Place
+    front: FloorPoint
     heading_rad: float
     depth_m: float
 
-    def ahead(self, distance_m: float) -> Place:
+    def ahead(self, distance_m: float) -> FloorPoint:
         """Return the place at this distance beyond the front; negative: before it."""
-        return Place(
+        return FloorPoint(
             self.front.x_m + distance_m * math.cos(self.heading_rad),
             self.front.y_m + distance_m * math.sin(self.heading_rad),
         )
@@ -198,7 +198,7 @@ class JumpCourse:
         self._stage = stage
         self._watchdog.rest()
 
-    def _go(self, goal: Place, position: Position, now_s: float) -> Motion:
+    def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
         if self._watchdog.is_stuck(goal.distance_m(position), now_s):
             self._freeing = shake_free()
             self._watchdog.rest()

@@ -31,7 +31,7 @@ class Position:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FloorPoint:
     """A place on the floor, meters."""
 
     x_m: float
@@ -67,7 +67,7 @@ class Motion:
 STILL = Motion()
 
 
-def read_places(text: str) -> list[Place]:
+def read_places(text: str) -> list[FloorPoint]:
     """Return the places of a text like ``1,1 3.5,1``.
 
     Raises:
@@ -85,7 +85,7 @@ def read_places(text: str) -> list[Place]:
             raise ValueError(f"{pair!r} is no place: write x,y in meters, as in 1,1 3.5,1") from None
         if not (math.isfinite(x_m) and math.isfinite(y_m)):
             raise ValueError(f"{pair!r} is no place: write finite numbers")
-        places.append(Place(x_m, y_m))
+        places.append(FloorPoint(x_m, y_m))
     if not places:
         raise ValueError("there is no place: write x,y in meters for each, as in 1,1 3.5,1")
     return places
@@ -96,7 +96,7 @@ def turned(angle_rad: float) -> float:
     return math.atan2(math.sin(angle_rad), math.cos(angle_rad))
 
 
-def head_for(position: Position, place: Place, speed_m_s: float) -> Motion:
+def head_for(position: Position, place: FloorPoint, speed_m_s: float) -> Motion:
     """Return the motion that drives the robot to the place and stops it there.
 
     It turns on the spot while the place is far from straight ahead, and slows down before it arrives.

@@ -14,7 +14,16 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mission_control.behaviors.motion import STILL, Maneuver, Motion, Place, Position, Watchdog, head_for, shake_free
+from mission_control.behaviors.motion import (
+    STILL,
+    FloorPoint,
+    Maneuver,
+    Motion,
+    Position,
+    Watchdog,
+    head_for,
+    shake_free,
+)
 
 REMEMBERED = 1000  # chosen: hours of an ordinary patrol
 PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
@@ -49,7 +58,7 @@ class PatrolRoute:
     """
 
     def __init__(
-        self, places: Sequence[Place], *, rounds: int, speed_m_s: float, reached_within_m: float, rest_s: float
+        self, places: Sequence[FloorPoint], *, rounds: int, speed_m_s: float, reached_within_m: float, rest_s: float
     ) -> None:
         self._places = tuple(places)
         self._last = rounds * len(self._places) if rounds else math.inf
@@ -122,7 +131,7 @@ class PatrolRoute:
         self._watchdog.rest()
         return STILL if self._rest_s or self.is_over else self._go(self._places[self.next_waypoint], position, now_s)
 
-    def _go(self, goal: Place, position: Position, now_s: float) -> Motion:
+    def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
         if self._freeing is None and self._watchdog.is_stuck(goal.distance_m(position), now_s):
             self._freeing = shake_free()
             self._freed += 1

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from mission_control.behaviors.motion import Maneuver, Motion, Place, Position, Watchdog, head_for, shake_free
+from mission_control.behaviors.motion import FloorPoint, Maneuver, Motion, Position, Watchdog, head_for, shake_free
 
 NEAR_M = 0.25  # chosen: the mark is found within 2.5 m, so more precision is useless
 AWAY_M = 1.0  # chosen: a robot left further away than this goes to the neighborhood first
@@ -32,7 +32,7 @@ class PickupRoute:
         attempts: Number of vain searches after which it gives up.
     """
 
-    def __init__(self, near: Place, *, speed_m_s: float, attempts: int) -> None:
+    def __init__(self, near: FloorPoint, *, speed_m_s: float, attempts: int) -> None:
         self._near, self._speed_m_s, self._attempts = near, speed_m_s, attempts
         self._stage = PickupStage.UNKNOWN
         self._in_vain = 0

@@ -25,13 +25,13 @@ from mission_control.behaviors.dark_search import (
     sectors,
 )
 from mission_control.behaviors.hide import Hide, HideParameters
-from mission_control.behaviors.motion import STILL, Motion, Place, Position, turned
+from mission_control.behaviors.motion import STILL, FloorPoint, Motion, Position, turned
 from mission_control.messages import BehaviorStatus
 
 NAME, ROBOT = "hide-scout4", "scout4"
 STEP_S = 0.1
 PATTERN = np.random.default_rng(5).uniform(-12.0, 12.0, (VIEW_ROWS, 2))
-DARK, RADIUS_M = Place(3.0, 3.0), 0.7
+DARK, RADIUS_M = FloorPoint(3.0, 3.0), 0.7
 
 
 class PlayedRoom:

@@ -20,12 +20,12 @@ from mission_control.behaviors.jump_course import (
     Obstacle,
 )
 from mission_control.behaviors.jump_over import JumpOver, JumpOverParameters
-from mission_control.behaviors.motion import Motion, Place, Position, turned
+from mission_control.behaviors.motion import FloorPoint, Motion, Position, turned
 from mission_control.messages import BehaviorStatus
 
 STEP_S = 0.1
 NAME, ROBOT = "jump-scout2", "scout2"
-BOX = Obstacle(Place(3.0, 2.0), 0.0, 0.1)
+BOX = Obstacle(FloorPoint(3.0, 2.0), 0.0, 0.1)
 
 
 class PlayedRobot:

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from mission_control.behaviors.motion import Motion, Place, Position
+from mission_control.behaviors.motion import FloorPoint, Motion, Position
 from mission_control.behaviors.pickup_route import AWAY_M, NEAR_M, PickupRoute, PickupStage
 from mission_control.behaviors.return_to_pickup import PickupParameters, ReturnToPickup
 from mission_control.messages import BehaviorStatus
 
 NAME, ROBOT = "return-scout5", "scout5"
-NEAR = Place(2.0, 2.0)
+NEAR = FloorPoint(2.0, 2.0)
 positions = st.builds(Position, st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-math.pi, math.pi))
 
 
