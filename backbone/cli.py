@@ -280,14 +280,14 @@ def story(
         from backbone.picture.reasons import story_of
 
         async with connected(mission, connect, secret_file) as (bus, clock):
-            told = await story_of(bus, name, clock)
-        events = [*map(told.people.named_event, told.events)]
-        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(events))
-        if not told.events:
+            found = await story_of(bus, name, clock)
+        events = [*map(found.people.named_event, found.events)]
+        show([json.dumps(story_json(name, found.events, found.missing))] if as_json else story_lines(events))
+        if not found.events:
             say(f"no component has an event about {name}")
-        if told.missing:
-            say(f"incomplete: {counted(len(told.missing), 'component')} did not answer")
-            for missing in told.missing:
+        if found.missing:
+            say(f"incomplete: {counted(len(found.missing), 'component')} did not answer")
+            for missing in found.missing:
                 say(f"  {missing}")
         return ExitCode.DONE
 
@@ -330,14 +330,14 @@ def log(
         async with connected(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)
             asked = LogQuestion(text, robot, person, level, since, until).asked(now, most)
-            told = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
-        show([json.dumps(log_json(told, now))] if as_json else log_lines(told, now))
-        if not told.events:
+            kept = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
+        show([json.dumps(log_json(kept, now))] if as_json else log_lines(kept, now))
+        if not kept.events:
             say("no event matches")
-        if told.left_out:
-            say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
-        if told.since_s > asked.since_s:
-            say(f"events before {told.since_s:.1f} s are no longer kept")
+        if kept.left_out:
+            say(f"{counted(kept.left_out, 'older event')} left out; see --most and --until")
+        if kept.since_s > asked.since_s:
+            say(f"events before {kept.since_s:.1f} s are no longer kept")
         return ExitCode.DONE
 
     run(work)

@@ -245,14 +245,14 @@ class Supervision:
         was_silent, one.silent_s = one.silent_s >= SHOWN_AFTER_S, silent_s
         is_silent = silent_s >= SHOWN_AFTER_S
         one.absent_since_s = now_s - silent_s if is_silent else -1.0
-        told: list[Instruction] = (
+        instructions: list[Instruction] = (
             [ReportSilent(name, silent_s if is_silent else 0.0)] if was_silent != is_silent else []
         )
         if silent_s >= one.policy.hung_after_s:
             one.failure = f"hung: no sign of life for {silent_s:.1f} s"
             one.end = _End(0.0, TERM_S, ordered=False, stage=EndedBy.SIGTERM)
-            told += _next_stage(one, one.end, now_s)
-        return self._and_wake(told)
+            instructions += _next_stage(one, one.end, now_s)
+        return self._and_wake(instructions)
 
     def absences(self, now_s: float) -> list[Absence]:
         """Return the components that do not run or respond; times are seconds of the machine."""

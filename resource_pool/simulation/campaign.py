@@ -116,9 +116,9 @@ class CampaignOutcome:
     def to_json(self) -> dict[str, object]:
         """Return the result as plain data, for ``--json``."""
         finding = self.finding
-        told: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
+        plain: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
         if finding is not None:
-            told["broken"] = {
+            plain["broken"] = {
                 "law": finding.broken.law,
                 "seed": finding.seed,
                 "supervised": finding.supervised,
@@ -130,7 +130,7 @@ class CampaignOutcome:
                 "faults_before": finding.faults_before,
                 "story": list(finding.story),
             }
-        return told
+        return plain
 
 
 def simulate(

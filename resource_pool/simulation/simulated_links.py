@@ -353,13 +353,13 @@ class LinkedNetwork(LocalNetwork):
             for token in self.tokens.get(address, ())
             if not _bus(token).link.process.is_dead
         )
-        told = self._reported.setdefault(watching, set())
-        if stands is (address in told):
+        reported = self._reported.setdefault(watching, set())
+        if stands is (address in reported):
             return
         if stands:
-            told.add(address)
+            reported.add(address)
         else:
-            told.discard(address)
+            reported.discard(address)
 
         def tell() -> None:
             link.process.run(watching.notify, address, stands)

@@ -196,12 +196,12 @@ class _SupervisedMission:
             run_directory=folder,
         )
 
-    def _note_also(self, told: Callable[[ProcessFell], None]) -> Callable[[ProcessFell], None]:
-        def note_and_tell(fell: ProcessFell) -> None:
+    def _note_also(self, listener: Callable[[ProcessFell], None]) -> Callable[[ProcessFell], None]:
+        def note_and_call(fell: ProcessFell) -> None:
             self._note_fall(fell)
-            told(fell)
+            listener(fell)
 
-        return note_and_tell
+        return note_and_call
 
     def _heard_fall(self, heard: Envelope[ProcessFell]) -> None:
         self._note_fall(heard.body)
