@@ -360,7 +360,7 @@ def start(
 
     async def work() -> int:
         from backbone.naming import component_of
-        from backbone.operators import OperatorAction, tell_acted
+        from backbone.operators import OperatorAction, publish_action
         from backbone.placer.messages import ADDRESS, Start, Started
         from backbone.placer.wishes import START_WITHIN_S
         from backbone.start_by_hand import completed
@@ -370,7 +370,7 @@ def start(
             started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
             if remark:
                 say(remark)
-            tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
+            publish_action(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
             show([f"{started.address} on {started.host}, process {started.pid}"])
             for reason in started.reasons:
                 say(reason)
@@ -389,12 +389,12 @@ def stop(
     """Stop one component; it is not restarted."""
 
     async def work() -> int:
-        from backbone.operators import OperatorAction, tell_acted
+        from backbone.operators import OperatorAction, publish_action
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
-            tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
+            publish_action(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             show([f"{name} ended by {ended.by}"])
         return ExitCode.DONE
 
@@ -425,12 +425,14 @@ def set_(
 
     async def work() -> int:
         from backbone.attributes import attributes_of, change
-        from backbone.operators import OperatorAction, login_name, tell_acted
+        from backbone.operators import OperatorAction, login_name, publish_action
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
                 lines = await change(bus, name, parameter, _value(value), login_name())
-                tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}")
+                publish_action(
+                    bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}"
+                )
             else:
                 shown = await attributes_of(bus, name)
                 if as_json:

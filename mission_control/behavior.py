@@ -243,7 +243,7 @@ class Behavior(Component[B], Generic[B]):
         if status is BehaviorStatus.FAILURE and self._parent is None and not self._abandoned:
             self._abandon(self.name, self.payload)
         failed = status is BehaviorStatus.FAILURE
-        self.tell(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
+        self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, Any]) -> None:
@@ -471,10 +471,10 @@ class Behavior(Component[B], Generic[B]):
                 patience_s=START_PATIENCE_S,
             )
         except Refusal as refusal:
-            self.tell(name, f"could not be started: {refusal}", LogLevel.WARNING)
+            self.publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
             self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
             return
-        self.tell(name, f"is not wanted any more: {stopped}")
+        self.publish_event(name, f"is not wanted any more: {stopped}")
         del self._kept[name], self._wishes[name]
         self._carry_out(self._children.left(name))
 

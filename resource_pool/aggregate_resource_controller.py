@@ -325,7 +325,7 @@ class AggregateResourceController(Component[ArcParameters]):
             )
         except (Refusal, LinkError) as error:
             placeless = f"got no place in the schedule: {error}"
-            self.tell(self.name, placeless, LogLevel.WARNING)
+            self.publish_event(self.name, placeless, LogLevel.WARNING)
             await self._notify(Suspended(self.name, placeless, "", -1.0)).wait()
             self.end(placeless)
             return
@@ -433,7 +433,7 @@ class AggregateResourceController(Component[ArcParameters]):
             reason = f"could not be prepared: {detail}"
             if self._gate.epochs == order.epochs:
                 self._gate.close(reason, self.name, -1.0)
-            self.tell(self.name, reason, LogLevel.WARNING)
+            self.publish_event(self.name, reason, LogLevel.WARNING)
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0) from error
         if self._gate.epochs != order.epochs:
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
@@ -594,7 +594,7 @@ class AggregateResourceController(Component[ArcParameters]):
             self._unfounded, self._unfounded_since_s = unfounded, now_s
         elif unfounded and now_s - self._unfounded_since_s >= LEASE_S * self.clock.rate:
             self._unfounded = {}
-            self.tell(self.name, "is counted as running and holds nothing: sends its request again")
+            self.publish_event(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")
 
     async def _watch_lease(self) -> None:
@@ -606,7 +606,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 continue
             await self.clock.sleep_until_s(self._lease_until_s)
             if self._gate.epochs and self.clock.now_s() >= self._lease_until_s:
-                self.tell(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
+                self.publish_event(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
                 self._shut("lease", "rc_manager", -1.0)
                 if self._manager is not None and self._manager.is_there:
                     await self._ask_anew()

@@ -51,7 +51,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
         """Start a failed watcher again ``retries`` times, then continue without it."""
         if status is BehaviorStatus.FAILURE:
             self._failures[child] += 1
-            self.tell(child, f"failed: {payload.get('detail', 'no reason given')}", LogLevel.WARNING)
+            self.publish_event(child, f"failed: {payload.get('detail', 'no reason given')}", LogLevel.WARNING)
         retry = status is BehaviorStatus.FAILURE and self._failures[child] <= self.parameters.retries
         return Decision.RETRY if retry else Decision.NEXT
 

@@ -107,7 +107,7 @@ class WatchForMotion(Behavior[WatchParameters]):
             self._events += 1
             region = Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px)
             self.bus.publish(self.address, Conversation.EVENTS, MotionSeen(frame.captured_s, frame.robot, region))
-            self.tell(
+            self.publish_event(
                 frame.robot, f"motion seen through {frame.robot} at x {blob.x_px}, y {blob.y_px}", LogLevel.NOTICE
             )
             self.tell_parent(self._found())
