@@ -163,7 +163,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._sets: list[dict[str, str]] = []
         self._rcs: dict[str, str] = {}
         self._asked = asyncio.Event()
-        self._telling: asyncio.Task[None] | None = None
+        self._sending: asyncio.Task[None] | None = None
         self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
         self._lease_until_s = 0.0
         self._leased = asyncio.Event()
@@ -224,7 +224,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def serve(self) -> None:
         """Send the request, then watch owner and RC manager until the ARC ends."""
-        self.start_task(self._send_notices(), "tell owner")
+        self.start_task(self._send_notices(), "notify owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
         self.start_task(self._watch_lease(), "watch lease")
@@ -286,7 +286,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._in_force = now
         if self._request is not None:
             self._ask_by({name: getattr(now, name) for name in RUN_TIMES})
-            self._telling = self.start_task(self._tell_run_times(), "tell run times")
+            self._sending = self.start_task(self._send_run_times(), "send run times")
 
     def statistics(self) -> dict[str, float]:
         """Count commands that passed, and commands refused because the gate was shut."""
@@ -367,7 +367,7 @@ class AggregateResourceController(Component[ArcParameters]):
         before = {name: getattr(request, name) for name in changed}
         self._ask_by(changed)
         try:
-            await self._tell_rc_manager(wish)
+            await self._ask_rc_manager(wish)
         except Refusal:
             self._ask_by(before)
             raise
@@ -375,8 +375,8 @@ class AggregateResourceController(Component[ArcParameters]):
     def _ask_by(self, changed: Mapping[str, bool | float]) -> None:
         """Change request and parameters together, so that the parameters show the present request."""
         assert self._request is not None  # noqa: S101  made in connect
-        if self._telling is not None:
-            self._telling.cancel()  # its run times are outdated
+        if self._sending is not None:
+            self._sending.cancel()  # its run times are outdated
         self._request = msgspec.structs.replace(self._request, **changed)
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
 
@@ -387,7 +387,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, path=names_and_numbers)
         return Done()
 
-    async def _tell_run_times(self) -> None:
+    async def _send_run_times(self) -> None:
         request = self._request
         assert request is not None  # noqa: S101  made in connect
         change = ChangeRuntime(self.name, request.minimum_runtime_s, request.maximum_runtime_s)
@@ -398,7 +398,7 @@ class AggregateResourceController(Component[ArcParameters]):
         except (Refusal, LinkError) as error:  # the next RC manager gets them with the request
             self.story.note(self.name, f"the RC manager did not accept its run times: {error}")
 
-    async def _tell_rc_manager(self, wish: Message) -> None:
+    async def _ask_rc_manager(self, wish: Message) -> None:
         await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
 
     def _current_request(self) -> CurrentRequest:
@@ -514,7 +514,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def _extend(self, until_s: float) -> None:
         """Request the extension of the slice until this time, at most the maximum run time from the grant on."""
         until_s = min(until_s, self._longest_end_s())
-        await self._tell_rc_manager(Extend(self.name, until_s))
+        await self._ask_rc_manager(Extend(self.name, until_s))
         self._slice_end_s = max(self._slice_end_s, until_s)
 
     def _longest_end_s(self) -> float:

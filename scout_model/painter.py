@@ -188,7 +188,7 @@ class _View:
         self._pixels = self._project(np.where(self._is_ahead[:, np.newaxis], self._corners, 1.0))
 
     def is_beside(self, corners: NDArray[np.intp]) -> bool:
-        """Say whether all these corners are behind the camera or beyond one and the same edge of the picture."""
+        """Return whether all these corners are behind the camera or beyond one and the same edge of the picture."""
         return bool(self._is_out[:, corners].all(axis=1).any())
 
     def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float) -> None:

@@ -205,7 +205,7 @@ class World:
         return self._robot(robot).program.motors
 
     def is_asleep(self, robot: str) -> bool:
-        """Say whether a robot stands so still that it is frozen until something touches or drives it.
+        """Return whether a robot stands so still that it is frozen until something touches or drives it.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -214,7 +214,7 @@ class World:
         return bool(self._data.tree_asleep[self._model.body_treeid[self._model.body(f"{robot}/body").id]] >= 0)
 
     def is_upright(self, robot: str) -> bool:
-        """Say whether a robot's upper side is above its lower one.
+        """Return whether a robot's upper side is above its lower one.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -225,7 +225,7 @@ class World:
         return bool(rotation[8] > 0)
 
     def is_carried(self, robot: str) -> bool:
-        """Say whether a carrier still holds a robot.
+        """Return whether a carrier still holds a robot.
 
         Raises:
             UnknownBody: No robot has this name.

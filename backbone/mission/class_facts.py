@@ -75,7 +75,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
         return [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
 
     def accepts(self, value: Any) -> bool:
-        """Say whether the class starts with this value."""
+        """Return whether the class starts with this value."""
         try:
             msgspec.convert(value, _value_type(self.schema))
         except msgspec.ValidationError:

@@ -136,7 +136,7 @@ def steer(pose: TargetPose, stage: Stage, last: Command, elapsed_s: float, stop_
 
 
 def has_arrived(pose: TargetPose, stop_m: float = STOP_M) -> bool:
-    """Return whether the robot is at its place and faces the board, as far as one can tell from a picture."""
+    """Return whether the robot is at its place and faces the board, as far as a picture shows."""
     return (
         abs(pose.left_m) <= ARRIVED_ASIDE_M
         and abs(pose.ahead_m - stop_m) <= ARRIVED_AHEAD_M
