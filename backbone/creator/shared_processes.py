@@ -136,7 +136,7 @@ class _Place(StrEnum):
 
 
 @dataclass
-class _Life:
+class _Membership:
     name: str
     place: _Place = _Place.WAITING
     life: int = 0
@@ -152,7 +152,7 @@ class _Process:
     serving_pid: int = 0
     deadline_s: float = NEVER_S
     failure: str = ""
-    members: dict[str, _Life] = field(default_factory=dict)
+    members: dict[str, _Membership] = field(default_factory=dict)
 
 
 class SharedProcesses:
@@ -176,9 +176,9 @@ class SharedProcesses:
         one = self._all.get(process)
         if one is None:
             one = self._all[process] = _Process(process)
-            one.members[name] = _Life(name)
+            one.members[name] = _Membership(name)
             return self._and_wake([ForkProcess(process, name)])
-        one.members[name] = _Life(name)
+        one.members[name] = _Membership(name)
         return self._and_wake(self._admit_waiting(one, now_s) if one.phase is _Phase.SERVING else [])
 
     def signalled(self, name: str, number: signal.Signals) -> list[ProcessInstruction]:
@@ -246,14 +246,14 @@ class SharedProcesses:
         how = f"its process {one.name}: {one.failure or describe(returncode)}"
         was_ended = one.phase is _Phase.ENDING and not one.failure
         instructions: list[ProcessInstruction] = []
-        left: dict[str, _Life] = {}
+        left: dict[str, _Membership] = {}
         for member in one.members.values():
             if member.report is not None:
                 instructions.append(member.report)
             elif member.place is _Place.LIVING:
                 instructions.append(MemberGone(member.name, returncode, how))
             elif was_ended:
-                left[member.name] = _Life(member.name)
+                left[member.name] = _Membership(member.name)
             else:  # a start is repeated after an outside signal, not after a failure of the process itself
                 instructions.append(MemberNotStarted(member.name, how, 1 if one.failure else returncode))
         if left:
@@ -301,7 +301,7 @@ class SharedProcesses:
         return instructions
 
     def _leaves(
-        self, one: _Process, member: _Life, report: MemberGone | MemberNotStarted, now_s: float
+        self, one: _Process, member: _Membership, report: MemberGone | MemberNotStarted, now_s: float
     ) -> list[ProcessInstruction]:
         """Report a member's end: at once while others remain, else together with the end of the process."""
         if any(other is not member and other.report is None for other in one.members.values()):
@@ -317,7 +317,7 @@ class SharedProcesses:
         one.phase, one.deadline_s = _Phase.ENDING, NEVER_S
         return [SignalProcess(one.name, one.pid, signal.SIGKILL)]
 
-    def _everybody(self) -> Iterator[tuple[_Process, _Life]]:
+    def _everybody(self) -> Iterator[tuple[_Process, _Membership]]:
         for one in self._all.values():
             for member in one.members.values():
                 yield one, member
