@@ -37,7 +37,7 @@ class WrongAttribute(Refusal):
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownAttributes:
     """Attributes of one name: requests, parameters, or both.
 
     Attributes:
@@ -82,7 +82,7 @@ class Shown:
         return {"name": self.name, "requests": [*map(_plain, self.requests)], "parameters": self.parameters}
 
 
-async def attributes_of(bus: Bus, name: str) -> Shown:
+async def attributes_of(bus: Bus, name: str) -> ShownAttributes:
     """Return the attributes of a component, an ARC's request, or a node of the behavior tree.
 
     Raises:
@@ -100,7 +100,7 @@ async def attributes_of(bus: Bus, name: str) -> Shown:
     except UnknownRequest:
         if unknown is not None:
             raise unknown from None
-    return Shown(name, requests, values)
+    return ShownAttributes(name, requests, values)
 
 
 async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> list[str]:

@@ -54,7 +54,7 @@ from backbone.mission_log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import LAUNCHER, Subsystem, address, component_of
-from backbone.operators import OperatorAction, tell_acted
+from backbone.operators import OperatorAction, publish_action
 from backbone.other_hosts import OtherHosts, endpoint_for_others
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
@@ -100,7 +100,7 @@ class Outcome:
         return self.ready_after_s is not None and self.failure is None and not killed
 
 
-class Observer(Protocol):
+class BringUpObserver(Protocol):
     """Shows a mission's bring-up, run and end to a person."""
 
     def began(self, step: str) -> None:
@@ -133,7 +133,7 @@ class Launcher(Component[NoParameters]):
         keeper: ProcessKeeper,
         description: MissionDescription,
         options: UpOptions,
-        observer: Observer,
+        observer: BringUpObserver,
         began_s: float,
     ) -> None:
         super().__init__(launch, bus, clock)
@@ -169,7 +169,7 @@ class Launcher(Component[NoParameters]):
         self.outcome.ready_after_s = time.monotonic() - self._began_s
         self.report("all ready")
         source = self._description.source
-        tell_acted(self.bus, self.clock, OperatorAction.START_MISSION, self._description.name, f"from {source}")
+        publish_action(self.bus, self.clock, OperatorAction.START_MISSION, self._description.name, f"from {source}")
         watching = asyncio.create_task(self._observer.up(self.bus, self.clock), name="observer")
         try:
             if self._options.for_s is None:
@@ -183,7 +183,7 @@ class Launcher(Component[NoParameters]):
 
     def interrupted(self) -> None:
         """End because the operator pressed Ctrl-C."""
-        tell_acted(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
+        publish_action(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
         self.end(signal.SIGINT.name)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -301,7 +301,7 @@ class Launcher(Component[NoParameters]):
             if not placed.done():  # stopped before it ran: the bring-up does not wait for it
                 placed.set_result(None)
             self._awaited.discard(order.name)
-            self.tell(order.name, f"is not wanted any more: {stopped}")
+            self.publish_event(order.name, f"is not wanted any more: {stopped}")
             monitor = PeerMonitor(self.bus, component)
             try:
                 await monitor.wait_there()
@@ -377,11 +377,11 @@ class Launcher(Component[NoParameters]):
 
     # ------------------------------------------------------------------ watch
     def _core_service_fell(self, fell: ProcessFell) -> None:
-        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
+        self.publish_event(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
 
     def _core_service_silent(self, name: str, silent_s: float) -> None:
         said = f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again"
-        self.tell(name, said, LogLevel.WARNING)
+        self.publish_event(name, said, LogLevel.WARNING)
         self.changed()
 
     @contextlib.asynccontextmanager
@@ -392,7 +392,7 @@ class Launcher(Component[NoParameters]):
         self._observer.done(step, time.monotonic() - began_s)
 
 
-async def run_mission(description: MissionDescription, options: UpOptions, observer: Observer) -> Outcome:
+async def run_mission(description: MissionDescription, options: UpOptions, observer: BringUpObserver) -> Outcome:
     """Bring the mission up, run it, take it down; return when all its processes and files are gone.
 
     Raises:
@@ -427,7 +427,7 @@ async def _with_hub(
     clock: MissionClock,
     description: MissionDescription,
     options: UpOptions,
-    observer: Observer,
+    observer: BringUpObserver,
     began_s: float,
 ) -> Outcome:
     keeper = ProcessKeeper(zygote, clock)

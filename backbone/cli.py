@@ -280,14 +280,14 @@ def story(
         from backbone.picture.reasons import story_of
 
         async with connected(mission, connect, secret_file) as (bus, clock):
-            told = await story_of(bus, name, clock)
-        events = [*map(told.people.named_event, told.events)]
-        show([json.dumps(story_json(name, told.events, told.missing))] if as_json else story_lines(events))
-        if not told.events:
+            found = await story_of(bus, name, clock)
+        events = [*map(found.people.named_event, found.events)]
+        show([json.dumps(story_json(name, found.events, found.missing))] if as_json else story_lines(events))
+        if not found.events:
             say(f"no component has an event about {name}")
-        if told.missing:
-            say(f"incomplete: {counted(len(told.missing), 'component')} did not answer")
-            for missing in told.missing:
+        if found.missing:
+            say(f"incomplete: {counted(len(found.missing), 'component')} did not answer")
+            for missing in found.missing:
                 say(f"  {missing}")
         return ExitCode.DONE
 
@@ -330,14 +330,14 @@ def log(
         async with connected(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)
             asked = LogQuestion(text, robot, person, level, since, until).asked(now, most)
-            told = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
-        show([json.dumps(log_json(told, now))] if as_json else log_lines(told, now))
-        if not told.events:
+            kept = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
+        show([json.dumps(log_json(kept, now))] if as_json else log_lines(kept, now))
+        if not kept.events:
             say("no event matches")
-        if told.left_out:
-            say(f"{counted(told.left_out, 'older event')} left out; see --most and --until")
-        if told.since_s > asked.since_s:
-            say(f"events before {told.since_s:.1f} s are no longer kept")
+        if kept.left_out:
+            say(f"{counted(kept.left_out, 'older event')} left out; see --most and --until")
+        if kept.since_s > asked.since_s:
+            say(f"events before {kept.since_s:.1f} s are no longer kept")
         return ExitCode.DONE
 
     run(work)
@@ -360,7 +360,7 @@ def start(
 
     async def work() -> int:
         from backbone.naming import component_of
-        from backbone.operators import OperatorAction, tell_acted
+        from backbone.operators import OperatorAction, publish_action
         from backbone.placer.messages import ADDRESS, Start, Started
         from backbone.placer.wishes import START_WITHIN_S
         from backbone.start_by_hand import completed
@@ -370,7 +370,7 @@ def start(
             started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
             if remark:
                 say(remark)
-            tell_acted(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
+            publish_action(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
             show([f"{started.address} on {started.host}, process {started.pid}"])
             for reason in started.reasons:
                 say(reason)
@@ -389,12 +389,12 @@ def stop(
     """Stop one component; it is not restarted."""
 
     async def work() -> int:
-        from backbone.operators import OperatorAction, tell_acted
+        from backbone.operators import OperatorAction, publish_action
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
-            tell_acted(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
+            publish_action(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             show([f"{name} ended by {ended.by}"])
         return ExitCode.DONE
 
@@ -425,12 +425,14 @@ def set_(
 
     async def work() -> int:
         from backbone.attributes import attributes_of, change
-        from backbone.operators import OperatorAction, login_name, tell_acted
+        from backbone.operators import OperatorAction, login_name, publish_action
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
                 lines = await change(bus, name, parameter, _value(value), login_name())
-                tell_acted(bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}")
+                publish_action(
+                    bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}"
+                )
             else:
                 shown = await attributes_of(bus, name)
                 if as_json:

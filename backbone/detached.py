@@ -17,7 +17,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.endings import ExitCode, say
 from backbone.errors import LinkError
-from backbone.operators import OperatorAction, tell_acted
+from backbone.operators import OperatorAction, publish_action
 from backbone.verdict import await_verdict
 
 ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
@@ -108,7 +108,7 @@ async def _ask(found: run_files.RunFile) -> bool:
         say(f"the hub cannot be reached: {error}")
         return False
     try:
-        tell_acted(bus, clock, OperatorAction.STOP_MISSION, found.mission, "by command")
+        publish_action(bus, clock, OperatorAction.STOP_MISSION, found.mission, "by command")
         await end_mission(bus)
     except LinkError as error:
         say(f"the launcher does not answer: {error}")

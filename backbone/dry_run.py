@@ -23,7 +23,7 @@ from backbone.mission.behavior_orders import PathStep
 from backbone.mission.model import ArcWish, Behavior, MissionDescription
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import NoHost
-from backbone.placer.placement import HostView, place
+from backbone.placer.placement import CandidateHost, place
 from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import RcKnown, Requested
@@ -183,7 +183,7 @@ def placements(description: MissionDescription) -> list[Placed]:
 def _place(
     description: MissionDescription, component_type: ComponentType, name: str, pin: str, counts: Counter[str]
 ) -> Placed:
-    hosts = [HostView(host.name, frozenset(host.tags), components=counts[host.name]) for host in description.hosts]
+    hosts = [CandidateHost(host.name, frozenset(host.tags), components=counts[host.name]) for host in description.hosts]
     try:
         choice = place(name, component_type.tags, pin, hosts)
     except NoHost as refusal:
@@ -193,7 +193,7 @@ def _place(
 
 # ---------------------------------------------------------------------- schedule
 @dataclass(frozen=True, slots=True)
-class _Claim:
+class _BehaviorClaim:
     """A behavior's claim, or why the behavior cannot claim."""
 
     arc: str
@@ -207,7 +207,7 @@ class _Claim:
 class _Asked:
     """A claim and the schedule manager's answer."""
 
-    claim: _Claim
+    claim: _BehaviorClaim
     rcs: tuple[str, ...] = ()
     refused: str = ""
 
@@ -217,7 +217,7 @@ def requests(description: MissionDescription) -> list[SchedulingRequest]:
     return [claim.request for claim in _claims(description) if claim.request is not None]
 
 
-def _claims(description: MissionDescription) -> Iterator[_Claim]:
+def _claims(description: MissionDescription) -> Iterator[_BehaviorClaim]:
     inventory = Inventory(description.resources)
     needs = {one.name: one.needs for one in description.types}
     for path, behavior in _walk(description.behaviors, [(description.name, description.priority)]):
@@ -229,7 +229,7 @@ def _claims(description: MissionDescription) -> Iterator[_Claim]:
         try:
             sets = inventory.find(FindRcs(list(needs[wish.kind]), wish.wish, features))
         except Refusal as refusal:
-            yield _Claim(arc, behavior, path, None, _refusal_text(refusal))
+            yield _BehaviorClaim(arc, behavior, path, None, _refusal_text(refusal))
             continue
         request = scheduling_request(
             arc,
@@ -240,7 +240,7 @@ def _claims(description: MissionDescription) -> Iterator[_Claim]:
             minimum_runtime_s=wish.minimum_runtime_s,
             maximum_runtime_s=wish.maximum_runtime_s,
         )
-        yield _Claim(arc, behavior, path, request)
+        yield _BehaviorClaim(arc, behavior, path, request)
 
 
 def _walk(behaviors: Iterable[Behavior], above: Sequence[PathStep]) -> Iterator[tuple[list[PathStep], Behavior]]:
@@ -264,7 +264,7 @@ def _rcs(description: MissionDescription, hosts: dict[str, str]) -> Iterator[RcK
         )
 
 
-def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _Claim, hosts: dict[str, str]) -> _Asked:
+def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _BehaviorClaim, hosts: dict[str, str]) -> _Asked:
     """Send the ARC's request, if the ARC and its behavior have hosts."""
     if claim.request is None:
         return _Asked(claim, refused=claim.obstacle)

@@ -101,7 +101,7 @@ class PeopleKnown(Message, frozen=True):
     consoles: Annotated[dict[Mention, Mention], MANY]
 
 
-Told = StoryEvent | OperatorActed | Log | ComponentState | PeopleKnown
+Logged = StoryEvent | OperatorActed | Log | ComponentState | PeopleKnown
 """Messages of which a log, and who is spoken of in it, is made."""
 
 
@@ -118,7 +118,7 @@ class MissionLog:
         self.people = People()
         """People at consoles, whose names replace the consoles' names in answers."""
 
-    def take(self, said: Told, source: str = "", cause: str = "") -> None:
+    def take(self, said: Logged, source: str = "", cause: str = "") -> None:
         """Take in a message, said by this component because of another message."""
         match said:
             case StoryEvent():

@@ -120,7 +120,7 @@ def login_name() -> str:
         return f"uid-{os.getuid()}"
 
 
-def tell_acted(bus: Bus, clock: Clock, action: OperatorAction, subject: str, detail: str = "") -> None:
+def publish_action(bus: Bus, clock: Clock, action: OperatorAction, subject: str, detail: str = "") -> None:
     """Publish an action of the logged-in user to the mission.
 
     Args:

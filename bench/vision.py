@@ -22,7 +22,7 @@ from mission_control.vision.landmark import Picture, Sighting
 from mission_control.vision.motion_detection import MotionDetector
 from mission_control.vision.pose_filter import PoseFilter
 from mission_control.vision.skeleton_model import TargetModel
-from mission_control.vision.skeleton_tracking import REACH_COLUMNS_PX, REACH_ROWS_PX, Phase, TargetTracker
+from mission_control.vision.skeleton_tracking import REACH_COLUMNS_PX, REACH_ROWS_PX, TargetTracker, TrackingPhase
 from mission_control.vision.target_acquisition import acquire
 from mission_control.vision.target_pose import estimate_poses
 from mission_control.vision.visual_servo import VisualServo
@@ -80,7 +80,7 @@ def followed(pictures: list[Picture]) -> tuple[list[float], list[float], list[fl
         began_s = time.process_time_ns()
         track = tracker.look(picture)
         took_ms = (time.process_time_ns() - began_s) / 1e6
-        if track.phase is not Phase.TRACKING or model is None or track.sighting is None:
+        if track.phase is not TrackingPhase.TRACKING or model is None or track.sighting is None:
             other_ms.append(took_ms)
             continue
         tracked_ms.append(took_ms)

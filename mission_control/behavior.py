@@ -1,10 +1,10 @@
-"""Behavior: base of every decision process that is no console.
+"""Behavior: base class of every decision process that is no console.
 
-A behavior claims at most one ARC, hears when its RCs come and go, starts its children through the
-placer and tells its parent how far it is. Derive, override the hooks you need; each hook says when
-it is called, what it is for and what not to do in it. ``behaviors/skeleton.py`` is one to copy.
+A behavior claims at most one ARC, is notified of the begin and end of grants, starts its children through the placer
+and reports its progress to its parent. Derive and override the hooks you need; each hook documents when it is called,
+its purpose, and what it must not do. Begin with a copy of ``behaviors/skeleton.py``.
 
-State kept on ``self`` survives every suspension: the process goes on, only its RCs are lent out.
+State on ``self`` survives every suspension, because only the RCs are taken and the process continues.
 
 Source: SMC 2000 and RAM 2002, "Mission Control".
 """
@@ -45,7 +45,7 @@ from mission_control.behavior_tree import (
     StopChild,
     draw,
 )
-from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
@@ -73,10 +73,10 @@ AGAIN_AFTER_S = 0.2  # chosen: a restarted placer or parent is back within one o
 
 
 class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What the tree gives every behavior; derive and add the behavior's own parameters, with defaults.
+    """Parameters that the tree gives every behavior; derive and add the behavior's own parameters, with defaults.
 
     Attributes:
-        path: Names and priorities from the mission's root to this node; empty: it was started by hand.
+        path: Names and priorities from the mission's root to this node; empty: started by hand.
         arc: The ARC it claims, if any.
         children: Nodes it starts.
     """
@@ -87,7 +87,7 @@ class BehaviorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 
 
 class NotAChild(Refusal):
-    """A report came from a component that is no child of this behavior."""
+    """The sender of the report is no child of this behavior."""
 
     code = "behavior.not_a_child"
     remedy = "Report to the behavior named before you in your path."
@@ -97,23 +97,23 @@ B = TypeVar("B", bound=BehaviorParameters)
 
 
 class Behavior(Component[B], Generic[B]):
-    """A node of the behavior tree, running.
+    """A running node of the behavior tree.
 
     Class variables to set: ``parameters_type``, and ``children_together`` (False: one after the other).
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | Report | AskBehavior
+    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self.status, self.payload = BehaviorStatus.RUNNING, dict[str, Any]()
         self.rcs: Mapping[str, str] = {}
-        """Kind → name of the RCs held now; empty while suspended."""
+        """Kind → name of the granted RCs; empty while suspended."""
         self.arc: ArcClient | None = None
-        """The hold on its ARC; None if it claims none."""
+        """The client of its ARC; None without an ARC."""
         self.times_resumed = self.times_suspended = self.frames_seen = 0
         self._nodes = {node.name: node for node in self.parameters.children}
         self._children = Children(list(self._nodes), together=self.children_together)
@@ -130,56 +130,56 @@ class Behavior(Component[B], Generic[B]):
     async def start(self) -> None:
         """Prepare.
 
-        When: once, after the component is ready, before the ARC is claimed and children are started.
-        What: subscribe to others' events, set up state. Not: wait for the ARC or for children.
+        When: once, after readiness, before the claim of the ARC and the start of children.
+        What: subscribe to events of other components, set up state. Not: wait for the ARC or for children.
         """
 
     def need(self) -> ArcNeed | None:
-        """Say which ARC to claim.
+        """Return the ARC to claim.
 
-        When: once, after ``start``. What: by default what the tree says; a behavior that knows better which run
-        times are of use to it returns the same need with those. Not: ask for another kind of ARC.
+        When: once, after ``start``. What: by default the ARC of the tree; a behavior that computes better run times
+        returns the same need with these. Not: ask for another kind of ARC.
         """
         return self.parameters.arc
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:
-        """Go on.
+        """Continue with the granted RCs.
 
-        When: each time the RCs are held, commands pass and pictures arrive from now on; the first time too.
-        What: tell algorithms that time has passed. Not: drive in a loop; that is ``act``.
+        When: at the begin of each grant; commands pass and pictures arrive from now on.
+        What: inform algorithms of the elapsed time. Not: drive in a loop; that is ``act``.
 
         Args:
-            rcs: Kind → name of what is held.
+            rcs: Kind → name of the granted RCs.
         """
 
     async def act(self) -> None:
         """Command the robot.
 
         When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
-        What: await ``self.arc`` commands and the clock, keep progress on ``self``. A command that comes too
-        late for the grant ends it quietly; after a ``LinkError`` it is begun again, and when an operator had
-        stopped the robot it is begun again once that stop is lifted.
-        Not: catch the cancellation and go on.
+        What: await ``self.arc`` commands and the clock, keep progress on ``self``. If a command is too late for the
+        grant, the task ends without an error. After a ``LinkError`` it begins again; after an operator's stop it begins
+        again when that stop is lifted.
+        Not: catch the cancellation and continue.
         """
 
     async def suspending(self, deadline_s: float) -> None:
         """Stop cleanly.
 
-        When: the slice is about to end; not before an override by a human, and not for a behavior that
-        overrides neither this nor ``act``. Commands still pass.
-        What: bring the robot to rest; return as soon as that is done. Not: take longer than the deadline.
+        When: shortly before the end of a slice, except before an override by a human. A behavior that overrides neither
+        this hook nor ``act`` is not called. Commands still pass.
+        What: stop the robot, then return. Not: exceed the deadline.
 
         Args:
             deadline_s: Seconds left.
         """
 
     def not_now(self) -> float:
-        """Say whether the end of the slice comes at a bad moment.
+        """Return the time that is needed beyond the end of the slice.
 
-        When: shortly before the minimum run time is over, and before the end of whatever this asked for; only if
-        the maximum run time is longer, and only of behaviors that override this.
-        What: return an estimate of what is still needed, from what is known already. Not: wait; ask for time to
-        spare, others wait for it; count on it, as a higher behavior or a person overrides all the same.
+        When: shortly before the end of the minimum run time and of each extension, if the maximum run time is longer
+        and the behavior overrides this hook.
+        What: return an estimate of the needed time, from known data. Not: wait; ask for spare time, because other ARCs
+        wait for it; rely on it, because a higher behavior or a person still preempts.
 
         Returns:
             Seconds still needed beyond the end of the slice; 0: it may end.
@@ -187,21 +187,21 @@ class Behavior(Component[B], Generic[B]):
         return 0.0
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Take note that the RCs are gone.
+        """Handle the end of a grant.
 
-        When: after every loss of the RCs, also an unannounced one. What: keep the state, tell people.
-        Not: command anything; no picture arrives until ``resumed``.
+        When: after every loss of the RCs, also without an announcement. What: keep the state, report it.
+        Not: send commands; no picture arrives until ``resumed``.
 
         Args:
             reason: ``slice``, ``higher``, ``rc``, ``lost`` …
-            by: ARC or RC because of which.
+            by: The ARC or RC that caused it.
         """
 
     def see(self, frame: Frame) -> None:
-        """Look at a picture.
+        """Process a picture.
 
-        When: for the newest picture of the current grant; older ones that were not yet seen are skipped.
-        What: detect, publish, ``report``. Not: take longer than a picture's period; nothing else runs meanwhile.
+        When: for the newest picture of the present grant; older pictures are skipped.
+        What: detect, publish, ``report``. Not: take longer than a picture's period, because it blocks the event loop.
         """
 
     async def child_finished(
@@ -210,15 +210,15 @@ class Behavior(Component[B], Generic[B]):
         status: BehaviorStatus,
         payload: Mapping[str, Any],  # noqa: ARG002
     ) -> Decision:
-        """Decide what comes after a child.
+        """Decide what follows the end of a child.
 
-        When: a child reported success or failure, could not be started, or fell too often.
-        What: return the decision; by default a failure aborts, a success goes on. Not: start or stop children here.
+        When: a child reported success or failure, was refused at its start, or fell too often.
+        What: return the decision; by default a failure aborts, a success continues. Not: start or stop children here.
         """
         return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
 
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
-        """Draw the conclusion from the children's end.
+        """Conclude after the end of all children.
 
         When: the last child finished, or one aborted the others. What: by default, finish with the same status.
         """
@@ -236,31 +236,31 @@ class Behavior(Component[B], Generic[B]):
         return self._children.status
 
     def finish(self, status: BehaviorStatus, payload: Mapping[str, Any] | None = None) -> None:
-        """Be done: the ARC is given back, children end, the parent hears it. Later calls change nothing."""
+        """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
         if self.status.is_final or not status.is_final:
             return
         self.status, self.payload = status, dict(payload or {})
         if status is BehaviorStatus.FAILURE and self._parent is None and not self._abandoned:
             self._abandon(self.name, self.payload)
         failed = status is BehaviorStatus.FAILURE
-        self.tell(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
+        self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
     def tell_parent(self, payload: Mapping[str, Any]) -> None:
-        """Have the parent told how the work goes; lost if it cannot be reached just now."""
+        """Send a report of progress to the parent; it is lost if the parent cannot be reached."""
         self.payload = dict(payload)
         if self._parent is not None and not self.status.is_final:
             self._begin(self._report_once(self._parent.address, self._report()), "report")
 
     # ------------------------------------------------------------------ the component's hooks
     async def connect(self) -> None:
-        """Watch the parent, if it is a behavior: the first step of a path is the mission itself."""
+        """Watch the parent, if it is a behavior; the first step of a path is the mission."""
         if len(self.path) > 2:
             parent = address(Subsystem.MISSION_CONTROL, self.path[-2][0])
             self._parent = PeerMonitor(self.bus, parent)
 
     async def serve(self) -> None:
-        """Start, claim, bring up the children; then everything goes by events."""
+        """Start, claim the ARC, start the children; then react to events."""
         await self.start()
         need = self.need()
         if need is not None and not self.status.is_final:
@@ -272,9 +272,9 @@ class Behavior(Component[B], Generic[B]):
             self._begin(self._stop_children_of_an_earlier_life(), "children of an earlier life")
 
     async def answer(self, asked: Envelope[Any]) -> Message:
-        """Answer the ARC, the children, and whoever asks how far it is."""
+        """Answer the ARC, the children, and ``AskBehavior``."""
         match asked.body:
-            case Report(child=child, status=status, payload=payload):
+            case ChildReport(child=child, status=status, payload=payload):
                 if child not in self._nodes or child != component_of(asked.source):
                     raise NotAChild(f"{asked.source} is no child of {self.name}", child=child)
                 self._child_reported(child, status, payload)
@@ -291,8 +291,8 @@ class Behavior(Component[B], Generic[B]):
     async def drain(self) -> None:
         """Give the ARC back.
 
-        The children go on: only an order to stop this behavior ends them, and that the placer sees to. A signal from
-        outside is no such order: the next life of this behavior adopts them.
+        The children continue. Only an order to stop this behavior ends them, which the placer does. After a signal from
+        outside, the next life of this behavior adopts them.
         """
         try:
             async with asyncio.timeout(DRAIN_TIME_S):
@@ -301,7 +301,7 @@ class Behavior(Component[B], Generic[B]):
             log.warning("%s leaves before its ARC has ended", self.name)
 
     def absences(self) -> list[Absence]:
-        """Return children and ARC that are wanted and missing, and children it goes on without."""
+        """Return the missing children and ARC, and the children that it has given up."""
         if self.status.is_final:
             return list(self._abandoned.values())
         wishes = [
@@ -312,7 +312,7 @@ class Behavior(Component[B], Generic[B]):
         return [*absent, *self._abandoned.values()]
 
     def statistics(self) -> dict[str, float]:
-        """Return how often the RCs came and went, and how many pictures were seen."""
+        """Return counts of grants and pictures."""
         return {
             "times_resumed": self.times_resumed,
             "times_suspended": self.times_suspended,
@@ -320,7 +320,7 @@ class Behavior(Component[B], Generic[B]):
         }
 
     def behavior_state(self) -> BehaviorState:
-        """Return how far it is."""
+        """Return its progress."""
         node = BehaviorNode(
             self.launch.type, self.name, self.path[-1][1], arc=self.parameters.arc, children=self.parameters.children
         )
@@ -330,7 +330,7 @@ class Behavior(Component[B], Generic[B]):
 
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
-        """Pass it on; see ``ArcListener``."""
+        """Call the hooks; see ``ArcListener``."""
         self.rcs, self._suspended_because = notice.rcs, ""
         self.times_resumed += 1
         held = ", ".join(f"{kind} {name}" for kind, name in notice.rcs.items())
@@ -342,12 +342,12 @@ class Behavior(Component[B], Generic[B]):
             self._acting = self._begin(self._act(), "act")
 
     async def arc_suspending(self, notice: Suspending) -> None:
-        """Pass it on; see ``ArcListener``."""
+        """Call the hooks; see ``ArcListener``."""
         await self._stop_acting()
         await self.suspending(notice.deadline_s)
 
     async def arc_suspended(self, notice: Suspended) -> None:
-        """Pass it on; see ``ArcListener``."""
+        """Call the hooks; see ``ArcListener``."""
         self.rcs, self._suspended_because = {}, suspended_because(notice.reason, notice.by)
         self.times_suspended += 1
         self.story.note(self.name, f"suspended: {self._suspended_because}")
@@ -357,7 +357,7 @@ class Behavior(Component[B], Generic[B]):
 
     @property
     def _commands_nothing(self) -> bool:
-        """Whether there is nothing to bring to rest: it only watches."""
+        """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
         return type(self).act is Behavior.act and type(self).suspending is Behavior.suspending
 
     async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
@@ -398,7 +398,7 @@ class Behavior(Component[B], Generic[B]):
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
     async def _wait_until_it_may_move(self, stopped: EmergencyStopped) -> None:
-        """Tell people why nothing happens, and return when the operator's stop is lifted, or perhaps."""
+        """Report the stop, and return when it is lifted or its state is unknown."""
         assert self.arc is not None  # noqa: S101  it refused the command
         held = self.feedback
         self.report(stopped.detail)
@@ -425,7 +425,7 @@ class Behavior(Component[B], Generic[B]):
                 return await self.arc.release(f"{self.name} is done")
             except LinkError as error:
                 log.info("%s: released without an answer: %s", self.arc.arc, error)
-            except Refusal as refusal:  # it is another owner's by now
+            except Refusal as refusal:  # it has another owner by now
                 log.info("%s is not released: %s", self.arc.arc, refusal)
                 return None
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
@@ -456,7 +456,7 @@ class Behavior(Component[B], Generic[B]):
             self._kept[name] = keeping
 
     async def _keep_child(self, name: str) -> None:
-        """Have the child running until it is ordered to stop. One from an earlier life of this behavior is adopted."""
+        """Keep the child running until an order stops it; adopt a child of an earlier life of this behavior."""
         wish = self._wishes[name] = Wish(name)
         order, at = self._nodes[name].order(self.path), address(Subsystem.MISSION_CONTROL, name)
         try:
@@ -471,10 +471,10 @@ class Behavior(Component[B], Generic[B]):
                 patience_s=START_PATIENCE_S,
             )
         except Refusal as refusal:
-            self.tell(name, f"could not be started: {refusal}", LogLevel.WARNING)
+            self.publish_event(name, f"could not be started: {refusal}", LogLevel.WARNING)
             self._child_reported(name, BehaviorStatus.FAILURE, _why(refusal))
             return
-        self.tell(name, f"is not wanted any more: {stopped}")
+        self.publish_event(name, f"is not wanted any more: {stopped}")
         del self._kept[name], self._wishes[name]
         self._carry_out(self._children.left(name))
 
@@ -485,7 +485,7 @@ class Behavior(Component[B], Generic[B]):
             self._begin(self._adopt(placement.name), f"adopt {placement.name}")
 
     async def _adopt(self, name: str) -> None:
-        """Learn how far a child is that was running before."""
+        """Ask an adopted child for its progress."""
         child = address(Subsystem.MISSION_CONTROL, name)
         try:
             state = await ask_until_answered(
@@ -497,13 +497,13 @@ class Behavior(Component[B], Generic[B]):
                 each_s=REPLY_TIME_S,
                 within_s=ADOPT_WITHIN_S,
             )
-        except (LinkError, Refusal) as error:  # it is being restarted, then it runs from its beginning
-            log.info("child %s does not say how far it is: %s", name, error)
+        except (LinkError, Refusal) as error:  # it is restarting and then runs from its beginning
+            log.info("child %s does not report its progress: %s", name, error)
             return
         self._child_reported(name, state.status, state.payload)
 
     async def _stop_children_of_an_earlier_life(self) -> None:
-        """Stop children that an earlier life of this behavior left running and that this life does not start now."""
+        """Stop running children of an earlier life of this behavior that this life does not start."""
         try:
             placed = await ask_until_answered(
                 self.bus,
@@ -536,7 +536,7 @@ class Behavior(Component[B], Generic[B]):
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
     def _abandon(self, name: str, payload: Mapping[str, Any]) -> None:
-        """Report for good what could not do its work, with its cause; a task that was done and failed is no absence."""
+        """Report a child that could not work as a lasting absence; a finished child that failed is no absence."""
         if "code" in payload:
             remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
             cause = str(payload.get("detail", "it failed"))
@@ -568,7 +568,7 @@ class Behavior(Component[B], Generic[B]):
 
     # ------------------------------------------------------------------ the parent
     async def _wind_up(self) -> None:
-        """Give back what is held, end the children, and tell the parent until it has noted it."""
+        """Give the ARC back, end the children, and repeat the report until the parent notes it."""
         await self._stop_acting()
         stops = [i.name for i in self._children.end() if isinstance(i, StopChild)]
         await asyncio.gather(self._release(), *(self._stop_child(name) for name in stops))
@@ -580,22 +580,22 @@ class Behavior(Component[B], Generic[B]):
                 return
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
-    async def _report_once(self, parent: str, report: Report) -> bool:
-        """Return True if there is nothing more to tell: it was noted, or the parent wants none of it."""
+    async def _report_once(self, parent: str, report: ChildReport) -> bool:
+        """Send the report once; return True if the parent noted or refused it."""
         try:
             await self.bus.ask(parent, report, ReportNoted, within_s=REPLY_TIME_S)
         except LinkError as error:
-            log.info("%s did not hear the report: %s", parent, error)
+            log.info("%s did not get the report: %s", parent, error)
             return False
         except Refusal as refusal:
             log.warning("%s refused the report: %s", parent, refusal)
         return True
 
-    def _report(self) -> Report:
-        return Report(self.name, self.status, self.payload)
+    def _report(self) -> ChildReport:
+        return ChildReport(self.name, self.status, self.payload)
 
     def _begin(self, work: Coroutine[Any, Any, Any], name: str) -> asyncio.Task[None] | None:
-        """Run the coroutine as a task, unless the component is already on its way out."""
+        """Run the coroutine as a task, unless the component is ending."""
         if self.state is not LifeState.READY:
             work.close()
             return None
@@ -603,11 +603,11 @@ class Behavior(Component[B], Generic[B]):
 
 
 def suspended_because(reason: str, by: str) -> str:
-    """Return why RCs were taken, as part of a sentence.
+    """Return the reason of a suspension, as part of a sentence.
 
     Args:
         reason: The scheduler's word.
-        by: Because of whom; empty: of nobody.
+        by: The component that caused it; empty: none.
 
     Example:
         >>> suspended_because("higher", "console-1"), suspended_because("silent", "")
@@ -617,7 +617,7 @@ def suspended_because(reason: str, by: str) -> str:
 
 
 async def _end_task(task: asyncio.Task[None] | None) -> None:
-    """Cancel a task and return when it has ended; a bug in it is its group's matter."""
+    """Cancel a task and return when it has ended; its task group handles a bug in it."""
     if task is not None and task is not asyncio.current_task():
         task.cancel()
         await asyncio.wait({task})

@@ -1,7 +1,7 @@
-"""The behavior tree: nodes with priorities, and what a parent does about its children.
+"""The behavior tree: nodes with priorities, and a parent's decisions about its children.
 
-Rules of this file: no bus, no clock. A priority counts among siblings only; who is higher of two
-nodes is decided by their paths from the root, in the RC manager.
+Rules of this file: no bus, no clock. A priority counts among siblings only; the RC manager compares two nodes by their
+paths from the root.
 
 Source: SMC 2000, "Mission Control": behaviors spawn children; a finished child returns its status
 to its parent, which decides what comes next.
@@ -51,9 +51,9 @@ class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         name: Name of the node and of its component.
         priority: Among its siblings; larger is higher.
         parameters: Its own parameters.
-        arc: What it claims, if anything.
+        arc: The ARC that it claims, if any.
         children: Nodes it starts.
-        process: Name of the process it shares with others; empty: a process of its own.
+        process: Name of its shared process; empty: a process of its own.
     """
 
     type: str
@@ -83,7 +83,7 @@ def draw(nodes: Sequence[BehaviorNode], remarks: Mapping[str, str] | None = None
 
     Args:
         nodes: The roots.
-        remarks: Name of a node → what to say behind it.
+        remarks: Name of a node → remark behind it.
 
     Example:
         >>> leaf = BehaviorNode("watch_for_motion", "watch1", 3)
@@ -104,32 +104,32 @@ def _lines(nodes: Sequence[BehaviorNode], remarks: Mapping[str, str], margin: st
         yield from _lines(node.children, remarks, margin + below, root=False)
 
 
-# ---------------------------------------------------------------------- what a parent does about its children
+# ---------------------------------------------------------------------- a parent and its children
 class Decision(StrEnum):
-    """What a parent does about a child that has finished."""
+    """A parent's decision about a finished child."""
 
     RETRY = "retry"  # start the same child again, from its beginning
-    NEXT = "next"  # leave it; go on with the children that are left
+    NEXT = "next"  # leave it; continue with the other children
     ABORT = "abort"  # stop all children; the parent has failed
 
 
 @dataclass(frozen=True, slots=True)
 class StartChild:
-    """Have this child started."""
+    """Start this child."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class StopChild:
-    """Have this child ended; right also if it is gone."""
+    """End this child. Idempotent."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
 class FinishParent:
-    """The children's work is done: the parent has this final status."""
+    """The children have finished: the parent has this final status."""
 
     status: BehaviorStatus
     payload: Mapping[str, Any] = field(default_factory=dict)
@@ -139,13 +139,13 @@ Instruction = StartChild | StopChild | FinishParent
 
 
 class Children:
-    """Turns what happened to children into what their parent does.
+    """Turns events of children into instructions for their parent.
 
     Laws: a child is stopped before it is started again; no child is started after the parent has
     finished; the parent finishes at most once.
 
     Args:
-        names: In the order of the mission file.
+        names: Names of the children, in the order of the mission file.
         together: True: all run at the same time; False: one after the other.
     """
 
@@ -161,14 +161,14 @@ class Children:
         return self._start_next()
 
     def reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> bool:
-        """Take note; return True if the parent has a decision to make: a child finished that had not before."""
+        """Record a report; return True if the child has newly finished and the parent must decide."""
         if name not in self._running or self._finished or self.status[name].is_final:
             return False
         self.status[name], self.payload[name] = status, payload
         return status.is_final
 
     def decided(self, name: str, decision: Decision) -> list[Instruction]:
-        """Return what follows from the parent's decision about a finished child."""
+        """Return the instructions after the parent's decision about a finished child."""
         if self._finished or name not in self._running or not self.status[name].is_final:
             return []
         match decision:
@@ -183,7 +183,7 @@ class Children:
                 return [StopChild(name), *self._start_next(), *self._finish_if_done()]
 
     def left(self, name: str) -> list[Instruction]:
-        """Return what follows when a child was ended by somebody else: whoever did it meant it."""
+        """Return the instructions after another component ended a child: the child is not started again."""
         if self._finished or name not in self._running:
             return []
         self._running.remove(name)
@@ -191,7 +191,7 @@ class Children:
         return [*self._start_next(), *self._finish_if_done()]
 
     def end(self) -> list[Instruction]:
-        """Return the orders that end all children that were started."""
+        """Return the orders that end all started children."""
         self._finished = True
         stops: list[Instruction] = [StopChild(name) for name in reversed(self._running)]
         self._running, self._waiting = [], []

@@ -1,4 +1,4 @@
-"""What behaviors say: to their parents, and to whoever listens."""
+"""Messages of behaviors: reports to their parents, and published events."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from backbone.wire import Message
 
 
 class BehaviorStatus(StrEnum):
-    """How far a behavior is."""
+    """Progress of a behavior."""
 
-    RUNNING = "running"  # at work, or suspended and waiting to go on
-    SUCCESS = "success"  # done, its aim was reached; final
-    FAILURE = "failure"  # done, its aim cannot be reached; final
+    RUNNING = "running"  # at work, or suspended
+    SUCCESS = "success"  # its aim is reached; final
+    FAILURE = "failure"  # its aim cannot be reached; final
 
     @property
     def is_final(self) -> bool:
@@ -22,13 +22,13 @@ class BehaviorStatus(StrEnum):
         return self is not BehaviorStatus.RUNNING
 
 
-class Report(Message, frozen=True):
-    """Child to parent: this is how far I am.
+class ChildReport(Message, frozen=True):
+    """Progress of a child, sent to its parent.
 
     Attributes:
         child: Name of the child.
-        status: A final one is said once and stands.
-        payload: What the parent may need to decide: plain values only.
+        status: Its status; a final one is sent once and never changes.
+        payload: Data for the parent's decision: plain values only.
     """
 
     child: Mention
@@ -37,22 +37,22 @@ class Report(Message, frozen=True):
 
 
 class ReportNoted(Message, frozen=True):
-    """Answer to ``Report``."""
+    """Answer to ``ChildReport``."""
 
 
 class AskBehavior(Message, frozen=True):
-    """How far are you?"""
+    """Ask for a behavior's progress."""
 
 
 class BehaviorState(Message, frozen=True):
     """Answer to ``AskBehavior``.
 
     Attributes:
-        name: Of the behavior.
-        status: How far it is.
-        payload: As last reported to its parent.
-        holds: Kind → name of the RCs it holds now; empty while suspended or without an ARC.
-        suspended_because: Reason and by whom, empty unless suspended.
+        name: Name of the behavior.
+        status: Its status.
+        payload: Payload of its last report to its parent.
+        holds: Kind → name of its granted RCs; empty while suspended or without an ARC.
+        suspended_because: Reason and cause of the suspension; empty unless suspended.
         tree: Its branch of the behavior tree as text, one line a node.
     """
 
@@ -74,12 +74,12 @@ class Region(Message, frozen=True):
 
 
 class MotionSeen(Message, frozen=True):
-    """Published as an event by a watching behavior: something moved.
+    """Motion in a picture, published as an event by a watching behavior.
 
     Attributes:
-        at_s: Mission time at which the picture was taken.
-        robot: Robot whose camera saw it.
-        region: Where in its picture.
+        at_s: Mission time of the picture.
+        robot: The robot of the camera.
+        region: Its region of the picture.
     """
 
     at_s: Instant
@@ -88,13 +88,13 @@ class MotionSeen(Message, frozen=True):
 
 
 class WaypointReached(Message, frozen=True):
-    """Published as an event by a patrol: the robot is at a way point.
+    """Arrival at a way point, published as an event by a patrol.
 
     Attributes:
         at_s: Mission time.
-        robot: Robot that patrols.
+        robot: The patrolling robot.
         number: Counts from 1 over all rounds; each number is published once.
-        waypoint: Which one, from 0, in the order of the patrol's parameter.
+        waypoint: Number of the way point, from 0, in the order of the patrol's parameter.
     """
 
     at_s: Instant

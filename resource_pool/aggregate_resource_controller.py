@@ -163,7 +163,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._sets: list[dict[str, str]] = []
         self._rcs: dict[str, str] = {}
         self._asked = asyncio.Event()
-        self._telling: asyncio.Task[None] | None = None
+        self._sending: asyncio.Task[None] | None = None
         self._notices: asyncio.Queue[_Notice] = asyncio.Queue()
         self._lease_until_s = 0.0
         self._leased = asyncio.Event()
@@ -224,7 +224,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def serve(self) -> None:
         """Send the request, then watch owner and RC manager until the ARC ends."""
-        self.start_task(self._send_notices(), "tell owner")
+        self.start_task(self._send_notices(), "notify owner")
         self.start_task(self._watch_owner(), "watch owner")
         self.start_task(self._beat(), "beat")
         self.start_task(self._watch_lease(), "watch lease")
@@ -286,7 +286,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._in_force = now
         if self._request is not None:
             self._ask_by({name: getattr(now, name) for name in RUN_TIMES})
-            self._telling = self.start_task(self._tell_run_times(), "tell run times")
+            self._sending = self.start_task(self._send_run_times(), "send run times")
 
     def statistics(self) -> dict[str, float]:
         """Count commands that passed, and commands refused because the gate was shut."""
@@ -325,7 +325,7 @@ class AggregateResourceController(Component[ArcParameters]):
             )
         except (Refusal, LinkError) as error:
             placeless = f"got no place in the schedule: {error}"
-            self.tell(self.name, placeless, LogLevel.WARNING)
+            self.publish_event(self.name, placeless, LogLevel.WARNING)
             await self._notify(Suspended(self.name, placeless, "", -1.0)).wait()
             self.end(placeless)
             return
@@ -367,7 +367,7 @@ class AggregateResourceController(Component[ArcParameters]):
         before = {name: getattr(request, name) for name in changed}
         self._ask_by(changed)
         try:
-            await self._tell_rc_manager(wish)
+            await self._ask_rc_manager(wish)
         except Refusal:
             self._ask_by(before)
             raise
@@ -375,8 +375,8 @@ class AggregateResourceController(Component[ArcParameters]):
     def _ask_by(self, changed: Mapping[str, bool | float]) -> None:
         """Change request and parameters together, so that the parameters show the present request."""
         assert self._request is not None  # noqa: S101  made in connect
-        if self._telling is not None:
-            self._telling.cancel()  # its run times are outdated
+        if self._sending is not None:
+            self._sending.cancel()  # its run times are outdated
         self._request = msgspec.structs.replace(self._request, **changed)
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
 
@@ -387,7 +387,7 @@ class AggregateResourceController(Component[ArcParameters]):
         self._in_force = self.parameters = msgspec.structs.replace(self.parameters, path=names_and_numbers)
         return Done()
 
-    async def _tell_run_times(self) -> None:
+    async def _send_run_times(self) -> None:
         request = self._request
         assert request is not None  # noqa: S101  made in connect
         change = ChangeRuntime(self.name, request.minimum_runtime_s, request.maximum_runtime_s)
@@ -398,7 +398,7 @@ class AggregateResourceController(Component[ArcParameters]):
         except (Refusal, LinkError) as error:  # the next RC manager gets them with the request
             self.story.note(self.name, f"the RC manager did not accept its run times: {error}")
 
-    async def _tell_rc_manager(self, wish: Message) -> None:
+    async def _ask_rc_manager(self, wish: Message) -> None:
         await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
 
     def _current_request(self) -> CurrentRequest:
@@ -433,7 +433,7 @@ class AggregateResourceController(Component[ArcParameters]):
             reason = f"could not be prepared: {detail}"
             if self._gate.epochs == order.epochs:
                 self._gate.close(reason, self.name, -1.0)
-            self.tell(self.name, reason, LogLevel.WARNING)
+            self.publish_event(self.name, reason, LogLevel.WARNING)
             raise SwappedOut(f"{self.name} {reason}", reason=reason, by=self.name, expected_start_s=-1.0) from error
         if self._gate.epochs != order.epochs:
             raise SwappedOut(f"{self.name} was closed while it prepared", reason=self._gate.reason, by=self._gate.by)
@@ -514,7 +514,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def _extend(self, until_s: float) -> None:
         """Request the extension of the slice until this time, at most the maximum run time from the grant on."""
         until_s = min(until_s, self._longest_end_s())
-        await self._tell_rc_manager(Extend(self.name, until_s))
+        await self._ask_rc_manager(Extend(self.name, until_s))
         self._slice_end_s = max(self._slice_end_s, until_s)
 
     def _longest_end_s(self) -> float:
@@ -594,7 +594,7 @@ class AggregateResourceController(Component[ArcParameters]):
             self._unfounded, self._unfounded_since_s = unfounded, now_s
         elif unfounded and now_s - self._unfounded_since_s >= LEASE_S * self.clock.rate:
             self._unfounded = {}
-            self.tell(self.name, "is counted as running and holds nothing: sends its request again")
+            self.publish_event(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")
 
     async def _watch_lease(self) -> None:
@@ -606,7 +606,7 @@ class AggregateResourceController(Component[ArcParameters]):
                 continue
             await self.clock.sleep_until_s(self._lease_until_s)
             if self._gate.epochs and self.clock.now_s() >= self._lease_until_s:
-                self.tell(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
+                self.publish_event(self.name, "its lease expired: no renewal came in time", LogLevel.WARNING)
                 self._shut("lease", "rc_manager", -1.0)
                 if self._manager is not None and self._manager.is_there:
                     await self._ask_anew()

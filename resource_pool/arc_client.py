@@ -380,7 +380,7 @@ class ArcClient:
             async with asyncio.timeout(REPLY_TIME_S):
                 await self._suspended.wait()
         except TimeoutError:
-            raise ReplyTimeout(f"{self.arc} still holds its RCs {REPLY_TIME_S:g} s after it was told to rest") from None
+            raise ReplyTimeout(f"{self.arc} still holds its RCs {REPLY_TIME_S:g} s after the order to rest") from None
 
     async def want_runtime(self, minimum_runtime_s: float, maximum_runtime_s: float = 0.0) -> None:
         """Request other run times from the next slice on."""

@@ -172,7 +172,7 @@ class Sending:
 
 
 @dataclass(frozen=True, slots=True)
-class Count:
+class ArcCount:
     """Counts of one ARC since its connection.
 
     Attributes:
@@ -323,10 +323,10 @@ class PacketSchedule:
         self._reported |= {(arc, number, fault) for fault, _ in found}
         return [line for _, line in found]
 
-    def counts(self) -> dict[str, Count]:
+    def counts(self) -> dict[str, ArcCount]:
         """Return the counts of each connected ARC."""
         return {
-            arc: Count(
+            arc: ArcCount(
                 sum(s.sent for s in sender.streams), sum(s.overruns for s in sender.streams), sender.worst_packet_s
             )
             for arc, sender in self._senders.items()

@@ -141,7 +141,13 @@ class ResourceController(Component[R], Generic[R]):
         """Return the interface for a driver of this RC."""
         folder = Path(self.launch.run_directory) if self.launch.run_directory else None
         return DriverSite(
-            self.name, self.bus, self.clock, self.parameters, lambda what: self.tell(self.name, what), self.fail, folder
+            self.name,
+            self.bus,
+            self.clock,
+            self.parameters,
+            lambda what: self.publish_event(self.name, what),
+            self.fail,
+            folder,
         )
 
     def make_driver(self, name: str = "") -> Any:
@@ -331,7 +337,7 @@ class ResourceController(Component[R], Generic[R]):
             detail = error.detail if isinstance(error, HardwareFault) else f"nothing within {SAFE_WITHIN_S} s"
             self._faults += 1
             unsafe = f"disconnected ({reason}), but {self.name} is not safe: {detail}"
-            self.tell(hold.arc, unsafe, LogLevel.ALARM)
+            self.publish_event(hold.arc, unsafe, LogLevel.ALARM)
             self._report_holders()
             raise HardwareFault(f"{self.name} is not safe after {hold.arc}: {detail}", arc=hold.arc) from error
         del self._unsafe[hold.arc]

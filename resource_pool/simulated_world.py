@@ -113,7 +113,7 @@ class SimulatedWorld(Component[WorldParameters]):
         return {
             "packets": self._packets,
             "packets_lost": sum(lost.values()),
-            "packets_for_nobody": self._air.for_nobody,
+            "packets_for_no_robot": self._air.for_no_robot,
             **{f"packets_lost_{name}": lost.get(network_id, 0) for network_id, name in self._robots.items()},
             **{f"packets_delivered_{name}": delivered.get(network_id, 0) for network_id, name in self._robots.items()},
             "stale_packets": self._stale,

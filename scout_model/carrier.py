@@ -1,6 +1,6 @@
 """The carrier: a bigger robot that brings Scouts in and sets them down; pure functions of time.
 
-It drives its path once (and back if so told), stops where each place it serves is nearest, and there
+It drives its path once (and back with ``there_and_back``), stops where each place it serves is nearest, and there
 an arm lifts the Scouts of this place off its deck, one after the other, and lowers them to the floor.
 Until a Scout stands on the floor it goes wherever the carrier holds it.
 
@@ -25,7 +25,7 @@ from scout_model.dimensions import (
     WHEEL_RADIUS_M,
 )
 from scout_model.errors import InvalidWorld
-from scout_model.targets import CARRIER, Route, TargetPose, path_length_m
+from scout_model.targets import CARRIER, Route, TargetState, path_length_m
 
 _LIFT_M = 0.05  # chosen: clears the neighbor on the deck
 _LIFT_SHARE = 0.25  # chosen: of the time; as much to lower it, the rest to reach out
@@ -83,7 +83,7 @@ class CarrierTrip:
         stop = self._stops[passenger]
         return self._target.begin_s + stop.at_m / self._target.speed_m_s + (stop.slot + 1) * SET_DOWN_S
 
-    def pose(self, time_s: float) -> TargetPose:
+    def pose(self, time_s: float) -> TargetState:
         """Return where the carrier is at this world time."""
         begin_s = self._target.begin_s
         return self._route.where(begin_s + min(self._driven_s(time_s - begin_s), self._last_s))
@@ -158,7 +158,7 @@ def _nearest(target: Target, place: ScoutPlace) -> tuple[float, float]:
     return best
 
 
-def _aboard(carrier: TargetPose, slot: int) -> CarriedPose:
+def _aboard(carrier: TargetState, slot: int) -> CarriedPose:
     """Return the place of a slot on the deck: rows of two, the first to leave stand in the rear."""
     row, side = divmod(slot, 2)
     rows = CARRIER_PLACES // 2

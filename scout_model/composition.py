@@ -297,7 +297,7 @@ def _add_furniture(spec: Any, furniture: Furniture, dark_places: list[DarkPlace]
 
 
 def _is_in(furniture: Furniture, dark: DarkPlace) -> bool:
-    """Say whether a piece of furniture stands in a dark place with all of its footprint and height."""
+    """Return whether a piece of furniture stands in a dark place with all of its footprint and height."""
     return (
         abs(furniture.x_m - dark.x_m) + furniture.width_m / 2 <= dark.width_m / 2
         and abs(furniture.y_m - dark.y_m) + furniture.depth_m / 2 <= dark.depth_m / 2

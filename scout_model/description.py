@@ -126,7 +126,7 @@ class ScoutPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A body that walks a path again and again; its position is a function of time alone.
 
-    A carrier walks its path once, and back if so told, and stops where it sets down what it carries.
+    A carrier walks its path once, and back with ``there_and_back``, and stops to set down its load.
 
     Attributes:
         name: Unique in the world.
@@ -163,7 +163,7 @@ class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         settling: How long the picture rolls after transmitter or receiver were switched to a
             frequency.
         interference: Share of the rows that two transmitters on one frequency spoil; the rest is the nearer one's.
-        snow: Contrast of the noise on a frequency nobody uses; 0: gray.
+        snow: Contrast of the noise on an unused frequency; 0: gray.
         radio_loss: Share of command packets lost wherever the robot is, besides those lost by distance.
         radio_delay_s: From a packet's end on the air to the robot's having read it.
         antenna_x_m: Of the base's one antenna for packets and pictures; None: the middle of the room.
@@ -198,7 +198,7 @@ CLEAN_AIR = AirDescription(
 
 
 class WorldDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A room and what is in it.
+    """A room with its contents.
 
     Attributes:
         width_m: Along x.

@@ -42,7 +42,7 @@ CAMERA_TILT_RAD = math.radians(4.0)  # chosen: level, half the picture would be 
 STEP_S = 1 / 240  # measured: the longest step at which the jump stays within 5 % of its height
 STEPS_PER_FRAME = 8
 FRAMES_PER_S = 30  # RAM 2002, "Visual Servoing": close to 30 frames per second
-COMMAND_TIMEOUT_S = 0.5  # chosen: a robot nobody talks to must neither move nor jam the air
+COMMAND_TIMEOUT_S = 0.5  # chosen: a robot without commands must neither move nor jam the air
 
 # Targets
 PIONEER_RADIUS_M = 0.20  # chosen: a Pioneer is 38 to 45 cm wide and long

@@ -88,7 +88,7 @@ def probe_once(folder: Path, trial_time_s: float = TRIAL_TIME_S) -> GlSupport:
         file.seek(0)
         try:
             return msgspec.json.decode(file.read(), type=GlSupport)
-        except msgspec.DecodeError:  # nobody has asked yet, or died while writing, or the disk was full
+        except msgspec.DecodeError:  # no probe ran yet, or it died while writing, or the disk was full
             file.truncate(0)
         support = probe(trial_time_s)
         try:

@@ -188,7 +188,7 @@ class _View:
         self._pixels = self._project(np.where(self._is_ahead[:, np.newaxis], self._corners, 1.0))
 
     def is_beside(self, corners: NDArray[np.intp]) -> bool:
-        """Say whether all these corners are behind the camera or beyond one and the same edge of the picture."""
+        """Return whether all these corners are behind the camera or beyond one and the same edge of the picture."""
         return bool(self._is_out[:, corners].all(axis=1).any())
 
     def fill(self, canvas: NDArray[np.uint8], polygon: NDArray[np.intp], level: float) -> None:
@@ -255,7 +255,7 @@ def _mesh(model: mujoco.MjModel, geom: int) -> _Mesh:
     x_m, y_m, z_m = model.geom_size[geom].tolist()
     mesh = _solid(kind, (x_m, y_m, z_m), is_mark=bool(model.geom_group[geom] == _MARKS))
     if mesh is None:
-        raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which nobody taught the painter")
+        raise ValueError(f"geom {model.geom(geom).name!r} has shape {kind.name}, which the painter cannot draw")
     return mesh
 
 

@@ -49,7 +49,7 @@ class RadioAir:
 
     Args:
         seed: Of the world.
-        air: How packets are delayed and lost.
+        air: Delays and losses of packets.
     """
 
     def __init__(self, seed: int, air: AirDescription) -> None:
@@ -58,7 +58,7 @@ class RadioAir:
         self._order = itertools.count()
         self._delivered: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
-        self._for_nobody = 0
+        self._for_no_robot = 0
 
     @property
     def delivered(self) -> Mapping[int, int]:
@@ -71,19 +71,19 @@ class RadioAir:
         return MappingProxyType(self._lost)
 
     @property
-    def for_nobody(self) -> int:
-        """Packets to ids no robot has."""
-        return self._for_nobody
+    def for_no_robot(self) -> int:
+        """Number of packets to ids without a robot."""
+        return self._for_no_robot
 
     def send(self, sent: Sent, away_m: float | None) -> None:
         """Put a packet on the air.
 
         Args:
             sent: The packet.
-            away_m: How far from the antenna its robot is, above 0; None: no robot has the id.
+            away_m: Distance of its robot from the antenna, above 0; None: no robot has the id.
         """
         if away_m is None:
-            self._for_nobody += 1
+            self._for_no_robot += 1
         elif self._is_lost(sent, away_m):
             self._lost[sent.network_id] += 1
         else:

@@ -27,7 +27,7 @@ _DRIVE = struct.Struct("!ff")
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class DrivePacket:
     """Turn the wheels at these speeds, forward is positive."""
 
     left_rad_s: float
@@ -35,12 +35,12 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class Halt:
+class HaltPacket:
     """Stop the wheels."""
 
 
 @dataclass(frozen=True, slots=True)
-class Jump:
+class JumpPacket:
     """Lower the foot, kick, wind the spring again."""
 
 
@@ -61,7 +61,7 @@ class Safe:
     """Stop the wheels and send no picture."""
 
 
-Packet = Drive | Halt | Jump | TransmitterOn | TransmitterOff | Safe
+Packet = DrivePacket | HaltPacket | JumpPacket | TransmitterOn | TransmitterOff | Safe
 
 
 def packet_bits(payload: bytes) -> int:
@@ -137,9 +137,9 @@ def decode(payload: bytes) -> Packet:
         raise MalformedPacket(f"{len(values)} bytes follow a command {command!r}, which takes none")
     match command:
         case b"H":
-            return Halt()
+            return HaltPacket()
         case b"J":
-            return Jump()
+            return JumpPacket()
         case b"S":
             return Safe()
         case b"X":
@@ -147,13 +147,13 @@ def decode(payload: bytes) -> Packet:
     raise MalformedPacket(f"no command begins with {command!r}")
 
 
-def _decode_drive(values: bytes) -> Drive:
+def _decode_drive(values: bytes) -> DrivePacket:
     if len(values) != _DRIVE.size:
         raise MalformedPacket(f"drive takes {_DRIVE.size} bytes of speeds, not {len(values)}")
     left_rad_s, right_rad_s = _DRIVE.unpack(values)
     if not (math.isfinite(left_rad_s) and math.isfinite(right_rad_s)):
         raise MalformedPacket(f"wheel speeds {left_rad_s}, {right_rad_s} are not finite")
-    return Drive(left_rad_s, right_rad_s)
+    return DrivePacket(left_rad_s, right_rad_s)
 
 
 def _decode_transmitter_on(values: bytes) -> TransmitterOn:

@@ -1,6 +1,6 @@
-"""What a kind of robot is to the simulated world: one MJCF file and one class.
+"""A kind of robot in the simulated world: one MJCF file and one class.
 
-The class says which body the robot has, hears its packets, and drives its actuators. A mission names
+The class names the robot's body, receives its packets, and drives its actuators. A mission names
 it by its class path, so a new kind needs no change in this package.
 """
 

@@ -1,4 +1,4 @@
-"""The Scout's firmware: what the robot does with the packets it hears.
+"""The Scout's firmware: the robot's reactions to packets.
 
 Packets and time go in, positions of the actuators come out; physics is the world's business.
 
@@ -7,7 +7,7 @@ Rules:
 * A packet that is none changes nothing, also not the watchdog.
 * Without a packet for ``COMMAND_TIMEOUT_S`` the wheels stop and the transmitter goes off.
 * A jump is preload, kick, rewind.  Until the spring is wound another jump is refused.  Halt, safe
-  and the watchdog stop a jump that has not kicked yet; a released spring stops for nobody.
+  and the watchdog stop a jump that has not kicked yet; a released spring cannot be stopped.
 
 Source: IROS 2001, section 2: the on-board processors do communications and actuator control only.
 """
@@ -29,7 +29,7 @@ from scout_model.dimensions import (
     WINCH_SPEED_M_S,
 )
 from scout_model.errors import MalformedPacket
-from scout_model.radio_link import Drive, Halt, Jump, Safe, TransmitterOff, TransmitterOn, decode
+from scout_model.radio_link import DrivePacket, HaltPacket, JumpPacket, Safe, TransmitterOff, TransmitterOn, decode
 
 
 class Spring(StrEnum):
@@ -126,11 +126,11 @@ class Firmware:
         self._heard += 1
         self._heard_s = now_s
         match packet:
-            case Drive(left_rad_s, right_rad_s):
+            case DrivePacket(left_rad_s, right_rad_s):
                 self._left_rad_s, self._right_rad_s = clip_wheel_speed(left_rad_s), clip_wheel_speed(right_rad_s)
-            case Halt():
+            case HaltPacket():
                 self._halt(now_s)
-            case Jump():
+            case JumpPacket():
                 self._jump(now_s)
             case TransmitterOn(frequency):
                 self._frequency = frequency

@@ -15,7 +15,7 @@ LEGS = ("left_leg", "right_leg")
 
 
 @dataclass(frozen=True, slots=True)
-class TargetPose:
+class TargetState:
     """A target at one time.
 
     Attributes:
@@ -60,7 +60,7 @@ class Route:
         self._back = _Path(target.path[::-1])
         self._lap_s = self._there.length_m / target.speed_m_s + target.rest_s
 
-    def where(self, time_s: float) -> TargetPose:
+    def where(self, time_s: float) -> TargetState:
         """Return the target's pose at this world time; see ``where``."""
         target = self._target
         lap, lap_elapsed_s = divmod(max(0.0, time_s - target.begin_s), self._lap_s)
@@ -68,7 +68,7 @@ class Route:
         return path.along(min(path.length_m, lap_elapsed_s * target.speed_m_s))
 
 
-def where(target: Target, time_s: float) -> TargetPose:
+def where(target: Target, time_s: float) -> TargetState:
     """Return the target's pose at this world time.
 
     Before ``begin_s`` it stands at the first point.  Then it moves to the last, rests, and comes
@@ -87,7 +87,7 @@ def part_poses(target: Target, time_s: float) -> list[PartPose]:
     return parts(target, where(target, time_s))
 
 
-def parts(target: Target, pose: TargetPose) -> list[PartPose]:
+def parts(target: Target, pose: TargetState) -> list[PartPose]:
     """Return the poses of all bodies the target is made of when it is here, always in the same order."""
     bodies = [PartPose(target.name, (pose.x_m, pose.y_m, 0.0), _turned(pose.heading_rad, 0.0))]
     if target.shape == "person":
@@ -124,8 +124,8 @@ class _Path:
         ]
         self.length_m = path_length_m(points)
 
-    def along(self, walked_m: float) -> TargetPose:
-        """Return where one is who walked so far from the first point."""
+    def along(self, walked_m: float) -> TargetState:
+        """Return the place at this distance along the path from the first point."""
         left_m, last = walked_m, self._segments[-1]
         for segment in self._segments:
             if left_m <= segment[2] or segment is last:
@@ -133,4 +133,4 @@ class _Path:
             left_m -= segment[2]
         a, b, length_m, heading_rad = segment
         share = min(1.0, left_m / length_m)
-        return TargetPose(a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), heading_rad, walked_m)
+        return TargetState(a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), heading_rad, walked_m)

@@ -63,7 +63,7 @@ class FrameKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """What one robot sends.
+    """The signal of one robot.
 
     Attributes:
         picture: Of its camera: grey levels 0 to 255, shape (240, 320), row 0 on top. It is only read.

@@ -24,7 +24,7 @@ from scout_model.dimensions import FRAMES_PER_S, STEP_S, STEPS_PER_FRAME
 from scout_model.errors import InvalidWorld, UnknownBody
 from scout_model.robot import Robot, robot_class
 from scout_model.scout import FirmwareStatistics, Scout, Spring
-from scout_model.targets import Route, TargetPose, part_poses, parts
+from scout_model.targets import Route, TargetState, part_poses, parts
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
 """What of MuJoCo's state a picture depends on."""
@@ -86,7 +86,7 @@ class World:
             for target in description.targets
             for part in part_poses(target, 0.0)
         }
-        self._placed: dict[str, TargetPose] = {}
+        self._placed: dict[str, TargetState] = {}
         self._place_targets()
         self._hold_carried()
         mujoco.mj_forward(self._model, self._data)
@@ -109,7 +109,7 @@ class World:
     def hear(self, network_id: int, payload: bytes) -> None:
         """Let a radio packet reach the robots: the one with this id obeys from the next frame on, others never.
 
-        A packet to an id nobody has is lost in the air; malformed bytes are ignored and counted by the robot.
+        A packet to an unknown id is lost; a robot ignores and counts malformed bytes.
         """
         robot = self._by_network_id.get(network_id)
         if robot is not None:
@@ -139,7 +139,7 @@ class World:
         """Advance by one frame, a thirtieth of a second."""
         driven = [self._drive(robot) for robot in self._robots.values()]
         if not any(driven) and not self._carried and self._is_all_asleep():
-            # Nothing to integrate: one step notices whom a target touches, and wakes it.
+            # Nothing to integrate: one step detects robots that a target touches, and wakes them.
             self._step += STEPS_PER_FRAME
             self._place_targets()
             mujoco.mj_step(self._model, self._data)
@@ -205,7 +205,7 @@ class World:
         return self._robot(robot).program.motors
 
     def is_asleep(self, robot: str) -> bool:
-        """Say whether a robot stands so still that it is frozen until something touches or drives it.
+        """Return whether a robot stands so still that it is frozen until something touches or drives it.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -214,7 +214,7 @@ class World:
         return bool(self._data.tree_asleep[self._model.body_treeid[self._model.body(f"{robot}/body").id]] >= 0)
 
     def is_upright(self, robot: str) -> bool:
-        """Say whether a robot's upper side is above its lower one.
+        """Return whether a robot's upper side is above its lower one.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -225,7 +225,7 @@ class World:
         return bool(rotation[8] > 0)
 
     def is_carried(self, robot: str) -> bool:
-        """Say whether a carrier still holds a robot.
+        """Return whether a carrier still holds a robot.
 
         Raises:
             UnknownBody: No robot has this name.
@@ -287,7 +287,7 @@ class World:
         return bool((self._data.tree_asleep >= 0).all()) and not self._data.qvel.any()
 
     def _drive(self, robot: _Body) -> bool:
-        """Hand the actuators what the robot's program says; say whether that is anything, and wake its body if so."""
+        """Apply the robot program's outputs to the actuators; return whether any is not 0, which wakes the body."""
         controls, data = robot.program.controls(self.time_s), self._data
         for actuator, control in controls.items():
             number = robot.actuators.get(actuator)

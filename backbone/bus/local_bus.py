@@ -32,7 +32,7 @@ class LocalNetwork:
         self.mission = mission
         self.servers: dict[str, Serving] = {}
         self.listeners: dict[Conversation, list[Listening]] = defaultdict(list)
-        self.tokens: dict[str, list[Declared]] = {}
+        self.tokens: dict[str, list[Declaration]] = {}
         self.watchers: list[Watching] = []
 
     def join(self, source: str, clock: Clock) -> LocalBus:
@@ -70,7 +70,7 @@ class Neighbor(BusBase):
     """
 
     network: LocalNetwork
-    declared: list[Declared]
+    declared: list[Declaration]
 
     async def ask_neighbor(self, address: str, question: Message, reply: type[Reply], *, within_s: float) -> Reply:
         """Ask the neighbor that serves the address; see ``Bus.ask``."""
@@ -114,7 +114,7 @@ class Neighbor(BusBase):
         self.network.listeners[conversation].append(listening)
         return listening
 
-    def declare_to_neighbors(self, address: str) -> Declared:
+    def declare_to_neighbors(self, address: str) -> Declaration:
         """Raise a token in this process."""
         tokens = self.network.tokens.setdefault(address, [])
 
@@ -123,7 +123,7 @@ class Neighbor(BusBase):
             if not tokens:
                 self._tell_watchers(address, alive=False)
 
-        token = Declared(self, fall)
+        token = Declaration(self, fall)
         tokens.append(token)
         if len(tokens) == 1:
             self._tell_watchers(address, alive=True)
@@ -148,7 +148,7 @@ class Neighbor(BusBase):
             self.network.carry_life(watching, address, alive)
 
 
-class Declared:
+class Declaration:
     """A declaration of one bus; ``close`` removes it from the network."""
 
     def __init__(self, owner: Neighbor, take_back: Callable[[], None]) -> None:
@@ -163,7 +163,7 @@ class Declared:
             self._take_back()
 
 
-class Serving(Declared):
+class Serving(Declaration):
     """A declaration that answers at an address."""
 
     def __init__(self, owner: Neighbor, address: str, accepts: Accepted, answer: Answer) -> None:
@@ -175,7 +175,7 @@ class Serving(Declared):
             del network.servers[address]
 
 
-class Listening(Declared):
+class Listening(Declaration):
     """A declaration that subscribes to a conversation."""
 
     def __init__(
@@ -216,7 +216,7 @@ class Listening(Declared):
             self.owner.unreadable += 1
 
 
-class Watching(Declared):
+class Watching(Declaration):
     """A declaration that watches tokens."""
 
     def __init__(self, owner: Neighbor, pattern: str, listener: LifeListener) -> None:
@@ -272,7 +272,7 @@ class LocalBus(Neighbor):
         _check(self.mission, address)
         return self.subscribe_to_neighbors(address, conversation, accepts, listener, latest=latest)
 
-    def declare_alive(self, address: str) -> Declared:
+    def declare_alive(self, address: str) -> Declaration:
         """Raise a liveliness token; see ``Bus.declare_alive``."""
         self.require_open()
         _check(self.mission, address)
@@ -284,10 +284,10 @@ class LocalBus(Neighbor):
         _check(self.mission, address)
         return self.watch_neighbors(address, listener)
 
-    def watch_link(self, listener: LinkListener) -> Declared:
+    def watch_link(self, listener: LinkListener) -> Declaration:
         """Report the link, which is always up inside one process."""
         self.require_open()
-        watching = Declared(self, lambda: None)
+        watching = Declaration(self, lambda: None)
 
         def hand_over() -> None:
             if not watching.closed:

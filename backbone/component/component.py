@@ -245,7 +245,7 @@ class Component(Generic[P]):
         """Call ``publish_news`` soon."""
         self._news.set()
 
-    def tell(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
+    def publish_event(self, subject: str, what: str, level: LogLevel = LogLevel.INFO) -> None:
         """Add an event about the subject to the story, and publish it to the mission's log."""
         self.bus.publish(self.address, Conversation.LOG, self.story.note(subject, what, level))
 

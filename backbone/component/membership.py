@@ -16,7 +16,7 @@ PROCESSES = f"{Subsystem.BACKBONE}/*/*/*"
 """Addresses of all shared processes, for watching their tokens; a token rises when its process serves."""
 
 
-class Admit(Message, frozen=True):
+class BeginMember(Message, frozen=True):
     """Admit this component. Idempotent for the same life.
 
     Attributes:
@@ -28,8 +28,8 @@ class Admit(Message, frozen=True):
     life: Count
 
 
-class Admitted(Message, frozen=True):
-    """Answer to ``Admit``: the member's life has begun. Its own token rises when it is ready."""
+class MemberBegun(Message, frozen=True):
+    """Answer to ``BeginMember``: the member's life has begun. Its own token rises when it is ready."""
 
 
 class AwaitEnd(Message, frozen=True):
@@ -94,7 +94,7 @@ class AskedAgain(Refusal):
     remedy = "Nothing to do: the newer question waits."
 
 
-ProcessQuestion = Admit | AwaitEnd | EndMember
+ProcessQuestion = BeginMember | AwaitEnd | EndMember
 
 
 def process_address(host: str, process: str, pid: int) -> str:

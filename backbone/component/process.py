@@ -113,12 +113,12 @@ def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
         >>> found.detail, found.remedy
         ("no scout is named 'y'", 'See status.')
     """
-    told = None
+    refusal = None
     for line in lines:
         found = _REFUSED_LINE.search(line)
         if found is not None and found[1] == address:
-            told = revive(found[2], found[3], found[4], {})
-    return told
+            refusal = revive(found[2], found[3], found[4], {})
+    return refusal
 
 
 async def _live(component_class: type[Component[Any]], launch: Launch) -> None:

@@ -52,14 +52,14 @@ class Repeats:
 
     def due(self, now_s: float) -> list[str]:
         """Return the counts of all places whose window has ended, one line each, and open their next windows."""
-        told = []
+        counts = []
         for place, window in list(self._windows.items()):
             if now_s < window.began_s + WINDOW_S:
                 break  # windows are in the order of their begins
-            told += self._close(place)
+            counts += self._close(place)
         while len(self._windows) > MOST_PLACES:
-            told += self._close(next(iter(self._windows)))
-        return told
+            counts += self._close(next(iter(self._windows)))
+        return counts
 
     def rest(self) -> list[str]:
         """Return the counts of all places, one line each, and close all windows."""

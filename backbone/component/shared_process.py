@@ -24,12 +24,12 @@ from backbone.bus.shared_bus import SharedSession
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.membership import (
-    Admit,
-    Admitted,
     AlreadyMember,
     AskedAgain,
     AwaitEnd,
+    BeginMember,
     EndMember,
+    MemberBegun,
     MemberEnded,
     MemberEnding,
     NeedsOwnProcess,
@@ -133,11 +133,11 @@ class SharedProcess:
     async def _answer(self, asked: Envelope[Any]) -> Message:
         if asked.source != self._launch.requester:
             raise NotItsCreator(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
-        question: Admit | AwaitEnd | EndMember = asked.body
+        question: BeginMember | AwaitEnd | EndMember = asked.body
         match question:
-            case Admit(launch=launch, life=life):
+            case BeginMember(launch=launch, life=life):
                 self._admit(launch, life)
-                return Admitted()
+                return MemberBegun()
             case AwaitEnd(life=life):
                 return MemberEnded(life, await self._member(life).wait_ended())
             case EndMember(life=life):

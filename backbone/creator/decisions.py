@@ -9,7 +9,7 @@ from backbone.creator.messages import EndedBy
 
 
 @dataclass(frozen=True, slots=True)
-class Fork:
+class ForkComponent:
     """Fork the component; report ``forked`` or ``fork_failed``."""
 
     name: str
@@ -24,7 +24,7 @@ class AskToStop:
 
 
 @dataclass(frozen=True, slots=True)
-class Signal:
+class SendSignal:
     """Send the signal to the process tree."""
 
     name: str
@@ -92,21 +92,21 @@ class ReportSilent:
 
 
 @dataclass(frozen=True, slots=True)
-class WakeAt:
-    """Report ``woken`` at this time at the latest; replaces earlier ``WakeAt``."""
+class SupervisionWakesAt:
+    """Report ``woken`` at this time at the latest; replaces earlier ``SupervisionWakesAt``."""
 
     at_s: float
 
 
 Instruction = (
-    Fork
+    ForkComponent
     | AskToStop
-    | Signal
+    | SendSignal
     | ReportReady
     | ReportStartFailed
     | ReportEnded
     | ReportLeft
     | ReportFell
     | ReportSilent
-    | WakeAt
+    | SupervisionWakesAt
 )

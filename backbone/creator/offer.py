@@ -94,7 +94,7 @@ class Offer(Component[NoParameters]):
         await self._creator.close()
 
     def _creator_fell(self, fell: ProcessFell) -> None:
-        self.tell(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
+        self.publish_event(fell.name, f"fell, {fell.how}; restarts in {fell.restart_in_s:.2g} s", LogLevel.WARNING)
         self.changed()
 
     async def _watch_link(self) -> None:

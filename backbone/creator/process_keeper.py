@@ -25,10 +25,10 @@ from backbone.component.launch import Launch
 from backbone.component.logs import log_path
 from backbone.component.membership import (
     PROCESSES,
-    Admit,
-    Admitted,
     AwaitEnd,
+    BeginMember,
     EndMember,
+    MemberBegun,
     MemberEnded,
     MemberEnding,
     process_address,
@@ -38,7 +38,7 @@ from backbone.component.messages import Absence, Stop, Stopping
 from backbone.component.process import EXIT_REFUSED, refusal_in_log
 from backbone.creator.decisions import (
     AskToStop,
-    Fork,
+    ForkComponent,
     Instruction,
     ReportEnded,
     ReportFell,
@@ -46,8 +46,8 @@ from backbone.creator.decisions import (
     ReportReady,
     ReportSilent,
     ReportStartFailed,
-    Signal,
-    WakeAt,
+    SendSignal,
+    SupervisionWakesAt,
 )
 from backbone.creator.messages import (
     READY_WITHIN_S,
@@ -391,7 +391,7 @@ class ProcessKeeper:
         """Have the shared process admit the component, then wait for its end; cancelled when the process ends."""
         try:
             await ask_until_answered(
-                bus, self._clock, at, Admit(launch, life), Admitted, each_s=ADMIT_EACH_S, within_s=math.inf
+                bus, self._clock, at, BeginMember(launch, life), MemberBegun, each_s=ADMIT_EACH_S, within_s=math.inf
             )
         except Refusal as refusal:
             self._carry_out_shared(self._shared.refused(life, str(refusal), self._now_s()))
@@ -430,13 +430,13 @@ class ProcessKeeper:
     def _carry_out(self, instructions: list[Instruction], forked: asyncio.Future[int] | None = None) -> None:
         for instruction in instructions:
             match instruction:
-                case Fork(name=name):
+                case ForkComponent(name=name):
                     self._begin_life(self._kept[name], forked)
                 case AskToStop(name=name, within_s=within_s):
                     self._task(self._ask_to_stop(self._kept[name], within_s), f"ask {name} to stop")
-                case Signal(name=name, number=number) if self._kept[name].launch.process:
+                case SendSignal(name=name, number=number) if self._kept[name].launch.process:
                     self._carry_out_shared(self._shared.signalled(name, number))
-                case Signal(name=name, pid=pid, number=number):
+                case SendSignal(name=name, pid=pid, number=number):
                     log.info("%s to %s, pid %d", number.name, name, pid)
                     self._zygote.kill(pid, number)
                 case ReportReady(name=name, pid=pid):
@@ -458,11 +458,11 @@ class ProcessKeeper:
                     self.on_fell(ProcessFell(name, how, restart_in_s, self._last_lines(name), failing))
                 case ReportSilent(name=name, silent_s=silent_s):
                     self.on_silent(name, silent_s)
-                case WakeAt(at_s=at_s):
+                case SupervisionWakesAt(at_s=at_s):
                     self._set_alarm(at_s)
                 case _:
                     assert_never(instruction)
-        if any(not isinstance(each, WakeAt | AskToStop | Signal) for each in instructions):
+        if any(not isinstance(each, SupervisionWakesAt | AskToStop | SendSignal) for each in instructions):
             self._kept = {one.name: self._kept[one.name] for one in self._supervision}
             self.on_changed()
 

@@ -96,7 +96,7 @@ class Creator(Component[CreatorParameters]):
     async def connect(self) -> None:
         """Watch liveliness tokens; spawn a zygote if this process could not fork one."""
         self._zygote = self._given or await Zygote.spawn_fresh(preload=self.parameters.preload)
-        self._zygote.on_lost = lambda: self.tell(
+        self._zygote.on_lost = lambda: self.publish_event(
             self.name, "lost its zygote and with it everything it ran", LogLevel.ALARM
         )
         self._keeper = ProcessKeeper(self._zygote, self.clock, self._read_vitals, self.pid)
@@ -205,12 +205,12 @@ class Creator(Component[CreatorParameters]):
     def _component_fell(self, fell: ProcessFell) -> None:
         self._fell += 1
         then = f"restarts in {fell.restart_in_s:.2g} s" if fell.restart_in_s >= 0 else "its owner asks for another one"
-        self.tell(fell.name, f"fell, {fell.how}; {then}", LogLevel.WARNING)
+        self.publish_event(fell.name, f"fell, {fell.how}; {then}", LogLevel.WARNING)
         self.bus.publish(self.address, Conversation.EVENTS, fell)
 
     def _component_silent(self, name: str, silent_s: float) -> None:
         said = f"shows no sign of life for {silent_s:.1f} s" if silent_s else "responds again"
-        self.tell(name, said, LogLevel.WARNING)
+        self.publish_event(name, said, LogLevel.WARNING)
         self._processes_changed()
 
     def _processes_changed(self) -> None:

@@ -136,7 +136,7 @@ class _Place(StrEnum):
 
 
 @dataclass
-class _Member:
+class _Membership:
     name: str
     place: _Place = _Place.WAITING
     life: int = 0
@@ -152,7 +152,7 @@ class _Process:
     serving_pid: int = 0
     deadline_s: float = NEVER_S
     failure: str = ""
-    members: dict[str, _Member] = field(default_factory=dict)
+    members: dict[str, _Membership] = field(default_factory=dict)
 
 
 class SharedProcesses:
@@ -176,9 +176,9 @@ class SharedProcesses:
         one = self._all.get(process)
         if one is None:
             one = self._all[process] = _Process(process)
-            one.members[name] = _Member(name)
+            one.members[name] = _Membership(name)
             return self._and_wake([ForkProcess(process, name)])
-        one.members[name] = _Member(name)
+        one.members[name] = _Membership(name)
         return self._and_wake(self._admit_waiting(one, now_s) if one.phase is _Phase.SERVING else [])
 
     def signalled(self, name: str, number: signal.Signals) -> list[ProcessInstruction]:
@@ -245,21 +245,21 @@ class SharedProcesses:
         del self._all[one.name]
         how = f"its process {one.name}: {one.failure or describe(returncode)}"
         was_ended = one.phase is _Phase.ENDING and not one.failure
-        told: list[ProcessInstruction] = []
-        left: dict[str, _Member] = {}
+        instructions: list[ProcessInstruction] = []
+        left: dict[str, _Membership] = {}
         for member in one.members.values():
             if member.report is not None:
-                told.append(member.report)
+                instructions.append(member.report)
             elif member.place is _Place.LIVING:
-                told.append(MemberGone(member.name, returncode, how))
+                instructions.append(MemberGone(member.name, returncode, how))
             elif was_ended:
-                left[member.name] = _Member(member.name)
+                left[member.name] = _Membership(member.name)
             else:  # a start is repeated after an outside signal, not after a failure of the process itself
-                told.append(MemberNotStarted(member.name, how, 1 if one.failure else returncode))
+                instructions.append(MemberNotStarted(member.name, how, 1 if one.failure else returncode))
         if left:
             self._all[one.name] = _Process(one.name, members=left)
-            told.append(ForkProcess(one.name, next(iter(left))))
-        return self._and_wake(told)
+            instructions.append(ForkProcess(one.name, next(iter(left))))
+        return self._and_wake(instructions)
 
     def observed(self, pid: int, silent_s: float, now_s: float) -> list[ProcessInstruction]:
         """Record the silence of this process: its deadlines count from the begin of the silence."""
@@ -275,33 +275,33 @@ class SharedProcesses:
 
     def woken(self, now_s: float) -> list[ProcessInstruction]:
         """Carry out what is due by ``now_s``."""
-        told: list[ProcessInstruction] = []
+        instructions: list[ProcessInstruction] = []
         for one in list(self._all.values()):
             if one.deadline_s <= now_s:
                 if one.phase is _Phase.STARTING:
                     one.failure = f"did not serve within {SERVES_WITHIN_S:g} s"
-                told += self._kill(one)
+                instructions += self._kill(one)
             for member in one.members.values():
                 if member.deadline_s <= now_s:
                     why = f"its process {one.name} did not admit it within {ADMITS_WITHIN_S:g} s"
                     member.place, member.deadline_s = _Place.DONE, NEVER_S
                     member.report = MemberNotStarted(member.name, why)
-                    told += self._kill(one)
-        return self._and_wake(told)
+                    instructions += self._kill(one)
+        return self._and_wake(instructions)
 
     # Steps
     def _admit_waiting(self, one: _Process, now_s: float) -> list[ProcessInstruction]:
-        told: list[ProcessInstruction] = []
+        instructions: list[ProcessInstruction] = []
         for member in one.members.values():
             if member.place is _Place.WAITING:
                 self._last_life += 1
                 member.place, member.life = _Place.ADMITTING, self._last_life
                 member.deadline_s = now_s + ADMITS_WITHIN_S
-                told.append(AdmitMember(one.name, one.pid, member.name, member.life))
-        return told
+                instructions.append(AdmitMember(one.name, one.pid, member.name, member.life))
+        return instructions
 
     def _leaves(
-        self, one: _Process, member: _Member, report: MemberGone | MemberNotStarted, now_s: float
+        self, one: _Process, member: _Membership, report: MemberGone | MemberNotStarted, now_s: float
     ) -> list[ProcessInstruction]:
         """Report a member's end: at once while others remain, else together with the end of the process."""
         if any(other is not member and other.report is None for other in one.members.values()):
@@ -317,12 +317,12 @@ class SharedProcesses:
         one.phase, one.deadline_s = _Phase.ENDING, NEVER_S
         return [SignalProcess(one.name, one.pid, signal.SIGKILL)]
 
-    def _everybody(self) -> Iterator[tuple[_Process, _Member]]:
+    def _everybody(self) -> Iterator[tuple[_Process, _Membership]]:
         for one in self._all.values():
             for member in one.members.values():
                 yield one, member
 
-    def _and_wake(self, told: list[ProcessInstruction]) -> list[ProcessInstruction]:
+    def _and_wake(self, instructions: list[ProcessInstruction]) -> list[ProcessInstruction]:
         at_s = min(
             (
                 deadline_s
@@ -331,4 +331,4 @@ class SharedProcesses:
             ),
             default=NEVER_S,
         )
-        return told if at_s == NEVER_S else [*told, ProcessesWakeAt(at_s)]
+        return instructions if at_s == NEVER_S else [*instructions, ProcessesWakeAt(at_s)]

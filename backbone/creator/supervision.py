@@ -31,7 +31,7 @@ from enum import StrEnum
 from backbone.component.messages import Absence
 from backbone.creator.decisions import (
     AskToStop,
-    Fork,
+    ForkComponent,
     Instruction,
     ReportEnded,
     ReportFell,
@@ -39,8 +39,8 @@ from backbone.creator.decisions import (
     ReportReady,
     ReportSilent,
     ReportStartFailed,
-    Signal,
-    WakeAt,
+    SendSignal,
+    SupervisionWakesAt,
 )
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHere, RestartPolicy
 from backbone.creator.silence import SHOWN_AFTER_S
@@ -245,14 +245,14 @@ class Supervision:
         was_silent, one.silent_s = one.silent_s >= SHOWN_AFTER_S, silent_s
         is_silent = silent_s >= SHOWN_AFTER_S
         one.absent_since_s = now_s - silent_s if is_silent else -1.0
-        told: list[Instruction] = (
+        instructions: list[Instruction] = (
             [ReportSilent(name, silent_s if is_silent else 0.0)] if was_silent != is_silent else []
         )
         if silent_s >= one.policy.hung_after_s:
             one.failure = f"hung: no sign of life for {silent_s:.1f} s"
             one.end = _End(0.0, TERM_S, ordered=False, stage=EndedBy.SIGTERM)
-            told += _next_stage(one, one.end, now_s)
-        return self._and_wake(told)
+            instructions += _next_stage(one, one.end, now_s)
+        return self._and_wake(instructions)
 
     def absences(self, now_s: float) -> list[Absence]:
         """Return the components that do not run or respond; times are seconds of the machine."""
@@ -293,7 +293,7 @@ class Supervision:
     def _fork(self, one: Supervised, now_s: float) -> list[Instruction]:
         one.phase, one.pid, one.token_rose, one.failure, one.end = Phase.FORKING, 0, False, "", None
         one.began_s, one.deadline_s = now_s, now_s + START_MOST_S
-        return [Fork(one.name)]
+        return [ForkComponent(one.name)]
 
     def _become_ready(self, one: Supervised) -> list[Instruction]:
         one.phase, one.deadline_s, one.start_answered = Phase.READY, NEVER_S, True
@@ -339,7 +339,7 @@ class Supervision:
 
     def _and_wake(self, instructions: list[Instruction]) -> list[Instruction]:
         at_s = min((one.deadline_s for one in self), default=NEVER_S)
-        return instructions if at_s == NEVER_S else [*instructions, WakeAt(at_s)]
+        return instructions if at_s == NEVER_S else [*instructions, SupervisionWakesAt(at_s)]
 
 
 def _is_ended_on_order(one: Supervised) -> bool:
@@ -367,14 +367,14 @@ def _next_stage(one: Supervised, end: _End, now_s: float) -> list[Instruction]:
         case EndedBy.ITSELF if was_ready:
             end.stage, one.deadline_s = EndedBy.ASKING, now_s + end.ask_s
             if one.asked_by_signal:
-                return [Signal(one.name, one.pid, signal.SIGTERM)]
+                return [SendSignal(one.name, one.pid, signal.SIGTERM)]
             return [AskToStop(one.name, end.ask_s)]
         case EndedBy.ITSELF | EndedBy.ASKING:
             end.stage, one.deadline_s = EndedBy.SIGTERM, now_s + end.term_s
-            return [Signal(one.name, one.pid, signal.SIGTERM)]
+            return [SendSignal(one.name, one.pid, signal.SIGTERM)]
         case _:
             end.stage, one.deadline_s = EndedBy.SIGKILL, NEVER_S
-            return [Signal(one.name, one.pid, signal.SIGKILL)]
+            return [SendSignal(one.name, one.pid, signal.SIGKILL)]
 
 
 def _by(end: _End, returncode: int) -> EndedBy:

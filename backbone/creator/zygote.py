@@ -57,7 +57,7 @@ class Zygote:
         on_lost: Called when the zygote died unexpectedly, before the ends of its components are reported.
     """
 
-    def __init__(self, body: _Body, settings: ZygoteSettings) -> None:
+    def __init__(self, body: _ZygoteChannel, settings: ZygoteSettings) -> None:
         self.on_exit: Callable[[int, int], None] = lambda _pid, _returncode: None
         self.on_lost: Callable[[], None] = lambda: None
         self._settings = settings
@@ -83,7 +83,7 @@ class Zygote:
             ours.close()
             serve(its, settings)
         its.close()
-        return cls(_Body(pid, ours, lambda: os.waitpid(pid, 0)), settings)
+        return cls(_ZygoteChannel(pid, ours, lambda: os.waitpid(pid, 0)), settings)
 
     @classmethod
     async def spawn_fresh(cls, *, run_directory: str = "", preload: Iterable[str] = ()) -> Zygote:
@@ -144,7 +144,7 @@ class Zygote:
                 await self._reading
             await self._body.wait_gone()
 
-    async def _living_body(self) -> _Body:
+    async def _living_body(self) -> _ZygoteChannel:
         async with self._renewing:
             if self._is_closing:
                 raise NoProcess("the zygote is being closed")
@@ -156,7 +156,7 @@ class Zygote:
                 self._reading = asyncio.create_task(self._read(self._body), name="zygote answers")
             return self._body
 
-    async def _read(self, body: _Body) -> None:
+    async def _read(self, body: _ZygoteChannel) -> None:
         """Handle the zygote's messages until it ends."""
         reader = await body.connect()
         while (answer := await _receive(reader)) is not None:
@@ -207,7 +207,7 @@ class _Lost(Exception):
     """The zygote died before it answered."""
 
 
-class _Body:
+class _ZygoteChannel:
     """One zygote process and the channel to it."""
 
     def __init__(self, pid: int, channel: socket.socket, reap: Callable[[], object]) -> None:
@@ -258,7 +258,7 @@ async def _receive(reader: asyncio.StreamReader) -> Answer | None:
     return answer
 
 
-def _spawn(settings: ZygoteSettings) -> _Body:
+def _spawn(settings: ZygoteSettings) -> _ZygoteChannel:
     ours, its = socket.socketpair()
     with its:
         output = None
@@ -275,7 +275,7 @@ def _spawn(settings: ZygoteSettings) -> _Body:
         )
         if output is not None:
             os.close(output)
-    return _Body(process.pid, ours, process.wait)
+    return _ZygoteChannel(process.pid, ours, process.wait)
 
 
 def _fresh(settings: ZygoteSettings) -> ZygoteSettings:

@@ -73,7 +73,7 @@ def _check_runtime(behavior: Element, arc: Element, report: Report) -> None:
 
 # ---------------------------------------------------------------------- what an ARC wishes and needs
 def _wishes_fit(arc: Element, tables: Tables, report: Report) -> bool:
-    """Report wishes that nothing can fulfil; say whether there is none."""
+    """Report wishes that no resource can fulfil; return whether there is none."""
     kind, needs = arc.text("kind"), tables.needs(arc.text("kind"))
     wishes = arc.all("wish")
     check_unique(wishes, "type", "wish for type", report)
@@ -151,7 +151,7 @@ def _check_set(behavior: Element, arc: Element, tables: Tables, sets: _Sets, rep
 
 
 def _check_demand(behavior: Element, arc: Element, report: Report) -> float | None:
-    """Return the share of a sharable resource that the ARC asks for; None if that is told or cannot be told."""
+    """Return the share of a sharable resource that the ARC asks for; None if it is unknown or already a fault."""
     period_s, packet_time_s = arc.number("period-s"), arc.number("packet-time-s")
     if period_s is None or packet_time_s is None or period_s <= 0 or packet_time_s <= 0:
         return None
@@ -172,7 +172,7 @@ class _Sets:
         self._tables, self._tries_left = tables, TRIES_AT_MOST
 
     def any_fits(self, roles: list[list[Element]]) -> bool:
-        """Say whether a set fits; True if that is too much work to find out, the dependency database will know."""
+        """Return whether a set fits; True if the search is too long, because the dependency database will decide."""
         return self._extend([], roles)
 
     def _extend(self, chosen: list[Element], roles: list[list[Element]]) -> bool:
@@ -194,13 +194,13 @@ class _Sets:
 def _together(resource: Element, other: Element, tables: Tables) -> bool:
     named = [used.text("name") for used in resource.all("uses") if used.text("type") == other.text("type")]
     if not all(tables.is_resource_of(name, other.text("type")) for name in named):
-        return True  # that there is none of this name is told already
+        return True  # an unknown name is already reported
     return not named or other.text("name") in named
 
 
 def _capacity(resource: Element) -> float:
     capacity = resource.number("capacity")
-    return capacity if capacity is not None and 0 < capacity <= 1 else 1.0  # an illegal one is told already
+    return capacity if capacity is not None and 0 < capacity <= 1 else 1.0  # an illegal one is already reported
 
 
 def _wanted(resource: Element, wish: Element | None) -> bool:

@@ -1,7 +1,7 @@
 """What has to fit together in a mission file: hosts, core services, types, resources, names.
 
 Pure: elements in, faults out. Values that the schema has refused are passed over here, so that one
-mistake is told once. World and behaviors have files of their own.
+mistake is reported once. World and behaviors have files of their own.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> N
 
     Args:
         root: The mission.
-        classes: Class path → what is known of the class; parameters of other classes are not judged.
-        report: Where faults go.
+        classes: Class path → facts of the class; parameters of other classes are not checked.
+        report: Collects the faults.
     """
     tables = Tables.of(root, classes)
     _check_hosts(tables, report)

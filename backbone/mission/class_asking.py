@@ -22,7 +22,7 @@ _judged: dict[str, str] = {}
 
 
 def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
-    """Return the facts of each class; ``failure`` says why a class has none. A class is asked once in a process.
+    """Return the facts of each class, or ``failure`` with the reason; a class is asked once in a process.
 
     Args:
         class_paths: ``package.module:Class`` each. Their modules are run.
@@ -40,7 +40,7 @@ def ask_classes(class_paths: Sequence[str]) -> dict[str, ClassFacts]:
 
 
 def judge(questions: Sequence[Question]) -> list[str]:
-    """Return what each class says against the parameters; empty: it starts with them, or gave no answer.
+    """Return each class's objection to the parameters; empty: it starts with them, or gave no answer.
 
     Args:
         questions: About classes that can be imported; their modules are run.

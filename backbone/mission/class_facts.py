@@ -1,4 +1,4 @@
-"""What the class of a component says of itself: its documentation, and the parameters a mission file may give it.
+"""Facts of a component class: its documentation, and the parameters that a mission file may set.
 
 Pure data and its judgement. ``class_asking`` gets the data from classes.
 """
@@ -26,7 +26,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
     Attributes:
         name: Its name.
         schema: The JSON schema of its values, as msgspec derives it from the parameter's type.
-        doc: What it means.
+        doc: Its meaning.
     """
 
     name: str
@@ -35,7 +35,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
 
     @property
     def is_required(self) -> bool:
-        """A mission file must give it."""
+        """True if a mission file must set it."""
         return "default" not in self.schema
 
     @property
@@ -75,7 +75,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
         return [f"{word} {self.schema[limit]:g}" for limit, word in _LIMITS.items() if limit in self.schema]
 
     def accepts(self, value: Any) -> bool:
-        """Say whether the class starts with this value."""
+        """Return whether the class starts with this value."""
         try:
             msgspec.convert(value, _value_type(self.schema))
         except msgspec.ValidationError:
@@ -84,14 +84,14 @@ class ParameterFacts(msgspec.Struct, frozen=True):
 
 
 class ClassFacts(msgspec.Struct, frozen=True):
-    """What a class says of itself.
+    """Facts of a class.
 
     Attributes:
         doc: Its documentation.
         parameters: What it can be given in a mission file.
         options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can judge by them.
-        failure: Why nothing can be said; empty: all is said.
+        failure: Why the facts are unknown; empty: they are known.
     """
 
     doc: str = ""

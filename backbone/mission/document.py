@@ -101,7 +101,7 @@ class Element:
         return self.place if found is None else found.place
 
     def has(self, attribute: str) -> bool:
-        """Say whether the file gives this attribute."""
+        """Return whether the file gives this attribute."""
         found = self.attributes.get(attribute)
         return found is not None and found.is_written
 
@@ -192,7 +192,7 @@ class _Refused(Exception):
 
 
 class _Lines:
-    """Tells line and column of a position in UTF-8 bytes."""
+    """Finds line and column of a position in UTF-8 bytes."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data

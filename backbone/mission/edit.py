@@ -349,5 +349,5 @@ def _shifted(text: bytes, old: str, new: str) -> bytes:
 
 
 def _stands_apart(data: bytes, node: Node) -> bool:
-    """Say whether there is an empty line between the children."""
+    """Return whether there is an empty line between the children."""
     return bool(re.search(rb"\n[ \t]*\r?\n", data[node.content : node.close]))

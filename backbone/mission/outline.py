@@ -17,7 +17,7 @@ class EditRefused(Refusal):
     """A change of a mission file that cannot be made; the text is as it was."""
 
     code = "mission.edit"
-    remedy = "Look at the tree: what may stand where is told in docs/reference/mission-file.md."
+    remedy = "Look at the tree: docs/reference/mission-file.md lists the place of each element."
 
 
 @dataclass(frozen=True, slots=True)

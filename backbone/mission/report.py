@@ -1,4 +1,4 @@
-"""Faults of a mission file: collected, never raised one by one, told in the order of the file."""
+"""Faults of a mission file: collected, never raised one by one, reported in the order of the file."""
 
 from __future__ import annotations
 

@@ -17,8 +17,8 @@ CORE_SERVICES = ("nameserver", "component_database", "placer", "creator", "depen
 
 SIMULATED = "simulated"  # the driver whose hardware is played by the mission's world
 SIMULATED_WORLD = "simulated_world"  # the shipped type that plays it
-WORLD = "world"  # the parameter that tells it, and the world's own
-NETWORK_ID = "network_id"  # the parameter by which the radio tells robots apart
+WORLD = "world"  # the parameter that names it, and the world's own
+NETWORK_ID = "network_id"  # the parameter by which the radio distinguishes robots
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,14 @@ class Tables:
         return [] if found is None else [needed.text("type") for needed in found.all("needs")]
 
     def belongs_to(self, name: str, subsystem: Subsystem) -> bool:
-        """Say whether this type is, or if its subsystem is illegal may be meant to be, of the subsystem."""
+        """Return whether this type is, or if its subsystem is illegal may be meant to be, of the subsystem."""
         found = self.types.get(name)
         return found is not None and (
             found.text("subsystem") == subsystem or found.text("subsystem") not in set(Subsystem)
         )
 
     def is_resource_type(self, name: str) -> bool:
-        """Say whether this type runs a piece of hardware, so is no service, ARC, behavior or world."""
+        """Return whether this type runs a piece of hardware, so is no service, ARC, behavior or world."""
         return (
             self.belongs_to(name, Subsystem.RESOURCE_POOL)
             and not self.needs(name)
@@ -94,11 +94,11 @@ class Tables:
         return self.by_type.get(kind, [])
 
     def is_resource_of(self, name: str, kind: str) -> bool:
-        """Say whether a resource of this name and type exists."""
+        """Return whether a resource of this name and type exists."""
         return name in self.resources and self.resources[name].text("type") == kind
 
     def robots(self) -> list[Element]:
-        """Return the resources that a radio tells apart: those of the types of which any has a network id."""
+        """Return the resources that a radio distinguishes: all of types of which any has a network id."""
         return [
             resource
             for same_type in self.by_type.values()
@@ -143,7 +143,7 @@ def host_tags_lacking(host: Element, component_type: Element) -> list[str]:
 
 # ---------------------------------------------------------------------- what all checks say alike
 def is_known(element: Element, attribute: str, what: str, known: Collection[str], report: Report) -> bool:
-    """Say whether the attribute names something that exists; if it is a legal name that does not, report it."""
+    """Return whether the attribute names something that exists; if it is a legal name that does not, report it."""
     name = element.text(attribute)
     if name in known:
         return True

@@ -53,7 +53,7 @@ def validated(root: Element, report: Report) -> MissionElement | None:
                 parent.children = [double, *(child for child in among if child is not double)]
                 _judged(
                     root, report
-                )  # the declared classes see the first of its kind; a fault told before is told once
+                )  # the declared classes see the first of its kind; a repeated fault is reported once
                 parent.children = among
     return mission
 

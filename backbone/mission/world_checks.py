@@ -167,7 +167,7 @@ def _check_not_in_ramps(scouts: list[Element], ramps: list[Element], report: Rep
 
 
 def _is_within(point_m: float | None, middle_m: float | None, extent_m: float | None) -> bool:
-    """Say whether a point is between the ends of an extent; never where one of them is missing."""
+    """Return whether a point is between the ends of an extent; never where one of them is missing."""
     if point_m is None or middle_m is None or extent_m is None:
         return False
     return abs(point_m - middle_m) < extent_m / 2

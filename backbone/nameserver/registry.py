@@ -213,14 +213,14 @@ class Registry:
         if entry is None or address not in entry.tokens:
             return []
         entry.tokens.discard(address)
-        told: list[Instruction] = []
+        instructions: list[Instruction] = []
         if entry.state is not None and entry.state.address == address:
             if entry.announced:
-                told = [Announce(Disappeared(address))]
+                instructions = [Announce(Disappeared(address))]
             entry.announced = False
             entry.state = msgspec.structs.replace(entry.state, state=LifeState.DRAINING, since_s=now_s)
         self._forget_if_gone(name)
-        return told
+        return instructions
 
     def _forget_if_gone(self, name: str) -> None:
         entry = self._entries[name]

@@ -27,7 +27,7 @@ FULL_MEMORY = 0.9  # chosen: swapping begins soon; such a host counts as saturat
 
 
 @dataclass(frozen=True, slots=True)
-class HostView:
+class CandidateHost:
     """A host as the placer sees it.
 
     Attributes:
@@ -75,7 +75,7 @@ class Choice:
     reasons: tuple[str, ...]
 
 
-def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView], colocation: str = "") -> Choice:
+def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[CandidateHost], colocation: str = "") -> Choice:
     """Return the host for one more component.
 
     Args:
@@ -96,7 +96,7 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView],
         raise NoHost(_no_host(name, pin, known, obstacles), name=name)
     chosen = min(able, key=lambda host: (host.load, host.name))
 
-    def reason(host: HostView) -> str:
+    def reason(host: CandidateHost) -> str:
         if host is chosen:
             why = "asked for" if pin else "with the rest of its process" if colocation else "least loaded"
             return f"{host.name}: chosen, {why}: {host.describe()}"
@@ -107,7 +107,7 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[HostView],
     return Choice(chosen.name, tuple(reason(host) for host in known))
 
 
-def obstacle(host: HostView, tags: Collection[str], pin: str, colocation: str = "") -> str:
+def obstacle(host: CandidateHost, tags: Collection[str], pin: str, colocation: str = "") -> str:
     """Return why this host is impossible, empty if it is possible."""
     if pin and host.name != pin:
         return f"not {pin}, which was asked for"
@@ -119,7 +119,7 @@ def obstacle(host: HostView, tags: Collection[str], pin: str, colocation: str = 
     return "" if host.alive else "its creator is gone"
 
 
-def _no_host(name: str, pin: str, known: list[HostView], obstacles: dict[str, str]) -> str:
+def _no_host(name: str, pin: str, known: list[CandidateHost], obstacles: dict[str, str]) -> str:
     if not known:
         return f"no host for {name}: no creator is known"
     lines = "; ".join(f"{host.name}: {obstacles[host.name]}" for host in known)

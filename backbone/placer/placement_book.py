@@ -33,12 +33,12 @@ from backbone.creator.messages import HostLoad, ProcessState, Spawn
 from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address, did_you_mean
 from backbone.placer.messages import NotPlaced, Placement
-from backbone.placer.placement import Choice, HostView, obstacle, place
+from backbone.placer.placement import CandidateHost, Choice, obstacle, place
 
 STOPPED_KEPT = 1000  # chosen: owners compare every few seconds; no mission stops so many in that time
 
 
-class Phase(StrEnum):
+class PlacementPhase(StrEnum):
     """Phase of a placement."""
 
     STARTING = "starting"  # its creator has the order; it is not ready yet
@@ -47,7 +47,7 @@ class Phase(StrEnum):
 
 
 @dataclass(slots=True)
-class Record:
+class PlacementRecord:
     """One placement.
 
     Attributes:
@@ -68,7 +68,7 @@ class Record:
 
     spawn: Spawn
     pin: str
-    phase: Phase
+    phase: PlacementPhase
     host: str
     since_s: float
     pid: int = 0
@@ -97,7 +97,7 @@ class Record:
 
     def misses(self, cause: str, now_s: float) -> None:
         """Record that the component, which ran, is missing."""
-        self.phase, self.host, self.pid, self.suspect = Phase.WAITING, "", 0, False
+        self.phase, self.host, self.pid, self.suspect = PlacementPhase.WAITING, "", 0, False
         self.cause, self.doing = cause, "is to be placed again"
         if self.missing_since_s < 0:
             self.missing_since_s = now_s
@@ -140,7 +140,7 @@ Instruction = PlaceAgain | EndOrphan | Inspect | Note
 class _Host:
     """One host: its view without the count of components, and its creator's pid."""
 
-    view: HostView
+    view: CandidateHost
     creator_pid: int
     reported: tuple[int, int] = (-1, -1)
     """Counts of components, by its creator and by the book, at the last inspection."""
@@ -151,14 +151,14 @@ class PlacementBook:
 
     def __init__(self) -> None:
         self._hosts: dict[str, _Host] = {}
-        self._records: dict[str, Record] = {}
+        self._records: dict[str, PlacementRecord] = {}
         self._numbers: dict[str, int] = {}
         self._left_behind: set[tuple[str, str]] = set()
         self._stopped: dict[str, str] = {}
         self._fences: dict[str, tuple[str, float]] = {}
 
     # ------------------------------------------------------------------ looking
-    def record(self, name: str) -> Record:
+    def record(self, name: str) -> PlacementRecord:
         """Return the record of this name.
 
         Raises:
@@ -171,15 +171,15 @@ class PlacementBook:
             raise NotPlaced(f"{name!r} was not placed{because}", name=name, stopped=name in self._stopped)
         return found
 
-    def find(self, name: str) -> Record | None:
+    def find(self, name: str) -> PlacementRecord | None:
         """Return the record of this name, or None."""
         return self._records.get(name)
 
-    def records(self) -> list[Record]:
+    def records(self) -> list[PlacementRecord]:
         """Return all records, sorted by name."""
         return [self._records[name] for name in sorted(self._records)]
 
-    def hosts(self) -> list[HostView]:
+    def hosts(self) -> list[CandidateHost]:
         """Return every host with its count of components, sorted by name."""
         counts: dict[str, int] = {}
         for record in self._records.values():
@@ -261,7 +261,7 @@ class PlacementBook:
                     pid=record.pid,
                 )
 
-    def reserve(self, spawn: Spawn, pin: str, now_s: float) -> Record:
+    def reserve(self, spawn: Spawn, pin: str, now_s: float) -> PlacementRecord:
         """Enter a new component without a host yet.
 
         Raises:
@@ -277,7 +277,7 @@ class PlacementBook:
             )
         self._remember_number(spawn)
         self._stopped.pop(spawn.name, None)
-        record = self._records[spawn.name] = Record(spawn, pin, Phase.STARTING, "", now_s)
+        record = self._records[spawn.name] = PlacementRecord(spawn, pin, PlacementPhase.STARTING, "", now_s)
         return record
 
     def choose(self, name: str, now_s: float) -> Choice:
@@ -289,25 +289,30 @@ class PlacementBook:
         record = self.record(name)
         record.host = ""  # it must not count on the host that it leaves
         choice = place(name, record.spawn.tags, record.pin, self.hosts(), colocation=self._colocation(record))
-        record.phase, record.host, record.reasons, record.since_s = Phase.STARTING, choice.host, choice.reasons, now_s
+        record.phase, record.host, record.reasons, record.since_s = (
+            PlacementPhase.STARTING,
+            choice.host,
+            choice.reasons,
+            now_s,
+        )
         record.pid, record.lost = 0, False
         return choice
 
     def started(self, name: str, pid: int, now_s: float) -> None:
         """Record that the component is ready."""
         record = self.record(name)
-        record.phase, record.since_s = Phase.RUNNING, now_s
+        record.phase, record.since_s = PlacementPhase.RUNNING, now_s
         record.runs(pid)
 
     def unsure(self, name: str, now_s: float) -> None:
         """Record that it is unknown whether the component runs; its creator's next list decides."""
         record = self.record(name)
-        record.phase, record.since_s, record.suspect = Phase.RUNNING, now_s, True
+        record.phase, record.since_s, record.suspect = PlacementPhase.RUNNING, now_s, True
 
     def waits(self, name: str, why: str = "") -> None:
         """Record that no host is possible now."""
         record = self.record(name)
-        record.phase, record.host, record.doing = Phase.WAITING, "", f"waits for a host: {why}"
+        record.phase, record.host, record.doing = PlacementPhase.WAITING, "", f"waits for a host: {why}"
 
     def forget(self, name: str) -> None:
         """Remove the name from the book. Idempotent."""
@@ -329,7 +334,7 @@ class PlacementBook:
         instructions: list[Instruction] = []
         if self.is_alive(host) and not self.knows_creator(host, creator_pid):
             instructions += self.creator_down(host, asked_s)
-        old = self._hosts[host].view if host in self._hosts else HostView(host)
+        old = self._hosts[host].view if host in self._hosts else CandidateHost(host)
         if not self.is_alive(host):
             instructions.append(Note(host, f"has a creator; its tags: {', '.join(sorted(tags)) or 'none'}"))
         self._hosts[host] = _Host(replace(old, tags=frozenset(tags), alive=True), creator_pid)
@@ -340,7 +345,7 @@ class PlacementBook:
         return instructions + [
             PlaceAgain(record.spawn.name)
             for record in self.records()
-            if record.phase is Phase.WAITING and not record.unwanted
+            if record.phase is PlacementPhase.WAITING and not record.unwanted
         ]
 
     def creator_down(self, host: str, now_s: float, fence_s: float = 0.0) -> list[Instruction]:
@@ -361,9 +366,9 @@ class PlacementBook:
             self._left_behind.add((host, name))
             if fence_s > 0:
                 self._fences[name] = (host, now_s + fence_s)
-            if record.phase is Phase.STARTING:
+            if record.phase is PlacementPhase.STARTING:
                 continue  # the task that starts it finds out and decides
-            if record.phase is Phase.RUNNING and record.spawn.policy.restart and not record.unwanted:
+            if record.phase is PlacementPhase.RUNNING and record.spawn.policy.restart and not record.unwanted:
                 record.misses(f"was lost with the creator of {host}", now_s)
                 record.lost = True
                 instructions += [Note(name, f"was lost with {host}"), PlaceAgain(name)]
@@ -384,7 +389,7 @@ class PlacementBook:
         if any(record.suspect for record in here):
             return [Inspect(load.host)]
         counts = (load.components, len(here))
-        settled = all(record.phase is not Phase.STARTING for record in here)
+        settled = all(record.phase is not PlacementPhase.STARTING for record in here)
         if settled and load.components != len(here) and counts != known.reported:
             known.reported = counts
             return [Inspect(load.host)]
@@ -393,7 +398,7 @@ class PlacementBook:
     def component_disappeared(self, component_address: str) -> list[Instruction]:
         """Record a fallen token; the creator knows whether its component has ended or is being restarted."""
         for record in self._records.values():
-            if record.address == component_address and record.phase is Phase.RUNNING and not record.unwanted:
+            if record.address == component_address and record.phase is PlacementPhase.RUNNING and not record.unwanted:
                 record.suspect = True
                 return [Inspect(record.host)]
         return []
@@ -401,7 +406,7 @@ class PlacementBook:
     def component_appeared(self, component_address: str, host: str, pid: int) -> None:
         """Record that a component is ready again."""
         for record in self._records.values():
-            if (record.address, record.host) == (component_address, host) and record.phase is Phase.RUNNING:
+            if (record.address, record.host) == (component_address, host) and record.phase is PlacementPhase.RUNNING:
                 record.runs(pid)
 
     def inspected(self, host: str, processes: Collection[ProcessState], asked_s: float) -> list[Instruction]:
@@ -410,7 +415,7 @@ class PlacementBook:
         instructions: list[Instruction] = []
         for record in self.records():
             name = record.spawn.name
-            if record.host != host or record.phase is not Phase.RUNNING or record.since_s > asked_s:
+            if record.host != host or record.phase is not PlacementPhase.RUNNING or record.since_s > asked_s:
                 continue
             process = listed.get(name)
             if process is not None:
@@ -425,7 +430,7 @@ class PlacementBook:
         return instructions
 
     # ------------------------------------------------------------------
-    def _colocation(self, record: Record) -> str:
+    def _colocation(self, record: PlacementRecord) -> str:
         """Return the host of the other members of its process; empty if they have none or there are none."""
         if not record.spawn.process:
             return ""
@@ -443,7 +448,7 @@ class PlacementBook:
             if (host, spawn.name) in self._left_behind or spawn.name in self._stopped:
                 return [EndOrphan(host, spawn.name), Note(spawn.name, f"came back with {host}, no longer wanted")]
             self._remember_number(spawn)
-            record = Record(spawn, host if spawn.pinned else "", Phase.RUNNING, host, asked_s)
+            record = PlacementRecord(spawn, host if spawn.pinned else "", PlacementPhase.RUNNING, host, asked_s)
             self._records[spawn.name] = record
             _adopt(record, host, process, asked_s)
             return [Note(spawn.name, f"was found on {host}")]
@@ -461,8 +466,8 @@ class PlacementBook:
             self._numbers[type_name] = max(self._numbers.get(type_name, 0), int(number))
 
 
-def _adopt(record: Record, host: str, process: ProcessState, asked_s: float) -> None:
+def _adopt(record: PlacementRecord, host: str, process: ProcessState, asked_s: float) -> None:
     """Accept a creator's process as the one that this record wants."""
-    record.phase, record.missing_since_s = Phase.RUNNING, -1.0
+    record.phase, record.missing_since_s = PlacementPhase.RUNNING, -1.0
     record.host, record.pid, record.since_s = host, process.pid, asked_s
     record.reasons, record.lost, record.suspect = (f"{host}: its creator has it",), False, False

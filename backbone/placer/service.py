@@ -74,10 +74,10 @@ from backbone.placer.placement_book import (
     Inspect,
     Instruction,
     Note,
-    Phase,
     PlaceAgain,
     PlacementBook,
-    Record,
+    PlacementPhase,
+    PlacementRecord,
 )
 from backbone.wire import Envelope, Message, UnknownMessage
 
@@ -161,7 +161,7 @@ class Placer(Component[NoParameters]):
             "hosts": float(len(hosts)),
             "hosts_alive": float(sum(host.alive for host in hosts)),
             "placements": float(len(records)),
-            "placements_waiting": float(sum(record.phase is Phase.WAITING for record in records)),
+            "placements_waiting": float(sum(record.phase is PlacementPhase.WAITING for record in records)),
             "starts": float(self._starts),
             "starts_refused": float(self._refused),
             "placed_again": float(self._again),
@@ -191,7 +191,7 @@ class Placer(Component[NoParameters]):
             try:
                 return await self._bring_up(record)
             except Refusal:
-                if record.phase is Phase.STARTING:
+                if record.phase is PlacementPhase.STARTING:
                     self._book.forget(name)
                     self._tell_news()
                 raise
@@ -211,7 +211,7 @@ class Placer(Component[NoParameters]):
             raise NoHost(f"{name}: the component database does not admit it: {error}", name=name) from error
         return admitted.component_type
 
-    async def _bring_up(self, record: Record) -> Started:
+    async def _bring_up(self, record: PlacementRecord) -> Started:
         """Start the component on a host and return when it is ready.
 
         Raises:
@@ -221,7 +221,7 @@ class Placer(Component[NoParameters]):
         await self._unfenced(record)
         for tries_left in reversed(range(SPAWN_TRIES)):
             await self._choose(record)
-            if record.phase is not Phase.STARTING:  # it returned with a host that was only cut off
+            if record.phase is not PlacementPhase.STARTING:  # it returned with a host that was only cut off
                 return _started(record)
             self.story.note(name, f"goes to {record.host}: {'; '.join(record.reasons)}")
             spawn = record.spawn
@@ -255,24 +255,24 @@ class Placer(Component[NoParameters]):
             break
         return _started(record)
 
-    async def _unfenced(self, record: Record) -> None:
+    async def _unfenced(self, record: PlacementRecord) -> None:
         """Return when no silent host can run the component any more, or when it has returned with its host."""
         name = record.spawn.name
-        while record.phase is Phase.STARTING and not record.unwanted:
+        while record.phase is PlacementPhase.STARTING and not record.unwanted:
             until_s = self._book.fenced_until_s(name, self.clock.now_s())
             if until_s is None:
                 return
             record.doing = "waits until the silent host has ended it"
             await self._news_or(until_s)
 
-    async def _choose(self, record: Record) -> None:
+    async def _choose(self, record: PlacementRecord) -> None:
         """Choose a host unless the component has returned; wait a while if only a creator's return makes one possible.
 
         Raises:
             NoHost: No host is possible.
         """
         name, until_s = record.spawn.name, self.clock.now_s() + CREATOR_BACK_S * self.clock.rate
-        while record.phase is Phase.STARTING:
+        while record.phase is PlacementPhase.STARTING:
             self._refuse_unwanted(record)
             try:
                 self._book.choose(name, self.clock.now_s())
@@ -284,11 +284,11 @@ class Placer(Component[NoParameters]):
             else:
                 return
 
-    def _refuse_unwanted(self, record: Record) -> None:
+    def _refuse_unwanted(self, record: PlacementRecord) -> None:
         if record.unwanted:
             raise StoppedMeanwhile(f"{record.spawn.name} was stopped before it had started")
 
-    async def _fate_of_spawn(self, record: Record) -> tuple[Fate, int]:
+    async def _fate_of_spawn(self, record: PlacementRecord) -> tuple[Fate, int]:
         """Ask the creator for the outcome of an unanswered order, and for the pid if the component is ready.
 
         If only the answer was lost, the component still becomes ready, and this method waits for it.
@@ -307,7 +307,7 @@ class Placer(Component[NoParameters]):
                 return Fate.UNKNOWN, 0
             await self._news_or(min(until_s, self.clock.now_s() + ANSWER_EACH_S * self.clock.rate))
 
-    def _silent(self, record: Record, fate: Fate, error: LinkError) -> CreatorSilent:
+    def _silent(self, record: PlacementRecord, fate: Fate, error: LinkError) -> CreatorSilent:
         name, host = record.spawn.name, record.host
         if fate in (Fate.NOT_DONE, Fate.HOST_LOST):
             return CreatorSilent(f"{name}: {error}; it does not run on {host}", name=name, outcome="not_running")
@@ -341,7 +341,7 @@ class Placer(Component[NoParameters]):
         except CreatorSilent:
             record.unwanted = False
             raise
-        if record.phase is Phase.STARTING:
+        if record.phase is PlacementPhase.STARTING:
             await self._start_left_off(record)
         found = self._book.find(name)
         if found is None or found is record:
@@ -379,7 +379,7 @@ class Placer(Component[NoParameters]):
                     self._stop_owned(owner, f"its owner {owner} is gone")
             suspects = owners
 
-    async def _start_left_off(self, record: Record) -> None:
+    async def _start_left_off(self, record: PlacementRecord) -> None:
         """Return when the task that starts the component has ended and the component is out of the book."""
         until_s = self.clock.now_s() + SPAWN_WITHIN_S * self.clock.rate
         while self._book.find(record.spawn.name) is record and self.clock.now_s() < until_s:
@@ -580,9 +580,9 @@ class Placer(Component[NoParameters]):
     async def _place_again(self, name: str) -> None:
         """Start a missing component until it runs or is unwanted; without a possible host it waits for a creator."""
         record = self._book.find(name)
-        if record is None or record.phase is not Phase.WAITING or record.unwanted:
+        if record is None or record.phase is not PlacementPhase.WAITING or record.unwanted:
             return
-        record.phase = Phase.STARTING
+        record.phase = PlacementPhase.STARTING
         await self._old_life_ended(record)
         for pause_s in chain(AGAIN_PAUSES_S, repeat(AGAIN_PAUSES_S[-1])):
             await self._pause(record, pause_s)
@@ -599,7 +599,7 @@ class Placer(Component[NoParameters]):
             except Refusal as refusal:
                 self.story.note(name, f"could not be started again: {refusal.detail}")
                 record.cause = f"could not be started again: {refusal.detail}"
-                if record.phase is not Phase.STARTING:  # its creator's list decides whether it runs
+                if record.phase is not PlacementPhase.STARTING:  # its creator's list decides whether it runs
                     break
                 self.changed()
             else:
@@ -608,16 +608,16 @@ class Placer(Component[NoParameters]):
         self._tell_news()
         self.changed()
 
-    async def _pause(self, record: Record, pause_s: float) -> None:
+    async def _pause(self, record: PlacementRecord, pause_s: float) -> None:
         """Return after this many seconds of the machine, or when the component is unwanted."""
         until_s = self.clock.now_s() + pause_s * self.clock.rate
         while self.clock.now_s() < until_s and not record.unwanted:
             await self._news_or(until_s)
 
-    async def _old_life_ended(self, record: Record) -> None:
+    async def _old_life_ended(self, record: PlacementRecord) -> None:
         """Return when the name is free or has returned, because a component dies a moment after its creator."""
         name, until_s = record.spawn.name, self.clock.now_s() + OLD_LIFE_S * self.clock.rate
-        while self.clock.now_s() < until_s and record.phase is Phase.STARTING and not record.unwanted:
+        while self.clock.now_s() < until_s and record.phase is PlacementPhase.STARTING and not record.unwanted:
             try:
                 await self.bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=ANSWER_EACH_S)
             except UnknownName:
@@ -656,7 +656,7 @@ def _creator(host: str) -> str:
     return f"{Subsystem.BACKBONE}/{creator_name(host)}"
 
 
-def _started(record: Record) -> Started:
+def _started(record: PlacementRecord) -> Started:
     return Started(record.address, record.host, record.pid, list(record.reasons))
 
 

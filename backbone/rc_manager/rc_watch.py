@@ -45,7 +45,7 @@ class Service(Protocol):
     def happened(self, event: Event) -> None:
         """Have the schedule manager decide on the event."""
 
-    def tell(self, subject: str, what: str, level: LogLevel) -> None:
+    def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
         """Put an event about the subject into the mission's log."""
 
     def start_task(self, work: Coroutine[Any, Any, None], name: str) -> object:
@@ -229,6 +229,6 @@ class RcWatch:
         if self._faults.get(rc) != fault:
             self._faults[rc] = fault
             log.warning("%s is put aside: %s", rc, fault)
-            self._service.tell(rc, f"is put aside: {fault}", LogLevel.WARNING)
+            self._service.publish_event(rc, f"is put aside: {fault}", LogLevel.WARNING)
             self._service.happened(RcWentDown(rc, fault))
         self.meet_in_a_while(rc)

@@ -304,7 +304,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _trace_stopped(self) -> None:
         """Let people know; the mission goes on without a trace."""
-        self.tell(self.name, self._why_no_trace(), LogLevel.WARNING)
+        self.publish_event(self.name, self._why_no_trace(), LogLevel.WARNING)
         self.changed()
 
     def _why_no_trace(self) -> str:

@@ -1,10 +1,10 @@
-"""Dark search: look around for the darkest direction, go there a little, look again; stop where it is dark all around.
+"""Dark search: look around for the darkest direction, go there a little, look again; stop where all around is dark.
 
 Rules of this file: no bus, no clock. Pictures and mission time go in, motions come out.
 
-A Scout has no odometry: directions count from where it began to look around, by the turn it was told to make, and are
-forgotten with the next look around. A view kept from before an interruption tells whether the robot still stands where
-it stood; if so it goes on, otherwise it looks around anew.
+A Scout has no odometry: directions are relative to the begin of the look around, by the commanded turn, and are dropped
+at the next look around. A view from before an interruption shows whether the robot still stands at its place; if so,
+the look around continues, otherwise it begins again.
 
 Source: the behaviors that RAM 2002, "Visual Servoing", reports as earlier work: they navigated by patches of light and
 dark. Numbers: chosen in simulated rooms with a dark corner and with a table.
@@ -31,18 +31,18 @@ NEAR_ROWS = 0.12  # chosen: the lowest rows show the floor 15 to 20 cm before th
 AHEAD_COLUMNS = (1 / 3, 2 / 3)  # chosen: 13 degrees, less than a sector
 HORIZON, CAMERA_HEIGHT = 150.2 / 240, 11.4 / 240  # the Scout's camera: rows of the horizon and of a meter's floor
 ALL_AROUND = 0.75  # chosen: legs of furniture and the way out may look bright
-IN_M, BACK_M = 0.35, 0.12  # chosen: three bodies into the dark; a body's length away from what it may have run into
+IN_M, BACK_M = 0.35, 0.12  # chosen: three bodies into the dark; a body length away from a possible obstacle
 CERTAIN_PICTURES = 4  # chosen: torn pictures come two or three in a row
-CHOICES = 4  # chosen: what looks darkest from afar is often a shadow line; then others get their turn
-BARRED_RAD = math.radians(60.0)  # chosen: no way back to where it just came from
+CHOICES = 4  # chosen: the darkest direction is often a shadow line; then other directions are tried
+BARRED_RAD = math.radians(60.0)  # chosen: no way back to the last place
 LONGEST_STEP_S = 0.2  # chosen: between pictures that are further apart the robot may have stood still
 SAME_VIEW, VIEW_COLUMNS, VIEW_ROWS = 9.0, 40, 15  # chosen: grey levels between views of 8 by 16 pixels
 SHIFTS = 8  # chosen: columns of such a view, 8 degrees; a robot that was stopped in a turn runs on less than that
 COMPARED = 10  # chosen: the first pictures after a switch roll
 
 
-class Stage(StrEnum):
-    """What the search does."""
+class SearchStage(StrEnum):
+    """Stage of the search."""
 
     LOOK = "looks around"
     TURN = "turns to where it looked darkest"
@@ -56,7 +56,7 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Glimpse:
-    """What a picture says about light.
+    """Light in a picture.
 
     Attributes:
         ahead: Mean brightness straight ahead, near and far counting alike, 0 to 255.
@@ -70,13 +70,13 @@ class Glimpse:
 
 
 def glimpse(picture: Picture) -> Glimpse:
-    """Return what a picture says about light.
+    """Return the light in a picture.
 
     Args:
         picture: Grey levels 0 to 255, shape (height, width), row 0 on top; at least 15 by 40 pixels.
 
     Raises:
-        ValueError: It has another shape.
+        ValueError: The picture has another shape.
     """
     if picture.ndim != 2 or picture.shape[0] < VIEW_ROWS or picture.shape[1] < VIEW_COLUMNS:
         raise ValueError(f"a grey picture of at least {VIEW_COLUMNS} by {VIEW_ROWS} pixels, not {picture.shape}")
@@ -107,16 +107,16 @@ class DarkSearch:
 
     Args:
         dark_level: Floor darker than this is dark, 0 to 255.
-        leg_m: So far it goes before it looks around again.
-        speed_m_s: On the way.
-        looks: After so many looks around it gives up; 0: never.
+        leg_m: Distance to drive before the next look around.
+        speed_m_s: Speed of driving.
+        looks: Number of looks around after which it gives up; 0: never.
     """
 
     def __init__(self, *, dark_level: float, leg_m: float, speed_m_s: float, looks: int) -> None:
         self._dark_level, self._leg_m, self._speed_m_s, self._most_looks = dark_level, leg_m, speed_m_s, looks
-        self._stage = Stage.LOOK
+        self._stage = SearchStage.LOOK
         self._looks = 0
-        self._left = 0.0  # of the stage: radians to turn or meters to go
+        self._left = 0.0  # remaining radians or meters of the stage
         self._turned_rad = 0.0  # since the look around began
         self._seen: list[tuple[float, float, float]] = []
         self._barred_rad: float | None = None
@@ -128,22 +128,22 @@ class DarkSearch:
         self._begin_look()
 
     @property
-    def stage(self) -> Stage:
-        """What it does."""
+    def stage(self) -> SearchStage:
+        """The stage of the search."""
         return self._stage
 
     @property
     def looks(self) -> int:
-        """How often it has looked all around."""
+        """Number of finished looks around."""
         return self._looks
 
     @property
     def is_final(self) -> bool:
         """True when it is hidden, or has given up."""
-        return self._stage in (Stage.HIDDEN, Stage.FAILED)
+        return self._stage in (SearchStage.HIDDEN, SearchStage.FAILED)
 
     def interrupt(self) -> None:
-        """Note that the robot is not held any more; the next pictures will tell whether it was moved meanwhile."""
+        """Record the loss of the robot; the next pictures show whether it was moved meanwhile."""
         self._decided_s, self._last = None, STILL
         self._to_compare = COMPARED
 
@@ -151,8 +151,8 @@ class DarkSearch:
         """Return how to move now.
 
         Args:
-            seen: Of the newest picture.
-            now_s: When it was taken, never before an earlier call's.
+            seen: Light in the newest picture.
+            now_s: Mission time of that picture; it never decreases.
         """
         if self.is_final:
             return STILL
@@ -166,7 +166,7 @@ class DarkSearch:
         return self._last
 
     def _is_back(self, seen: Glimpse) -> bool:
-        """Say whether the first pictures after an interruption have told what they can; begin anew if it was moved."""
+        """Return whether the first pictures after an interruption suffice; begin again if the robot was moved."""
         assert self._view is not None  # noqa: S101  asked only then
         self._to_compare -= 1
         if is_same_view(self._view, seen.view):
@@ -177,76 +177,76 @@ class DarkSearch:
         return not self._to_compare
 
     def _take_in(self, seen: Glimpse, passed_s: float) -> None:
-        """Count what the last motion did until now, and go to the next stage when this one is done."""
+        """Add the last motion's effect, and go to the next stage when this one is finished."""
         turned_rad, gone_m = self._last.turn_rad_s * passed_s, abs(self._last.forward_m_s) * passed_s
         self._turned_rad += turned_rad
         self._dark_pictures = self._dark_pictures + 1 if seen.ground < self._dark_level else 0
         match self._stage:
-            case Stage.LOOK:
+            case SearchStage.LOOK:
                 self._seen.append((self._turned_rad, seen.ahead, seen.ground))
                 if self._turned_rad >= 2 * math.pi:
                     self._looks += 1
                     self._conclude()
-            case Stage.TURN | Stage.FACE_OUT:
+            case SearchStage.TURN | SearchStage.FACE_OUT:
                 before, self._left = self._left, self._left - turned_rad
                 if before * self._left <= 0 or abs(self._left) < 0.02:
                     self._after_turn()
-            case Stage.GO:
+            case SearchStage.GO:
                 self._left -= gone_m
                 if self._dark_pictures >= CERTAIN_PICTURES:
-                    self._enter(Stage.ENTER, IN_M)
+                    self._enter(SearchStage.ENTER, IN_M)
                 elif self._left <= 0:
                     self._begin_look()
-            case Stage.ENTER:
+            case SearchStage.ENTER:
                 self._left -= gone_m
                 if self._left <= 0:
-                    self._enter(Stage.BACK, BACK_M)
-            case Stage.BACK:
+                    self._enter(SearchStage.BACK, BACK_M)
+            case SearchStage.BACK:
                 self._left -= gone_m
                 if self._left <= 0:
                     self._begin_look()
-            case Stage.HIDDEN | Stage.FAILED:
+            case SearchStage.HIDDEN | SearchStage.FAILED:
                 return
 
     def _conclude(self) -> None:
-        """Say what all those views mean."""
+        """Decide from all views of a look around."""
         is_dark = [ground < self._dark_level for _angle, _ahead, ground in self._seen]
         if sum(is_dark) >= ALL_AROUND * len(is_dark):
             brightest = sectors(self._seen, brightest=True)[0]
-            self._enter(Stage.FACE_OUT, turned(brightest - self._turned_rad))
+            self._enter(SearchStage.FACE_OUT, turned(brightest - self._turned_rad))
         elif self._looks == self._most_looks:
-            self._enter(Stage.FAILED, 0.0)
+            self._enter(SearchStage.FAILED, 0.0)
         else:
             barred = self._barred_rad
             ways = [way for way in sectors(self._seen) if barred is None or abs(turned(way - barred)) > BARRED_RAD]
             way = ways[(self._looks - 1) % CHOICES]
-            self._enter(Stage.TURN, turned(way - self._turned_rad))
+            self._enter(SearchStage.TURN, turned(way - self._turned_rad))
 
     def _after_turn(self) -> None:
-        if self._stage is Stage.FACE_OUT:
-            self._enter(Stage.HIDDEN, 0.0)
+        if self._stage is SearchStage.FACE_OUT:
+            self._enter(SearchStage.HIDDEN, 0.0)
         else:
-            self._enter(Stage.GO, self._leg_m)
-            self._barred_rad = math.pi  # seen from the next look around, which begins straight ahead
+            self._enter(SearchStage.GO, self._leg_m)
+            self._barred_rad = math.pi  # relative to the next look around, which begins straight ahead
 
     def _begin_look(self) -> None:
         self._seen, self._turned_rad = [], 0.0
-        self._enter(Stage.LOOK, 0.0)
+        self._enter(SearchStage.LOOK, 0.0)
 
-    def _enter(self, stage: Stage, left: float) -> None:
+    def _enter(self, stage: SearchStage, left: float) -> None:
         self._stage, self._left, self._dark_pictures = stage, left, 0
 
     def _motion(self) -> Motion:
         match self._stage:
-            case Stage.LOOK:
+            case SearchStage.LOOK:
                 return Motion(0.0, TURN_RAD_S)
-            case Stage.TURN | Stage.FACE_OUT:
+            case SearchStage.TURN | SearchStage.FACE_OUT:
                 return Motion(0.0, math.copysign(TURN_RAD_S, self._left))
-            case Stage.GO | Stage.ENTER:
+            case SearchStage.GO | SearchStage.ENTER:
                 return Motion(self._speed_m_s, 0.0)
-            case Stage.BACK:
+            case SearchStage.BACK:
                 return Motion(-self._speed_m_s, 0.0)
-            case Stage.HIDDEN | Stage.FAILED:
+            case SearchStage.HIDDEN | SearchStage.FAILED:
                 return STILL
 
 

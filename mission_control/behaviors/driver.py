@@ -1,4 +1,4 @@
-"""Driver: base of the behaviors that drive a robot. The decisions are in files of their own, this is the loop."""
+"""Driver: base class of behaviors that drive a robot. This file has the loop; pure files have the decisions."""
 
 from __future__ import annotations
 
@@ -15,66 +15,66 @@ from resource_pool.arc_client import ArcClient, AskPose, EmergencyStopped, NoSuc
 log = logging.getLogger(__name__)
 
 DECIDE_EVERY_S = 0.1  # chosen: commands last half a second, and ten a second of 2 ms are a fiftieth of a radio
-LOCALIZE_WITHIN_S = 0.3  # chosen: a position that is older is none to steer by; wheels stop by themselves after 0.5 s
+LOCALIZE_WITHIN_S = 0.3  # chosen: an older position is useless for steering; wheels stop by themselves after 0.5 s
 AGAIN_AFTER_S = 1.0  # chosen: hardware that refused needs a moment; mission seconds
 
 D = TypeVar("D", bound=BehaviorParameters)
 
 
 class NeedsArc(Refusal):
-    """A behavior that drives has no ARC to drive with."""
+    """A driving behavior has no ARC."""
 
     code = "behavior.needs_arc"
     remedy = "Give the behavior an <arc> of the kind this behavior's documentation names."
 
 
 class Driver(Behavior[D]):
-    """Drives while the robot is held, stops it before it is given back, and fails with the reason if it never can.
+    """Drives during grants, stops the robot before the end of a grant, and fails with the reason if it never can drive.
 
     Derive, override ``drive_on`` instead of ``act``, and keep all progress on ``self`` or in a plain object there.
     """
 
     needs_arc: ClassVar[str] = "drive"
-    """Kind of ARC to name in the complaint when there is none."""
+    """Kind of ARC that the refusal names if there is none."""
     never: ClassVar[frozenset[str]] = frozenset({"world.unknown_body", "wire.unknown"})
-    """Codes of refusals that the next attempt would meet again."""
+    """Codes of refusals that every further attempt would get again."""
 
     async def drive_on(self, robot: str) -> None:
-        """Go on with the work.
+        """Continue the work.
 
-        When: from each ``resumed`` on; cancelled before the robot is gone, and begun again later.
-        What: decide, ``move``, sleep ``DECIDE_EVERY_S``, again and again. Not: keep progress in local variables.
+        When: from each ``resumed`` on; cancelled before the end of the grant, and begun again later.
+        What: decide, ``move``, sleep ``DECIDE_EVERY_S``, in a loop. Not: keep progress in local variables.
 
         Args:
-            robot: Name of the one that is held.
+            robot: Name of the granted robot.
         """
         raise NotImplementedError
 
     @property
     def held(self) -> ArcClient:
-        """The hold on its ARC.
+        """The client of its ARC.
 
         Raises:
-            NeedsArc: It claims none.
+            NeedsArc: It claims no ARC.
         """
         if self.arc is None:
             raise NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}")
         return self.arc
 
     async def move(self, motion: Motion) -> None:
-        """Turn the wheels for this motion, until the next one or for half a second."""
+        """Turn the wheels for this motion, until the next call or for half a second."""
         await self.held.drive(*motion.wheels_rad_s())
 
     async def locate(self, localizer: str, robot: str) -> Position:
-        """Return where the robot is, as whoever looks at the room from above sees it.
+        """Return the position of the robot, as the localizer tracks it from above the room.
 
         Args:
-            localizer: Name or address of the component that tracks.
+            localizer: Name or address of the tracking component.
             robot: Name of the robot.
 
         Raises:
-            Refusal: It does not know the robot, or tracks nothing.
-            LinkError: It did not answer.
+            Refusal: The localizer does not know the robot, or is no localizer.
+            LinkError: The localizer did not answer.
         """
         tracker = localizer if "/" in localizer else address(Subsystem.RESOURCE_POOL, localizer)
         pose = await self.bus.ask(tracker, AskPose(robot), Pose, within_s=LOCALIZE_WITHIN_S)
@@ -86,7 +86,7 @@ class Driver(Behavior[D]):
             self.give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
 
     async def act(self) -> None:
-        """Drive on; what can never be done ends the behavior, what can be is done again."""
+        """Drive; fail after a refusal that would repeat, try again after other refusals."""
         while True:
             try:
                 return await self.drive_on(self.rcs.get("scout", ""))
@@ -106,11 +106,11 @@ class Driver(Behavior[D]):
         """Bring the robot to rest."""
         try:
             await self.held.halt()
-        except (Refusal, LinkError) as error:  # the radio's last packet stops it all the same
+        except (Refusal, LinkError) as error:  # the radio's last packet stops the robot too
             log.info("%s could not be halted: %s", self.name, error)
 
     def give_up(self, refusal: Refusal) -> None:
-        """Fail, with the refusal's code, words and remedy for the parent."""
+        """Fail; the parent gets the refusal's code, detail and remedy."""
         why: dict[str, Any] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
         self.report(f"gives up: {refusal.detail}")
         self.finish(BehaviorStatus.FAILURE, why)

@@ -1,7 +1,7 @@
-"""Hide: find a dark place by the pictures alone, go into it, and look out of it.
+"""Hide: find a dark place by pictures alone, go into it, and look out of it.
 
-In mission.xml: an ARC of kind ``capture``. A slice should be long enough for a look around, eight seconds, but need not
-be: if the robot still stands where it stood, the look around goes on in the next one.
+In mission.xml: an ARC of kind ``capture``. A slice of at least eight seconds, long enough for a look around, is best.
+If it is shorter and the robot still stands at its place, the look around continues in the next slice.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behavior import BehaviorParameters, suspended_because
-from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, Stage, glimpse
+from mission_control.behaviors.dark_search import VIEW_COLUMNS, VIEW_ROWS, DarkSearch, SearchStage, glimpse
 from mission_control.behaviors.driver import Driver
 from mission_control.behaviors.motion import MOST_M_S, STILL
 from mission_control.behaviors.servo_to_target import UnusablePicture
@@ -27,9 +27,9 @@ class HideParameters(BehaviorParameters, frozen=True, kw_only=True):
 
     Attributes:
         dark_level: Floor darker than this is dark: a grey level above 0 and below 255.
-        leg_m: So far the robot goes before it looks around again, above 0.
-        speed_m_s: On the way, above 0, at most 0.3.
-        looks: After so many looks around it fails; 0: never.
+        leg_m: Distance to drive before the next look around, above 0.
+        speed_m_s: Speed of driving, above 0, at most 0.3.
+        looks: Number of looks around after which it fails; 0: never.
     """
 
     dark_level: float = 60.0
@@ -49,7 +49,7 @@ class HideParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class Hide(Driver[HideParameters]):
-    """Succeeds in a dark place; fails if it finds none."""
+    """Succeeds in a dark place; fails if it finds no dark place."""
 
     parameters_type = HideParameters
     needs_arc = "capture"
@@ -64,11 +64,11 @@ class Hide(Driver[HideParameters]):
 
     @property
     def search(self) -> DarkSearch:
-        """How far it is; read only."""
+        """The state of the search; read only."""
         return self._search
 
     def see(self, frame: Frame) -> None:
-        """Decide by this picture; ``drive_on`` carries it out."""
+        """Decide from this picture; ``drive_on`` carries it out."""
         self._fresh.set()
         if frame.width_px < VIEW_COLUMNS or frame.height_px < VIEW_ROWS:
             self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
@@ -77,7 +77,7 @@ class Hide(Driver[HideParameters]):
         self._motion = self._search.decide(glimpse(pixels), frame.captured_s)
 
     async def drive_on(self, robot: str) -> None:
-        """Do what each picture leads to; see ``Driver.drive_on``."""
+        """Carry out the decision of each picture; see ``Driver.drive_on``."""
         while not self._search.is_final:
             self.report(f"{robot} {self._search.stage}, {self._seen()}")
             await self._fresh.wait()
@@ -86,18 +86,18 @@ class Hide(Driver[HideParameters]):
                 raise self._unusable
             await self.move(self._motion)
         await self.held.halt()
-        is_hidden = self._search.stage is Stage.HIDDEN
+        is_hidden = self._search.stage is SearchStage.HIDDEN
         self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self._search.looks})
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep what was seen; the next pictures tell whether the robot still stands there."""
+        """Keep the views; the next pictures show whether the robot still stands at its place."""
         self._search.interrupt()
         self._motion = STILL
         self._fresh.clear()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
-        """Begin anew with the new parameters."""
+        """Begin again with the new parameters."""
         self._search = self._plan()
 
     def statistics(self) -> dict[str, float]:

@@ -1,9 +1,10 @@
-"""Jump course: drive up to an obstacle, jump, see whether that brought the robot over, drive on.
+"""Jump course: drive up to an obstacle, jump, check whether the robot is over it, drive on.
 
 Rules of this file: no bus, no clock. Positions and mission time go in, motions and jumps come out.
 
-Laws: a robot that has jumped is told nothing until it has landed and its spring is wound again. What counts is where
-the robot is: taken away and brought back on either side of the obstacle, it goes on from there.
+Laws: after a jump the robot gets no command until it has landed and its spring is wound again. Only the robot's
+    position
+counts: if it is carried to either side of the obstacle, the course continues from there.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 
 from mission_control.behaviors.motion import (
+    FloorPoint,
     Maneuver,
     Motion,
-    Place,
     Position,
     Watchdog,
     head_for,
@@ -28,15 +29,15 @@ TAKE_OFF_M = 0.20  # measured: from 15 to 32 cm before its front a box of 30 cm 
 RUN_UP_M = 0.30  # chosen: a straight piece before the take-off, so that the robot arrives there well turned
 DEEPEST_M = 0.20  # measured: a jump carries 60 cm far, and 40 cm beyond the front
 AT_TAKE_OFF_M = 0.04  # chosen: leaves the robot well within the measured 17 cm
-AIMED_RAD = math.radians(4.0)  # chosen: 4 cm aside where it lands
+AIMED_RAD = math.radians(4.0)  # chosen: 4 cm aside at the landing
 LANDED_AFTER_S = 3.0  # measured: 0.42 s until the kick is over, 0.7 s of flight, and 2.4 s until the spring is wound
 BEYOND_M = 0.06  # chosen: half a body; then no wheel stands on the obstacle
 ARRIVED_M = 0.08  # chosen: less than a body
-PATIENCE_S = 4.0  # chosen: turning round takes two seconds
+PATIENCE_S = 4.0  # chosen: a turn round takes two seconds
 
 
-class Stage(StrEnum):
-    """How far a robot is with its jump."""
+class JumpStage(StrEnum):
+    """Stage of a jump."""
 
     RUN_UP = "goes to its run-up"
     APPROACH = "goes to where it jumps"
@@ -48,35 +49,35 @@ class Stage(StrEnum):
 
 
 class Act(Enum):
-    """What is to be done besides driving."""
+    """An action besides driving."""
 
     JUMP = auto()
-    WAIT = auto()  # nothing at all, not even a halt: it would call the jump off
+    WAIT = auto()  # no command, not even a halt, which would cancel the jump
 
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """What is to be jumped over.
+    """The obstacle to jump over.
 
     Attributes:
-        front: Where the robot shall cross its near side.
-        heading_rad: In which direction.
-        depth_m: How deep it is in that direction, at most ``DEEPEST_M``.
+        front: Point of its near side at which the robot crosses it.
+        heading_rad: Direction of the jump.
+        depth_m: Its depth in that direction, at most ``DEEPEST_M``.
     """
 
-    front: Place
+    front: FloorPoint
     heading_rad: float
     depth_m: float
 
-    def ahead(self, distance_m: float) -> Place:
-        """Return the place so far beyond the front; negative: before it."""
-        return Place(
+    def ahead(self, distance_m: float) -> FloorPoint:
+        """Return the place at this distance beyond the front; negative: before it."""
+        return FloorPoint(
             self.front.x_m + distance_m * math.cos(self.heading_rad),
             self.front.y_m + distance_m * math.sin(self.heading_rad),
         )
 
     def passed_m(self, position: Position) -> float:
-        """Return how far beyond the front the robot is, in the direction of the jump; negative: before it."""
+        """Return the robot's distance beyond the front, in the direction of the jump; negative: before it."""
         x_m, y_m = position.x_m - self.front.x_m, position.y_m - self.front.y_m
         return x_m * math.cos(self.heading_rad) + y_m * math.sin(self.heading_rad)
 
@@ -85,16 +86,16 @@ class JumpCourse:
     """The state of a jump over an obstacle.
 
     Args:
-        obstacle: What to jump over.
-        attempts: Jumps after which it gives up.
-        speed_m_s: On straight ways.
-        onward_m: So far beyond the obstacle it drives.
+        obstacle: The obstacle.
+        attempts: Number of jumps after which it gives up.
+        speed_m_s: Speed on straight ways.
+        onward_m: Distance to drive beyond the obstacle.
     """
 
     def __init__(self, obstacle: Obstacle, *, attempts: int, speed_m_s: float, onward_m: float) -> None:
         self._obstacle, self._attempts = obstacle, attempts
         self._speed_m_s, self._goal_m = speed_m_s, obstacle.depth_m + max(onward_m, BEYOND_M)
-        self._stage = Stage.RUN_UP
+        self._stage = JumpStage.RUN_UP
         self._jumps = 0
         self._jumped_s = -math.inf
         self._is_seen_landing = False
@@ -102,102 +103,102 @@ class JumpCourse:
         self._freeing: Maneuver | None = None
 
     @property
-    def stage(self) -> Stage:
-        """How far it is."""
+    def stage(self) -> JumpStage:
+        """The stage of the jump."""
         return self._stage
 
     @property
     def jumps(self) -> int:
-        """Jumps that the robot obeyed."""
+        """Number of jumps that the robot obeyed."""
         return self._jumps
 
     @property
     def is_final(self) -> bool:
-        """True when it is over, or has given up."""
-        return self._stage in (Stage.OVER, Stage.FAILED)
+        """True when the robot is over the obstacle, or the course has failed."""
+        return self._stage in (JumpStage.OVER, JumpStage.FAILED)
 
     def airborne_s(self, now_s: float) -> float:
-        """Return for how long the robot must still be left alone, 0 if it need not."""
+        """Return the time for which the robot must still get no command, 0: none."""
         return max(0.0, self._jumped_s + LANDED_AFTER_S - now_s)
 
     def interrupt(self) -> None:
-        """Note that the robot is not held any more; where it is at the next decision says how to go on."""
+        """Record the loss of the robot; the next decision depends only on its position then."""
         self._freeing, self._is_seen_landing = None, False
         self._watchdog.rest()
-        if self._stage is not Stage.AIRBORNE and not self.is_final:
-            self._stage = Stage.RUN_UP
+        if self._stage is not JumpStage.AIRBORNE and not self.is_final:
+            self._stage = JumpStage.RUN_UP
 
     def jumped(self) -> None:
-        """Note that the robot obeyed the last ``Act.JUMP``."""
+        """Record that the robot obeyed the last ``Act.JUMP``."""
         self._jumps += 1
 
     def decide(self, position: Position, now_s: float) -> Motion | Act:
-        """Return what to do now.
+        """Return the next motion or action.
 
         Args:
-            position: Where the robot is now.
-            now_s: Mission time, never before an earlier call's.
+            position: Present position of the robot.
+            now_s: Mission time; it never decreases.
         """
         if self.is_final or self.airborne_s(now_s) > 0:
             return Act.WAIT
-        if self._stage is Stage.AIRBORNE:
+        if self._stage is JumpStage.AIRBORNE:
             self._land(position)
         if self._freeing is not None:
             motion = self._freeing.motion(now_s)
             if motion is not None:
                 return motion
             self._freeing = None
-        if self._stage is not Stage.ONWARD and self._is_beyond(position):
-            self._enter(Stage.ONWARD)
+        if self._stage is not JumpStage.ONWARD and self._is_beyond(position):
+            self._enter(JumpStage.ONWARD)
         return self._go_on(position, now_s)
 
     def _go_on(self, position: Position, now_s: float) -> Motion | Act:
         obstacle = self._obstacle
         match self._stage:
-            case Stage.OVER | Stage.FAILED:
+            case JumpStage.OVER | JumpStage.FAILED:
                 return Act.WAIT
-            case Stage.ONWARD:
+            case JumpStage.ONWARD:
                 goal = obstacle.ahead(self._goal_m)
                 if obstacle.passed_m(position) >= self._goal_m or goal.distance_m(position) < ARRIVED_M:
-                    self._enter(Stage.OVER)
+                    self._enter(JumpStage.OVER)
                     return Act.WAIT
                 return self._go(goal, position, now_s)
-            case Stage.RUN_UP:
+            case JumpStage.RUN_UP:
                 goal = obstacle.ahead(-TAKE_OFF_M - RUN_UP_M)
                 if goal.distance_m(position) < ARRIVED_M:
-                    self._enter(Stage.APPROACH)
+                    self._enter(JumpStage.APPROACH)
                 return self._go(goal, position, now_s)
-            case Stage.APPROACH:
+            case JumpStage.APPROACH:
                 goal = obstacle.ahead(-TAKE_OFF_M)
                 if goal.distance_m(position) < AT_TAKE_OFF_M:
-                    self._enter(Stage.AIM)
+                    self._enter(JumpStage.AIM)
                 return self._go(goal, position, now_s)
             case _:
                 if obstacle.ahead(-TAKE_OFF_M).distance_m(position) > 2 * AT_TAKE_OFF_M:
-                    self._enter(Stage.RUN_UP)
+                    self._enter(JumpStage.RUN_UP)
                 elif abs(turned(obstacle.heading_rad - position.heading_rad)) < AIMED_RAD:
-                    self._enter(Stage.AIRBORNE)
+                    self._enter(JumpStage.AIRBORNE)
                     self._jumped_s, self._is_seen_landing = now_s, True
                     return Act.JUMP
                 return turn_to(position, obstacle.heading_rad)
 
     def _land(self, position: Position) -> None:
-        """Say what came of the jump; a heading that was turned round in the air tells that it lies on its back."""
+        """Judge the jump; a heading that was reversed in the air means that the robot lies on its back."""
         if self._is_seen_landing and abs(turned(position.heading_rad - self._obstacle.heading_rad)) > math.pi / 2:
             self._freeing = shake_free()
         if self._is_beyond(position):
-            self._enter(Stage.ONWARD)
+            self._enter(JumpStage.ONWARD)
         else:
-            self._enter(Stage.FAILED if self._jumps >= self._attempts else Stage.RUN_UP)
+            self._enter(JumpStage.FAILED if self._jumps >= self._attempts else JumpStage.RUN_UP)
 
     def _is_beyond(self, position: Position) -> bool:
         return self._obstacle.passed_m(position) >= self._obstacle.depth_m + BEYOND_M
 
-    def _enter(self, stage: Stage) -> None:
+    def _enter(self, stage: JumpStage) -> None:
         self._stage = stage
         self._watchdog.rest()
 
-    def _go(self, goal: Place, position: Position, now_s: float) -> Motion:
+    def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
         if self._watchdog.is_stuck(goal.distance_m(position), now_s):
             self._freeing = shake_free()
             self._watchdog.rest()

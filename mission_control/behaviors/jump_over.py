@@ -1,9 +1,9 @@
 """Jump over: bring a robot to the other side of a box, a step or a wall of up to 30 cm.
 
-The way to the obstacle must be free, and somebody must see where the robot is: see ``patrol``.
+The way to the obstacle must be free, and a localizer must track the robot: see ``patrol``.
 
-In mission.xml: an ARC of kind ``drive`` (or more), and the tracker's name as ``localizer``. Give the ARC a maximum run
-time a few seconds above its minimum, and no slice of its equals ends it in the air.
+In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name. Set the maximum run time of the ARC a few
+seconds above its minimum, so that no slice ends while the robot is in the air.
 
 Source: IROS 2001, section 2: the Scout jumps over objects 30 cm in height.
 """
@@ -16,7 +16,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import DECIDE_EVERY_S, Driver
-from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, Obstacle, Stage
+from mission_control.behaviors.jump_course import DEEPEST_M, Act, JumpCourse, JumpStage, Obstacle
 from mission_control.behaviors.motion import MOST_M_S, Motion, read_places
 from mission_control.messages import BehaviorStatus
 
@@ -25,13 +25,13 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``JumpOver``.
 
     Attributes:
-        front: Where to cross the obstacle's near side: ``x,y`` in meters.
-        heading_deg: In which direction: 0 along x, 90 along y.
-        localizer: Component that says where a robot is: its name if it is in the resource pool, else its address.
-        depth_m: How deep the obstacle is in that direction, above 0, at most 0.2.
-        onward_m: So far beyond it the robot drives before it has succeeded.
-        speed_m_s: On straight ways, above 0, at most 0.3.
-        attempts: After so many jumps it fails, at least 1.
+        front: Point of the obstacle's near side to cross: ``x,y`` in meters.
+        heading_deg: Direction of the jump: 0 along x, 90 along y.
+        localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
+        depth_m: Depth of the obstacle in that direction, above 0, at most 0.2.
+        onward_m: Distance to drive beyond the obstacle.
+        speed_m_s: Speed on straight ways, above 0, at most 0.3.
+        attempts: Number of jumps after which it fails, at least 1.
     """
 
     front: str
@@ -48,7 +48,7 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
         if not math.isfinite(self.heading_deg):
             raise ValueError(f"heading_deg is {self.heading_deg}: write degrees, 0 along x and 90 along y")
         if not self.localizer:
-            raise ValueError("localizer is empty: name the component that sees where robots are")
+            raise ValueError("localizer is empty: name the component that tracks robots")
         if not 0 < self.depth_m <= DEEPEST_M:
             raise ValueError(f"depth_m is {self.depth_m}: a jump carries over at most {DEEPEST_M} m")
         if not 0 <= self.onward_m < math.inf:
@@ -60,7 +60,7 @@ class JumpOverParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class JumpOver(Driver[JumpOverParameters]):
-    """Succeeds when the robot has driven on beyond the obstacle; fails after so many jumps that did not do."""
+    """Succeeds when the robot has driven on beyond the obstacle; fails after ``attempts`` vain jumps."""
 
     parameters_type = JumpOverParameters
 
@@ -70,11 +70,11 @@ class JumpOver(Driver[JumpOverParameters]):
 
     @property
     def course(self) -> JumpCourse:
-        """How far it is; read only."""
+        """The state of the course; read only."""
         return self._course
 
     async def drive_on(self, robot: str) -> None:
-        """Decide ten times a second by where the robot is; see ``Driver.drive_on``."""
+        """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
         while True:
             position = await self.locate(self.parameters.localizer, robot)
             match self._course.decide(position, self.clock.now_s()):
@@ -91,20 +91,20 @@ class JumpOver(Driver[JumpOverParameters]):
                 break
             await self.clock.sleep_s(DECIDE_EVERY_S)
         await self.held.halt()
-        is_over = self._course.stage is Stage.OVER
+        is_over = self._course.stage is JumpStage.OVER
         self.finish(BehaviorStatus.SUCCESS if is_over else BehaviorStatus.FAILURE, {"jumps": self._course.jumps})
 
     def not_now(self) -> float:
-        """Ask for the time until the robot has landed; see ``Behavior.not_now``."""
+        """Return the time until the robot has landed; see ``Behavior.not_now``."""
         return self._course.airborne_s(self.clock.now_s())
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep what is known; where the robot is then says how to go on."""
+        """Keep the state; the next decision depends on the robot's position then."""
         self._course.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._course.jumps} jumps until now")
 
     def parameters_changed(self) -> None:
-        """Begin anew with the new parameters."""
+        """Begin again with the new parameters."""
         self._course = self._plan()
 
     def statistics(self) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Motion: from where a robot is and where it should be to how it moves.
+"""Motion: computes a robot's motion from its position and its goal.
 
 Rules of this file: no bus, no clock; times are mission seconds.
 
@@ -23,7 +23,7 @@ TURN_FIRST_RAD = math.radians(50.0)  # chosen: beyond it a robot turns on the sp
 
 @dataclass(frozen=True, slots=True)
 class Position:
-    """Where a robot is: meters, and its heading in radians."""
+    """Position of a robot: meters, and its heading in radians."""
 
     x_m: float
     y_m: float
@@ -31,24 +31,24 @@ class Position:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FloorPoint:
     """A place on the floor, meters."""
 
     x_m: float
     y_m: float
 
     def distance_m(self, position: Position) -> float:
-        """Return how far the robot is from here."""
+        """Return the robot's distance from this place."""
         return math.hypot(self.x_m - position.x_m, self.y_m - position.y_m)
 
     def bearing_rad(self, position: Position) -> float:
-        """Return where the robot sees this place: 0 is straight ahead, left is positive, -pi to pi."""
+        """Return the bearing of this place from the robot: 0 is straight ahead, left is positive, -pi to pi."""
         return turned(math.atan2(self.y_m - position.y_m, self.x_m - position.x_m) - position.heading_rad)
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a robot moves: forward in meters a second, and turning in radians a second, left is positive."""
+    """Motion of a robot: forward in meters a second, turning in radians a second, left is positive."""
 
     forward_m_s: float = 0.0
     turn_rad_s: float = 0.0
@@ -67,11 +67,11 @@ class Motion:
 STILL = Motion()
 
 
-def read_places(text: str) -> list[Place]:
+def read_places(text: str) -> list[FloorPoint]:
     """Return the places of a text like ``1,1 3.5,1``.
 
     Raises:
-        ValueError: There is none in it, or one of them is no pair of numbers.
+        ValueError: The text has no place, or a place is no pair of numbers.
 
     Example:
         >>> read_places("1,1 3.5,0.5")
@@ -85,7 +85,7 @@ def read_places(text: str) -> list[Place]:
             raise ValueError(f"{pair!r} is no place: write x,y in meters, as in 1,1 3.5,1") from None
         if not (math.isfinite(x_m) and math.isfinite(y_m)):
             raise ValueError(f"{pair!r} is no place: write finite numbers")
-        places.append(Place(x_m, y_m))
+        places.append(FloorPoint(x_m, y_m))
     if not places:
         raise ValueError("there is no place: write x,y in meters for each, as in 1,1 3.5,1")
     return places
@@ -96,15 +96,15 @@ def turned(angle_rad: float) -> float:
     return math.atan2(math.sin(angle_rad), math.cos(angle_rad))
 
 
-def head_for(position: Position, place: Place, speed_m_s: float) -> Motion:
-    """Return the motion that brings the robot to the place, and to rest there.
+def head_for(position: Position, place: FloorPoint, speed_m_s: float) -> Motion:
+    """Return the motion that drives the robot to the place and stops it there.
 
     It turns on the spot while the place is far from straight ahead, and slows down before it arrives.
 
     Args:
-        position: Where the robot is.
-        place: Where it should be.
-        speed_m_s: As fast as this on a straight way, above 0; ``MOST_M_S`` at most.
+        position: Position of the robot.
+        place: Its goal.
+        speed_m_s: Speed on a straight way, above 0; ``MOST_M_S`` at most.
     """
     bearing_rad = place.bearing_rad(position)
     turn_rad_s = _within(TURN_PER_S * bearing_rad, MOST_RAD_S)
@@ -120,10 +120,10 @@ def turn_to(position: Position, heading_rad: float) -> Motion:
 
 
 class Maneuver:
-    """A fixed sequence of motions, played from when it is first asked.
+    """A fixed sequence of motions, from the first call on.
 
     Args:
-        steps: Motions and for how many seconds each.
+        steps: Motions and their durations in seconds.
     """
 
     def __init__(self, steps: Sequence[tuple[Motion, float]]) -> None:
@@ -131,7 +131,7 @@ class Maneuver:
         self._begun_s: float | None = None
 
     def motion(self, now_s: float) -> Motion | None:
-        """Return the motion for this moment, None when all are over."""
+        """Return the motion for this time, None after the last."""
         if self._begun_s is None:
             self._begun_s = now_s
         left_s = now_s - self._begun_s
@@ -143,19 +143,19 @@ class Maneuver:
 
 
 def shake_free() -> Maneuver:
-    """Return the maneuver that frees a robot which does not get on.
+    """Return the maneuver that frees a stuck robot.
 
-    Full speed back and forth: what lies on its back is thrown upright by its own tail, and what stands before
-    something gets away from it. measured: rights every landing of a jump in at most one attempt.
+    Full speed back and forth: the tail throws a robot that lies on its back upright, and a robot before an obstacle
+    gets away from it. measured: one attempt rights the robot after every landing of a jump.
     """
     return Maneuver([(Motion(-0.35), 0.3), (Motion(0.35), 0.3), (STILL, 0.5)])
 
 
 class Watchdog:
-    """Notices that a robot does not get nearer to where it is going.
+    """Detects a robot that does not get nearer to its goal.
 
     Args:
-        patience_s: So long it may take to get ``STEP_M`` nearer.
+        patience_s: Time in which it must get ``STEP_M`` nearer.
     """
 
     STEP_M = 0.02  # chosen: half a wheel; tracking from above is better than that
@@ -165,11 +165,11 @@ class Watchdog:
         self.rest()
 
     def rest(self) -> None:
-        """Begin anew: the aim changed, or the robot was not driven for a while."""
+        """Begin again, because the goal changed or the robot was not driven for a while."""
         self._nearest_m, self._since_s = math.inf, math.inf
 
     def is_stuck(self, distance_m: float, now_s: float) -> bool:
-        """Return True if it has been no nearer for all the patience there is; asked at every decision."""
+        """Return True if it has not got nearer within ``patience_s``; called at every decision."""
         if distance_m <= self._nearest_m - self.STEP_M:
             self._nearest_m, self._since_s = distance_m, now_s
         return now_s - self._since_s >= self._patience_s

@@ -1,11 +1,10 @@
 """Patrol: drive through way points, round after round.
 
-A Scout does not know where it is. Something else must see it: a camera above the room that tracks robots, as
-laboratories have, or the simulated world in its place. Counting the wheels' turns would not do: whoever takes the robot
-over for a minute leaves it somewhere else.
+A Scout does not know its position. A localizer must track it: a camera above the room, as in laboratories, or the
+simulated world. Counting the turns of the wheels is not enough, because a person may take the robot over for a minute
+and leave it at another place.
 
-In mission.xml: an ARC of kind ``drive`` (or more), and the tracker's name as ``localizer``; with a simulated world that
-is the world's name.
+In mission.xml: an ARC of kind ``drive`` (or more), and the localizer's name; a simulated world is its own localizer.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Patrol``.
 
     Attributes:
-        waypoints: Where to go, in this order: ``x,y`` in meters, separated by blanks, as in ``1,1 3.5,1 3.5,4``.
-        localizer: Component that says where a robot is: its name if it is in the resource pool, else its address.
-        rounds: Success after so many; 0: for ever.
-        speed_m_s: On straight ways, above 0, at most 0.3.
-        reached_within_m: As near as this to a way point counts as reached, at least 0.02.
-        rest_s: So long the robot stays at each way point; what it is not held does not count.
+        waypoints: Way points in order: ``x,y`` in meters, separated by blanks, as in ``1,1 3.5,1 3.5,4``.
+        localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
+        rounds: Number of rounds until success; 0: for ever.
+        speed_m_s: Speed on straight ways, above 0, at most 0.3.
+        reached_within_m: Distance from a way point that counts as reached, at least 0.02.
+        rest_s: Time at each way point; only time of grants counts.
     """
 
     waypoints: str
@@ -46,7 +45,7 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
     def __post_init__(self) -> None:
         read_places(self.waypoints)
         if not self.localizer:
-            raise ValueError("localizer is empty: name the component that sees where robots are")
+            raise ValueError("localizer is empty: name the component that tracks robots")
         if self.rounds < 0:
             raise ValueError(f"rounds is {self.rounds}: write how many, or 0 for no end")
         if not 0 < self.speed_m_s <= MOST_M_S:
@@ -58,7 +57,7 @@ class PatrolParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class Patrol(Driver[PatrolParameters]):
-    """Publishes ``WaypointReached`` for each way point, in order and once, however often it is suspended on the way."""
+    """Publishes ``WaypointReached`` once for each way point, in order, with any number of suspensions."""
 
     parameters_type = PatrolParameters
 
@@ -69,11 +68,11 @@ class Patrol(Driver[PatrolParameters]):
 
     @property
     def route(self) -> PatrolRoute:
-        """How far it is; read only."""
+        """The state of the route; read only."""
         return self._route
 
     async def drive_on(self, robot: str) -> None:
-        """Decide ten times a second by where the robot is; see ``Driver.drive_on``."""
+        """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
         self._say(robot)
         while not self._route.is_over:
             position = await self.locate(self.parameters.localizer, robot)
@@ -85,12 +84,12 @@ class Patrol(Driver[PatrolParameters]):
         self.finish(BehaviorStatus.SUCCESS, self._found())
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep the record; go on later from wherever the robot is then."""
+        """Keep the state; later continue from the robot's position then."""
         self._route.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
-        """Begin a new patrol by the new parameters; way points of the old one stay published."""
+        """Begin a new patrol with the new parameters; way points of the old one stay published."""
         self._route, self._published = self._plan(), 0
 
     def statistics(self) -> dict[str, float]:
@@ -108,7 +107,7 @@ class Patrol(Driver[PatrolParameters]):
         )
 
     def _publish(self, robot: str) -> None:
-        """Tell each way point reached since the last time."""
+        """Publish each way point that was reached since the last call."""
         if self._route.reached == self._published:
             return
         for visit in self._route.visits_since(self._published):

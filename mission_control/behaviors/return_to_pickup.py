@@ -1,10 +1,10 @@
 """Return to pickup: bring a robot back to the marked place where it is picked up.
 
-From anywhere in the room it first drives, tracked from above, to where the mark can be seen; then it servoes to the
-mark. Whoever takes the robot over and leaves it at the other end of the room has it come back from there.
+The robot first drives, tracked by a localizer, to a place from which the mark is in sight; then it servoes to the mark.
+It also returns after a person has left it at the other end of the room.
 
 In mission.xml: an ARC of kind ``capture`` at the camera's full rate, with a period as short as a picture's; the
-tracker's name as ``localizer``; a place before the mark as ``near``.
+localizer's name; a place before the mark as ``near``.
 
 Source: IROS 2001, "Visual Servoing": Scouts find their way back to where they can be picked up.
 """
@@ -15,7 +15,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from mission_control.behaviors.driver import DECIDE_EVERY_S
 from mission_control.behaviors.motion import MOST_M_S, read_places
-from mission_control.behaviors.pickup_route import PickupRoute, Stage
+from mission_control.behaviors.pickup_route import PickupRoute, PickupStage
 from mission_control.behaviors.servo_to_target import Servo, ServoParameters, TargetNotFound
 from mission_control.vision.servo_law import Stage as Approach
 from resource_pool.arc_client import Frame
@@ -25,11 +25,11 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
     """Parameters of ``ReturnToPickup``, besides those of ``ServoToTarget``.
 
     Attributes:
-        near: Where to go first, ``x,y`` in meters: best 1 to 2 m straight before the mark.
-        localizer: Component that says where a robot is: its name if it is in the resource pool, else its address.
-        speed_m_s: On the way there, above 0, at most 0.3.
-        search_turns: So many turns it looks for the mark before that counts as in vain, above 0.
-        attempts: After so many times in vain it fails, at least 1.
+        near: The first goal, ``x,y`` in meters: best 1 to 2 m straight before the mark.
+        localizer: Component that tracks robots: its name if it is in the resource pool, else its address.
+        speed_m_s: Speed on the way to it, above 0, at most 0.3.
+        search_turns: Number of turns of one search for the mark, above 0.
+        attempts: Number of vain searches after which it fails, at least 1.
     """
 
     near: str
@@ -43,7 +43,7 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
         if len(read_places(self.near)) != 1:
             raise ValueError(f"near is {self.near!r}: write one place, x,y in meters")
         if not self.localizer:
-            raise ValueError("localizer is empty: name the component that sees where robots are")
+            raise ValueError("localizer is empty: name the component that tracks robots")
         if not 0 < self.speed_m_s <= MOST_M_S:
             raise ValueError(f"speed_m_s is {self.speed_m_s}: it must be above 0 and at most {MOST_M_S}")
         if self.search_turns <= 0:
@@ -53,7 +53,7 @@ class PickupParameters(ServoParameters, frozen=True, kw_only=True):
 
 
 class ReturnToPickup(Servo[PickupParameters]):
-    """Succeeds at its place before the mark, wherever it begins; fails if the mark is not to be found."""
+    """Succeeds at its place before the mark, from any begin; fails if it does not find the mark."""
 
     parameters_type = PickupParameters
 
@@ -63,18 +63,18 @@ class ReturnToPickup(Servo[PickupParameters]):
 
     @property
     def route(self) -> PickupRoute:
-        """How far it is; read only."""
+        """The state of the route; read only."""
         return self._route
 
     def see(self, frame: Frame) -> None:
-        """Look for the mark, and follow it, as soon as the robot goes by sight."""
-        if self._route.stage is Stage.BY_SIGHT:
+        """Search and track the mark, while the robot navigates by sight."""
+        if self._route.stage is PickupStage.BY_SIGHT:
             super().see(frame)
 
     async def drive_on(self, robot: str) -> None:
-        """Go to where the mark can be seen, then by sight; see ``Driver.drive_on``."""
-        while self._route.stage is not Stage.FAILED:
-            if self._route.stage is Stage.BY_SIGHT:
+        """Drive to the place ``near``, then by sight; see ``Driver.drive_on``."""
+        while self._route.stage is not PickupStage.FAILED:
+            if self._route.stage is PickupStage.BY_SIGHT:
                 if await self._go_by_sight(robot):
                     return
             else:
@@ -83,17 +83,17 @@ class ReturnToPickup(Servo[PickupParameters]):
         self.give_up(TargetNotFound(f"{robot} looked for the mark {self._route.in_vain} times"))
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Keep what was tried; see ``Behavior.suspended``."""
+        """Keep the state of the search; see ``Behavior.suspended``."""
         self._route.interrupt()
         await super().suspended(reason, by)
 
     def parameters_changed(self) -> None:
-        """Begin anew with the new parameters."""
+        """Begin again with the new parameters."""
         self._route = self._way()
         super().parameters_changed()
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, and how often the mark was looked for in vain."""
+        """Return the base's counters, and the vain searches."""
         return {**super().statistics(), "searched_in_vain": self._route.in_vain}
 
     def _way(self) -> PickupRoute:
@@ -105,13 +105,13 @@ class ReturnToPickup(Servo[PickupParameters]):
         position = await self.locate(self.parameters.localizer, robot)
         await self.move(self._route.decide(position, self.clock.now_s()))
         self.report(f"{robot} {self._route.stage}")
-        if self._route.stage is Stage.BY_SIGHT:
+        if self._route.stage is PickupStage.BY_SIGHT:
             self.look_anew()
         else:
             await self.clock.sleep_s(DECIDE_EVERY_S)
 
     async def _go_by_sight(self, robot: str) -> bool:
-        """Do what the next picture leads to; return True at the mark."""
+        """Carry out the decision of the next picture; return True at the mark."""
         step = await self.next_step()
         if self.has_searched(self.parameters.search_turns):
             self._route.not_found()

@@ -1,15 +1,15 @@
-"""Which run times are worth asking for, to see what is in view for a while through a shared frequency.
+"""Run times: the best requests to see a target that is in view for a while through a shared frequency.
 
-Pure. A slice that is made longer as soon as something is glimpsed need hold no more than its blind beginning and a
-few frames to glimpse in. It detects what is in view for ``view_s`` unless that leaves before ``blind_s + detect_s``
-of it, or comes after its end. With N equals that each run for ``run_s`` and settle for ``settling_s``, the share of
-phases in which one of the slices of one robot detects it is
+Pure. If a slice is extended at the first glimpse, it needs only its blind begin and a few frames for a glimpse. It
+detects a target that is in view for ``view_s``, unless the target leaves before ``blind_s + detect_s`` of the slice or
+comes after its end. With N equals that each run for ``run_s`` and settle for ``settling_s``, the share of phases in
+which one of the slices of one robot detects it is
 ``(view_s + run_s - blind_s - detect_s) / (N (run_s + settling_s))``. It falls with ``run_s`` if and only if
-``view_s > settling_s + blind_s + detect_s``: then slices should be as short as still glimpse, otherwise they should
-be as long as the mission allows.
+``view_s > settling_s + blind_s + detect_s``: then slices should be as short as a glimpse allows, otherwise as long as
+the mission allows.
 
-Short run times are drawn anew for each slice: equals that all ask for fixed times make a schedule with a period, and
-what takes a multiple of it to pass is seen every time or never.
+Short run times are drawn again for each slice: if all equals ask for fixed times, the schedule has a period, and a
+target that passes in a multiple of it is seen every time or never.
 
 Source: RAM 2002, "Experiments" (behaviors that work out the run times they ask for are its stated next step); the
 formula: chosen, for slices in turn.
@@ -22,17 +22,17 @@ from dataclasses import dataclass
 from random import Random
 
 GLIMPSE_FRAMES = (2, 4)  # chosen: one good frame in two is likely, in four certain; longer slices come less often
-EXTENSION = 1.5  # chosen: times to detect; a burst of bad frames falls into many of them
-GRAIN_S = 0.001  # chosen: finer times say nothing
+EXTENSION = 1.5  # chosen: multiples of the time to detect, because a burst of bad frames hits many detections
+GRAIN_S = 0.001  # chosen: finer times are meaningless
 
 
 @dataclass(frozen=True, slots=True)
 class RunTimes:
-    """What to ask for.
+    """The run times to ask for.
 
     Attributes:
         shortest_s: Least useful time, seconds.
-        longest_s: Longest time worth asking for without having seen anything; at least the shortest.
+        longest_s: Longest useful time without a glimpse; at least the shortest.
         maximum_s: End of extensions.
     """
 
@@ -53,12 +53,12 @@ def useful_run_times(
     """Return the run times to ask for.
 
     Args:
-        view_s: Shortest time for which what is looked for is in view, seconds.
+        view_s: Shortest time for which a target is in view, seconds.
         settling_s: Time from a switch to the first picture, seconds.
-        blind_s: Time from the first picture to the first that tells something, seconds.
+        blind_s: Time from the first picture to the first usable picture, seconds.
         frame_s: Time from one sound picture to the next, on average, seconds.
         detect_s: Time from the first picture with it to certainty, seconds, above 0.
-        given_s: Run time the mission gives; no longer one is asked for, but for extensions.
+        given_s: Run time in the mission file; only extensions ask for more.
 
     Example:
         >>> useful_run_times(view_s=4.0, settling_s=0.3, blind_s=0.5, frame_s=0.1, detect_s=0.8, given_s=5.0)

@@ -1,7 +1,7 @@
 """Servo to target: find the landmark, follow it in the picture, and stop at a place straight before it.
 
-What is seen and how to drive is decided in ``mission_control.vision``; this carries it out. While the robot is not held
-it may be moved or turned: with the next pictures the target is acquired anew, and the approach goes on where it was.
+``mission_control.vision`` decides about pictures and motions; this file carries them out. Between grants the robot may
+be moved or turned: the next pictures acquire the target again, and the approach continues at its stage.
 
 In mission.xml: an ARC of kind ``capture`` at the camera's full rate, with a period as short as a picture's.
 
@@ -24,23 +24,23 @@ from mission_control.behavior import BehaviorParameters, suspended_because
 from mission_control.behaviors.driver import Driver
 from mission_control.messages import BehaviorStatus
 from mission_control.vision.servo_law import STOP_M, Stage
-from mission_control.vision.skeleton_tracking import Phase
-from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, Step, VisualServo
+from mission_control.vision.skeleton_tracking import TrackingPhase
+from mission_control.vision.visual_servo import FARTHEST_STOP_M, LATENCY_S, NEAREST_STOP_M, ServoStep, VisualServo
 from resource_pool.arc_client import Frame
 
 PICTURE_PX = (320, 240)  # what ``SCOUT_CAMERA`` was measured for
-SETTLES_S = 2.0  # chosen: about half of what settling takes; asked for again if it was too little
+SETTLES_S = 2.0  # chosen: about half the time of settling; requested again if it was too short
 
 
 class UnusablePicture(Refusal):
-    """The framegrabber's pictures are not those of the camera that the algorithm knows."""
+    """The framegrabber's pictures do not have the size that the algorithm needs."""
 
     code = "servo.unusable_picture"
     remedy = "Use a framegrabber that delivers grey pictures of 320 by 240 pixels."
 
 
 class TargetNotFound(Refusal):
-    """The robot turned round and round and did not see the target."""
+    """The robot turned round several times and did not see the target."""
 
     code = "servo.target_not_found"
     remedy = "Bring the robot within 2.5 m of the target, where nothing hides it, or let it turn for longer."
@@ -50,9 +50,9 @@ class ServoParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``ServoToTarget``.
 
     Attributes:
-        stop_m: How far before the target to stop, 0.4 to 1.2.
-        search_turns: After so many turns without a sight of the target it fails; 0: never.
-        latency_s: From a picture's capture until the command it leads to turns the wheels, 0 to 0.5.
+        stop_m: Distance before the target at which to stop, 0.4 to 1.2.
+        search_turns: Number of turns without a sight of the target after which it fails; 0: never.
+        latency_s: Time from a picture's capture until its command turns the wheels, 0 to 0.5.
     """
 
     stop_m: float = STOP_M
@@ -72,7 +72,7 @@ S = TypeVar("S", bound=ServoParameters)
 
 
 class Servo(Driver[S]):
-    """What servoing behaviors have in common: pictures in, commands out."""
+    """Base class of servoing behaviors: pictures in, commands out."""
 
     needs_arc = "capture"
     never = Driver.never | {UnusablePicture.code}
@@ -80,25 +80,25 @@ class Servo(Driver[S]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._servo = self._plan()
-        self._step: Step | None = None
+        self._step: ServoStep | None = None
         self._seen_s: float | None = None
         self._fresh = asyncio.Event()
         self._unusable: UnusablePicture | None = None
         self._acquisitions = 0
         self._counted_rad = 0.0
-        self._phase = Phase.ACQUIRING
+        self._phase = TrackingPhase.ACQUIRING
 
     @property
-    def step(self) -> Step | None:
-        """What the last picture led to; read only."""
+    def step(self) -> ServoStep | None:
+        """The decision of the last picture; read only."""
         return self._step
 
-    async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera will do
-        """Acquire the target anew; see ``Behavior.resumed``."""
+    async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera
+        """Acquire the target again; see ``Behavior.resumed``."""
         self.look_anew()
 
     def see(self, frame: Frame) -> None:
-        """Work out what this picture leads to; ``drive_on`` carries it out."""
+        """Decide from this picture; ``drive_on`` carries it out."""
         self._fresh.set()
         if (frame.width_px, frame.height_px) != PICTURE_PX:
             self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
@@ -109,34 +109,34 @@ class Servo(Driver[S]):
         self._note_phase(frame.robot, self._step)
 
     def not_now(self) -> float:
-        """Ask for the moment that settling before the target needs; see ``Behavior.not_now``."""
+        """Return the time that settling before the target needs; see ``Behavior.not_now``."""
         return SETTLES_S if self._servo.stage is Stage.SETTLING else 0.0
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Say how far it was; see ``Behavior.suspended``."""
+        """Report the progress; see ``Behavior.suspended``."""
         self.report(f"suspended: {suspended_because(reason, by)}; {self._servo.approaches} approaches until now")
 
     def parameters_changed(self) -> None:
-        """Begin anew with the new parameters."""
+        """Begin again with the new parameters."""
         self._servo, self._counted_rad = self._plan(), 0.0
         self.look_anew()
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, and how often the target was found and come near to."""
+        """Return the base's counters, and counts of sights and approaches."""
         mine = {"acquisitions": self._acquisitions, "approaches": self._servo.approaches}
         return {**super().statistics(), **mine}
 
     def look_anew(self) -> None:
         """Begin again with acquisition: the robot stands still, perhaps elsewhere."""
         self._servo.resumed()
-        self._step, self._seen_s, self._phase = None, None, Phase.ACQUIRING
+        self._step, self._seen_s, self._phase = None, None, TrackingPhase.ACQUIRING
         self._fresh.clear()
 
-    async def next_step(self) -> Step:
-        """Return what the newest picture led to, when there is a newer one than the last time.
+    async def next_step(self) -> ServoStep:
+        """Wait for a newer picture and return its decision.
 
         Raises:
-            UnusablePicture: The camera's pictures are not those of a Scout.
+            UnusablePicture: The pictures do not have the size of a Scout's.
         """
         await self._fresh.wait()
         self._fresh.clear()
@@ -145,22 +145,22 @@ class Servo(Driver[S]):
         assert self._step is not None  # noqa: S101  a picture that is fresh was seen
         return self._step
 
-    async def follow(self, robot: str, step: Step) -> None:
-        """Command what a picture led to, and say so."""
+    async def follow(self, robot: str, step: ServoStep) -> None:
+        """Send the command of a picture's decision, and report it."""
         await self.held.drive(*step.command.wheels_rad_s())
         self.report(f"{robot} {step.stage}, {step.track.phase}, {self._servo.approaches} approaches until now")
 
     def has_searched(self, turns: float) -> bool:
-        """Return True if the robot has turned round so often without a sight of the target; never for 0."""
-        self._counted_rad = min(self._counted_rad, self._servo.searched_rad)  # a sight begins the count anew
+        """Return True if the robot has made this many turns without a sight of the target; never for 0."""
+        self._counted_rad = min(self._counted_rad, self._servo.searched_rad)  # a sight restarts the count
         return turns > 0 and self._servo.searched_rad - self._counted_rad >= 2 * math.pi * turns
 
     def search_anew(self) -> None:
-        """Count turns in search of the target from here on."""
+        """Begin a new search: count its turns from 0."""
         self._counted_rad = self._servo.searched_rad
 
     def arrived(self) -> None:
-        """Succeed, with where the robot stands before the target."""
+        """Succeed; the report contains the robot's pose before the target."""
         pose = self._step.pose if self._step is not None else None
         at: dict[str, Any] = {"approaches": self._servo.approaches}
         if pose is not None:
@@ -170,22 +170,22 @@ class Servo(Driver[S]):
     def _plan(self) -> VisualServo:
         return VisualServo(stop_m=self.parameters.stop_m, latency_s=self.parameters.latency_s)
 
-    def _note_phase(self, robot: str, step: Step) -> None:
+    def _note_phase(self, robot: str, step: ServoStep) -> None:
         if step.track.phase is self._phase:
             return
-        if self._phase is Phase.ACQUIRING:
+        if self._phase is TrackingPhase.ACQUIRING:
             self._acquisitions += 1
         self.story.note(robot, f"the target: {self._phase} → {step.track.phase}")
         self._phase = step.track.phase
 
 
 class ServoToTarget(Servo[ServoParameters]):
-    """Succeeds at its place before the landmark; fails if the landmark is not to be found."""
+    """Succeeds at its place before the landmark; fails if it does not find the landmark."""
 
     parameters_type = ServoParameters
 
     async def drive_on(self, robot: str) -> None:
-        """Do what each picture leads to; see ``Driver.drive_on``."""
+        """Carry out the decision of each picture; see ``Driver.drive_on``."""
         self.report(f"{robot} waits for its first picture")
         while True:
             step = await self.next_step()

@@ -1,4 +1,4 @@
-"""Skeleton: the smallest behavior that does something. Copy it, rename it, name it in mission.xml.
+"""Skeleton: the smallest working behavior. Copy it, rename it, name it in mission.xml.
 
 In mission.xml: a component type ``skeleton`` of class ``mission_control.behaviors.skeleton:Skeleton``,
 and a behavior of that type with a priority, its parameters and the ARC it needs.
@@ -14,7 +14,7 @@ class SkeletonParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Own parameters, each with a unit in its name, a default and a line here.
 
     Attributes:
-        turns: How many turns it makes before it has succeeded.
+        turns: Number of turns until success.
         speed_rad_s: Speed of the wheels.
     """
 
@@ -29,13 +29,13 @@ class Skeleton(Behavior[SkeletonParameters]):
     turned = 0  # kept through suspensions, as everything on self is
 
     async def act(self) -> None:
-        """Command the robot: runs while its RCs are held, is cut off when they go, begins again when they are back."""
+        """Command the robot: begins with each grant, is cancelled at its end."""
         assert self.arc is not None, "a skeleton needs an ARC that can drive: <arc kind='drive' …/>"  # noqa: S101
         while self.turned < self.parameters.turns:
             self.report(f"turn {self.turned + 1} of {self.parameters.turns}")  # one line for people
-            for _tenth in range(10):  # commands end by themselves after half a second: repeat them
+            for _tenth in range(10):  # a command expires after half a second, so repeat it
                 await self.arc.drive(self.parameters.speed_rad_s, -self.parameters.speed_rad_s)
                 await self.clock.sleep_s(0.1)  # mission time; nothing else sleeps
             self.turned += 1
         await self.arc.halt()
-        self.finish(BehaviorStatus.SUCCESS, {"turned": self.turned})  # the ARC goes back, the parent hears it
+        self.finish(BehaviorStatus.SUCCESS, {"turned": self.turned})  # gives the ARC back, reports to the parent

@@ -1,4 +1,4 @@
-"""Surveillance: several watchers, one picture of what they saw.
+"""Surveillance: several watchers, one record of their events.
 
 Source: IROS 2001, "Surveillance": behaviors of equal priority watch the same room.
 """
@@ -24,14 +24,14 @@ class SurveillanceParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``Surveillance``.
 
     Attributes:
-        retries: How often one failed child is started again before the others go on without it.
+        retries: Number of restarts of a failed child before the others continue without it.
     """
 
     retries: int = 3
 
 
 class Surveillance(Behavior[SurveillanceParameters]):
-    """Starts its children, gathers what they see, and goes on as long as one of them can watch."""
+    """Starts its children, collects their events, and continues while one of them can watch."""
 
     parameters_type = SurveillanceParameters
 
@@ -41,17 +41,17 @@ class Surveillance(Behavior[SurveillanceParameters]):
         self._last: MotionSeen | None = None
 
     async def start(self) -> None:
-        """Listen to all watchers of this branch."""
+        """Subscribe to all watchers of this branch."""
         for path, _node in walk(self.parameters.children):
             watcher = f"mission_control/{path[-1][0]}"
             self.bus.subscribe(watcher, Conversation.EVENTS, MotionSeen, self._heard)
         self._say()
 
     async def child_finished(self, child: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> Decision:
-        """Start a failed watcher again some times, then go on without it."""
+        """Start a failed watcher again ``retries`` times, then continue without it."""
         if status is BehaviorStatus.FAILURE:
             self._failures[child] += 1
-            self.tell(child, f"failed: {payload.get('detail', 'no reason given')}", LogLevel.WARNING)
+            self.publish_event(child, f"failed: {payload.get('detail', 'no reason given')}", LogLevel.WARNING)
         retry = status is BehaviorStatus.FAILURE and self._failures[child] <= self.parameters.retries
         return Decision.RETRY if retry else Decision.NEXT
 

@@ -1,6 +1,6 @@
-"""Watch for motion: look through one robot's camera and say when something moves.
+"""Watch for motion: detect motion in the pictures of one robot and publish it.
 
-Source: RAM 2002, "Experiments": Scouts watch a room for anything that moves.
+Source: RAM 2002, "Experiments": Scouts watch a room for motion.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
     """Parameters of ``WatchForMotion``.
 
     Attributes:
-        again_after_s: Motion that goes on is told again after this long, mission seconds.
-        frames_wanted: Pictures of one slice in which the detector is certain of motion, before it is told.
-        view_s: Shortest time for which what is looked for is in view, mission seconds; above 0 the behavior works
-            out the run times it asks for, none longer than the tree's; 0: it asks for those of the tree.
+        again_after_s: Time after which continuing motion is published again, mission seconds.
+        frames_wanted: Number of pictures of one slice with certain motion before it is published.
+        view_s: Shortest time for which a target is in view, mission seconds. Above 0 the behavior computes its run
+            times, none longer than the tree's; 0: it asks for those of the tree.
         settling_s: Time from a switch to the first picture, mission seconds; for that.
         frame_rate_hz: Pictures a second; for that.
-        clean_share: Share of the pictures that tell something, above 0 to 1; for that.
-        seed: Of the run times, which are drawn.
+        clean_share: Share of usable pictures, above 0 to 1; for that.
+        seed: Seed of the drawn run times.
     """
 
     again_after_s: float = 1.0
@@ -52,7 +52,7 @@ class WatchParameters(BehaviorParameters, frozen=True, kw_only=True):
 
 
 class WatchForMotion(Behavior[WatchParameters]):
-    """Publishes ``MotionSeen`` under its own address; remembers its view while it is suspended."""
+    """Publishes ``MotionSeen`` under its own address; keeps its view while it is suspended."""
 
     parameters_type = WatchParameters
 
@@ -67,7 +67,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._maximum_s = 0.0
 
     def need(self) -> ArcNeed | None:
-        """Claim for as long as is of use for what is looked for."""
+        """Claim with the computed run times."""
         need, given = super().need(), self.parameters
         if need is not None and given.view_s > 0:
             self._times = run_times(given, need.minimum_runtime_s)
@@ -80,7 +80,7 @@ class WatchForMotion(Behavior[WatchParameters]):
         return need
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:
-        """Adapt to what changed while others had the robot, and draw for how long to ask next."""
+        """Adapt to changes since the last grant, and draw the next run time."""
         self._robot = rcs.get("scout", "") or self._robot
         self._detector.swapped_in()
         self._certain_frames, self._told_in_slice = 0, False
@@ -92,11 +92,11 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._say()
 
     async def suspended(self, reason: str, by: str) -> None:
-        """Say what was seen until now."""
+        """Report the counts."""
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def see(self, frame: Frame) -> None:
-        """Look for motion in the picture, publish it as soon as it is certain, and again while it goes on."""
+        """Detect motion in the picture; publish it when it is certain, and again while it continues."""
         pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
         self._robot = frame.robot
         blob = self._detector.look(pixels)
@@ -107,7 +107,7 @@ class WatchForMotion(Behavior[WatchParameters]):
             self._events += 1
             region = Region(blob.x_px, blob.y_px, blob.width_px, blob.height_px)
             self.bus.publish(self.address, Conversation.EVENTS, MotionSeen(frame.captured_s, frame.robot, region))
-            self.tell(
+            self.publish_event(
                 frame.robot, f"motion seen through {frame.robot} at x {blob.x_px}, y {blob.y_px}", LogLevel.NOTICE
             )
             self.tell_parent(self._found())
@@ -117,11 +117,11 @@ class WatchForMotion(Behavior[WatchParameters]):
         self._ask_for_more(frame.captured_s)
 
     def statistics(self) -> dict[str, float]:
-        """Return the base's counters, the events, and the pictures that were too torn to judge."""
+        """Return the base's counters, the events, and the pictures that were too torn to use."""
         return {**super().statistics(), "events": self._events, "frames_rejected": self._detector.rejected}
 
     def _ask_for_more(self, captured_s: float) -> None:
-        """Have the slice last until it is certain, if something was glimpsed; what is told needs no more."""
+        """Extend the slice until motion is certain, if there was a glimpse that is not published yet."""
         votes = self._detector.votes
         if self._told_in_slice or not votes or not votes[-1]:
             return
@@ -135,8 +135,8 @@ class WatchForMotion(Behavior[WatchParameters]):
         assert self.arc is not None  # noqa: S101  pictures come through it
         try:
             await self.arc.want_longer(until_s)
-        except (Refusal, LinkError) as error:  # then it ends as it would have
-            self.story.note(self.arc.arc, f"its slice was not made longer: {error}")
+        except (Refusal, LinkError) as error:  # then the slice ends in time
+            self.story.note(self.arc.arc, f"its slice was not extended: {error}")
 
     async def _ask_next_for(self, minimum_s: float) -> None:
         assert self.arc is not None  # noqa: S101  it was granted
@@ -156,11 +156,11 @@ class WatchForMotion(Behavior[WatchParameters]):
 
 
 def run_times(given: WatchParameters, given_s: float) -> RunTimes:
-    """Return which run times are of use for what is in view for ``given.view_s``.
+    """Return the best run times for a target that is in view for ``given.view_s``.
 
     Args:
-        given: Of the behavior.
-        given_s: Run time the mission gives, seconds.
+        given: Parameters of the behavior.
+        given_s: Run time in the mission file, seconds.
 
     Raises:
         ValueError: ``view_s`` is not finite, or ``given_s`` is not above 0.
@@ -176,5 +176,5 @@ def run_times(given: WatchParameters, given_s: float) -> RunTimes:
 
 
 def frames_s(given: WatchParameters, sound_frames: int) -> float:
-    """Return how long it takes until there are so many pictures that tell something, seconds, on average."""
+    """Return the average time until this many usable pictures, seconds."""
     return sound_frames / (given.frame_rate_hz * given.clean_share)

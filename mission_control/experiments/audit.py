@@ -1,6 +1,6 @@
-"""Whether grants and transmitters agree: at each recorded switch, and that no frequency ever had two.
+"""Audit: grants and transmitters must agree at each recorded switch, and no frequency may have two transmitters.
 
-Pure. What the RC manager decided (the schedule trace) is laid beside what the robots' transmitters did.
+Pure. It compares the RC manager's decisions (the schedule trace) with the robots' transmitters.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 FRAME_S = 1.0 / 30.0
-SLACK_S = 2 * FRAME_S + 0.01  # chosen: packets take milliseconds and are obeyed, and told of, at the next frame
+SLACK_S = 2 * FRAME_S + 0.01  # chosen: packets take milliseconds and take effect at the next frame
 
 
 @dataclass(frozen=True, slots=True)
 class Transmitting:
-    """From a frame on, these robots transmit, until the next of these.
+    """The transmitting robots from one frame until the next sample.
 
     Attributes:
         at_s: Mission time of the frame.
@@ -28,10 +28,10 @@ class Transmitting:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What came of it.
+    """The result of the audit.
 
     Attributes:
-        switches: Grants and ends of holds that were looked at.
+        switches: Number of compared grants and ends of holds.
         jammed: Frames from which on a frequency had two transmitters.
         broken: One line for each disagreement.
     """
@@ -54,17 +54,17 @@ def agreement(
     frequencies: Iterable[str],
     until_s: float,
 ) -> Agreement:
-    """Compare each grant and each end of a hold with what transmitted then.
+    """Compare each grant and each end of a hold with the transmitters at that time.
 
-    At a grant the ARC's robot transmits on the ARC's frequency, and goes on until it is revoked; from two frames
-    after the hold's end on until its next connection it does not transmit.
+    From a grant until its revocation, the ARC's robot transmits on the ARC's frequency. From two frames after the end
+    of the hold until its next connection, it does not transmit.
 
     Args:
         trace: Lines of the schedule trace, in order.
-        samples: What transmitted, by each frame in which that changed, in order.
+        samples: Transmitting robots, one sample for each frame with a change, in order.
         robots: Names of the Scouts.
         frequencies: Names of the video frequencies.
-        until_s: Time of the last sample that could have been taken; later switches are not judged.
+        until_s: Time of the last possible sample; later switches are ignored.
     """
     scouts, channels = set(robots), set(frequencies)
     holds: dict[str, _Hold] = {}
@@ -101,7 +101,7 @@ def agreement(
 
 
 def _during(samples: Sequence[Transmitting], begin_s: float, end_s: float) -> Iterable[Transmitting]:
-    """Yield the sample that holds at the beginning and those taken before the end."""
+    """Yield the valid sample at the begin and all samples before the end."""
     for number, sample in enumerate(samples):
         over = samples[number + 1].at_s <= begin_s if number + 1 < len(samples) else False
         if not over and sample.at_s < end_s:

@@ -22,9 +22,9 @@ app = typer.Typer(
 )
 
 MOST_TRIALS = 1_000_000  # chosen: days of work
-LARGEST_SEED = 2**32 - 1  # as numpy has it
-MOST_JOBS = 1024  # chosen: more cores than any machine this was tried on
-PIPE_WIDTH = 200  # chosen: into a file or pipe nothing is cut; no table is wider
+LARGEST_SEED = 2**32 - 1  # the limit of numpy
+MOST_JOBS = 1024  # chosen: more cores than any tested machine
+PIPE_WIDTH = 200  # chosen: no table is wider, so files and pipes get whole tables
 
 
 class _Exit(IntEnum):
@@ -33,13 +33,13 @@ class _Exit(IntEnum):
 
 
 class Policy(StrEnum):
-    """How run time is asked for."""
+    """Policy of the requests for run time."""
 
     PAPER = "paper"
     ADAPTIVE = "adaptive"
 
 
-class Target(StrEnum):
+class TargetKind(StrEnum):
     """What passes."""
 
     PIONEER = "pioneer"
@@ -47,7 +47,7 @@ class Target(StrEnum):
 
 
 class Order(StrEnum):
-    """In which order watchers and consoles have their turns."""
+    """Order of the turns of watchers and consoles."""
 
     ACTIVE_FIRST = "active-first"
     EXTRA_FIRST = "extra-first"
@@ -73,7 +73,7 @@ def surveillance(
     extra: Annotated[list[int] | None, typer.Option("--extra", help="Scouts that consoles hold; repeatable.")] = None,
     channels: Annotated[int | None, typer.Option("--channels", help="Video frequencies.")] = None,
     policy: Annotated[list[Policy] | None, typer.Option("--policy", help="How to ask; repeatable.")] = None,
-    target: Annotated[Target | None, typer.Option("--target", help="What passes.")] = None,
+    target: Annotated[TargetKind | None, typer.Option("--target", help="What passes.")] = None,
     speed: Annotated[list[float] | None, typer.Option("--speed", help="Of the target, m/s; repeatable.")] = None,
     slice_s: Annotated[float | None, typer.Option("--slice", help="Minimum run time of all, seconds.")] = None,
     order: Annotated[Order | None, typer.Option("--order", help="Whose turns come first.")] = None,
@@ -90,7 +90,7 @@ def surveillance(
         bool, typer.Option("--mission-file", help="Print the mission file of the first condition, run nothing.")
     ] = False,
 ) -> None:
-    """Let something pass Scouts that watch in turns; count how often it is seen.
+    """Let a target pass Scouts that watch in turns; count how often it is detected.
 
     Without options for a condition: the published conditions of both papers, and the adaptive policy beside them.
     """
@@ -138,7 +138,7 @@ def load(
     plot: PlotTo = None,
     traces: TracesTo = None,
 ) -> None:
-    """Put 2 to 10 robots on one channel, two of which watch; count how often what passes is seen."""
+    """Put 2 to 10 robots on one channel, two of which watch; count how often a passing target is detected."""
     from mission_control.experiments.load import load_conditions
 
     conditions = list(load_conditions(policy.value, channels, driven))

@@ -1,4 +1,4 @@
-"""Conditions of the surveillance experiment, and which of them the papers measured. Pure."""
+"""Conditions of the surveillance experiment, with the papers' results. Pure."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from mission_control.experiments.geometry import EXTRAS, PASSAGES, SLICE_S, WATC
 Policy = Literal["paper", "adaptive"]
 Order = Literal["active-first", "extra-first", "interleaved"]
 
-CONSOLE_SLICE_S = 2.0  # chosen: half the time a Pioneer is in view, so that none hides it; one can steer by sight
+CONSOLE_SLICE_S = 2.0  # chosen: half the time a Pioneer is in view, so that no slice hides it
 MOST_CHANNELS = 4  # chosen: the Scouts of the papers had two
 
 
 class ImpossibleCondition(Refusal):
-    """No such experiment can be made."""
+    """The condition is impossible."""
 
     code = "experiment.condition"
     remedy = "See 'scout-backbone experiment surveillance --help' for what is possible."
 
 
 class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What differs between runs; all else is the one geometry.
+    """The values that differ between runs; the geometry is always the same.
 
     Attributes:
         active: Scouts that watch.
         extra: Scouts that consoles hold, of the mission's own priority.
         channels: Video frequencies, each with a framegrabber.
-        policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers work out their run times, draw
-            each, and ask for more on a glimpse, equals get equal time, and consoles ask for at most
-            ``CONSOLE_SLICE_S`` and want no air while nobody drives.
+        policy: ``paper``: all ask for ``slice_s``, in turns; ``adaptive``: watchers compute and draw their run times
+            and ask for an extension at a glimpse, equals get equal time, and consoles ask for at most
+            ``CONSOLE_SLICE_S`` and want no time while they do not drive.
         target: ``pioneer`` or ``person``.
-        speed_m_s: Of the target; 0: that of the papers.
-        slice_s: Run time that watchers and consoles are given, seconds.
-        order: In which order watchers and consoles come, and so have their turns.
-        driven: Share of the time in which somebody drives at each console.
-        noise: Of the picture: 0 none, 1 as the papers tell.
-        frames_wanted: Certain pictures of one slice before a watcher tells.
+        speed_m_s: Speed of the target; 0: the papers' speed.
+        slice_s: Run time of watchers and consoles in the mission file, seconds.
+        order: Order of the claims of watchers and consoles, and so of their turns.
+        driven: Share of the time in which each console drives.
+        noise: Noise of the pictures: 0 none, 1 as in the papers.
+        frames_wanted: Number of pictures of one slice with certain motion before a watcher publishes it.
     """
 
     active: Annotated[int, msgspec.Meta(ge=1, le=len(WATCHERS))] = 2
@@ -57,7 +57,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     @property
     def passage(self) -> Passage:
-        """What passes, at the speed of this condition."""
+        """The passage of the target, at the speed of this condition."""
         usual = PASSAGES[self.target]
         if not self.speed_m_s:
             return usual
@@ -70,17 +70,17 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Names of all Scouts: those that watch first."""
+        """Names of all Scouts, watching ones first."""
         return tuple(f"scout{number}" for number in range(1, self.active + self.extra + 1))
 
     @property
     def watching(self) -> tuple[str, ...]:
-        """Names of those that watch."""
+        """Names of the watching Scouts."""
         return self.robots[: self.active]
 
     @property
     def driven_robots(self) -> tuple[str, ...]:
-        """Names of those that consoles hold."""
+        """Names of the Scouts that consoles hold."""
         return self.robots[self.active :]
 
     @property
@@ -105,7 +105,7 @@ class Condition(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
                 )
 
     def title(self) -> str:
-        """Return what is said of it in one line."""
+        """Return the condition in one line."""
         words = [f"{self.active} active, {self.extra} extra, {self.target} {self.passage.speed_m_s:g} m/s"]
         words += [f"{self.channels} channels"] * (self.channels > 1)
         words += [f"driven {self.driven:.0%}"] * (self.extra > 0 and self.driven < 1)
@@ -120,7 +120,7 @@ def checked(**wanted: object) -> Condition:
     """Return the condition of these values.
 
     Raises:
-        ImpossibleCondition: One of them is not possible; the text says which and why.
+        ImpossibleCondition: A value is impossible; the detail names it with the reason.
     """
     try:
         return msgspec.convert(wanted, Condition)
@@ -129,13 +129,13 @@ def checked(**wanted: object) -> Condition:
 
 
 class Published(msgspec.Struct, frozen=True):
-    """What a paper measured under a condition.
+    """A paper's result under a condition.
 
     Attributes:
-        source: Where.
-        detected: Trials in which the target was detected.
-        trials: Of so many; 0: the paper gives no count.
-        said: As the paper says it.
+        source: Paper and figure.
+        detected: Number of trials with a detection.
+        trials: Number of trials; 0: the paper gives no count.
+        said: The paper's words.
     """
 
     source: str
@@ -170,4 +170,4 @@ BESIDE: Sequence[Condition] = tuple(
     for policy in ("paper", "adaptive")
 )
 EVERYTHING: Sequence[Condition] = (*PAPERS, *QUARTER, *ALWAYS, *BESIDE)
-"""What is measured without further options."""
+"""The conditions without further options."""

@@ -1,4 +1,4 @@
-"""The one geometry of all surveillance experiments: who stands where, what passes, and when it is in view.
+"""The geometry of all surveillance experiments: places of Scouts, passages of targets, and times in view.
 
 Pure. The room is that of the shipped ``mission.xml``; no number here differs between conditions. The papers
 do not give camera poses; these fit all their rates (SCHEDULING.md, section 6).
@@ -15,9 +15,9 @@ Interval = tuple[float, float]
 ROOM_M = (9.0, 6.0)
 PATH: tuple[Point, Point] = ((0.0, 3.0), (9.0, 3.0))
 WATCHERS: tuple[Point, ...] = ((0.72, 1.764), (7.20, 0.527), (3.40, 2.050), (5.60, 2.050), (1.90, 2.050))
-"""Where watching Scouts stand, all looking along +y; the first two are the papers'."""
+"""Places of watching Scouts, which all look along +y; the first two are the papers'."""
 EXTRAS: tuple[Point, ...] = tuple((4.5 + 0.75 * column, row) for row in (1.2, 1.9) for column in (0, 1, -1, -2, -3))
-"""Where Scouts stand that people drive: in nobody's view, and not in the target's way."""
+"""Places of driven Scouts: outside all views, and not on the target's path."""
 VIEW_RAD = math.radians(40.0)
 """Horizontal angle of view of a Scout's camera (``scout_model.dimensions``)."""
 FRAME_RATE_HZ = 15.0
@@ -28,13 +28,13 @@ SLICE_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Passage:
-    """What passes.
+    """The passage of a target.
 
     Attributes:
         shape: ``pioneer`` or ``person``.
-        speed_m_s: Along the path.
-        there_and_back: True: it turns at the path's end and comes back.
-        radius_m: Half of its width, as far as it matters for being in view.
+        speed_m_s: Speed along the path.
+        there_and_back: True: it turns at the path's end and returns.
+        radius_m: Half of its visible width.
     """
 
     shape: str
@@ -57,11 +57,11 @@ PASSAGES = {passage.shape: passage for passage in (PIONEER, PERSON)}
 
 
 def seen_along(watcher: Point, radius_m: float) -> Interval:
-    """Return from where to where along the path something of this radius is in the watcher's view, at least in part.
+    """Return the part of the path on which a target of this radius is at least partly in the watcher's view.
 
     Args:
-        watcher: Its place; it looks along +y.
-        radius_m: Of a disc around the target's place.
+        watcher: Place of the watcher, which looks along +y.
+        radius_m: Radius of a disc around the target's place.
 
     Returns:
         First and last distance from the path's beginning, metres, within the path.
@@ -82,9 +82,9 @@ def in_view(passage: Passage, watcher: Point, *, least_m: float = 0.0) -> list[I
     """Return when the passing target is in the watcher's view, seconds from its departure, in order.
 
     Args:
-        passage: What passes.
-        watcher: Its place.
-        least_m: So much of the target's width must be in view.
+        passage: The passage of the target.
+        watcher: Place of the watcher.
+        least_m: Width of the target that must be in view.
     """
     first_m, last_m = seen_along(watcher, passage.radius_m)
     edge_m = least_m / math.cos(VIEW_RAD / 2)
@@ -104,5 +104,5 @@ def shortest_view_s(passage: Passage, watcher: Point) -> float:
 
 
 def is_in_view(passage: Passage, watcher: Point, since_departure_s: float) -> bool:
-    """Say whether the target is in the watcher's view at this time, at least in part."""
+    """Return whether the target is at least partly in the watcher's view at this time."""
     return any(begin_s <= since_departure_s <= end_s for begin_s, end_s in in_view(passage, watcher))

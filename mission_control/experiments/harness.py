@@ -1,4 +1,4 @@
-"""Many trials on all cores: the same trials give the same results, however many processes share them."""
+"""Many trials on all cores: the same trials give the same results, with any number of processes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import TypeVar
 Order = TypeVar("Order")
 Result = TypeVar("Result")
 
-BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and pictures once drawn are used again
+BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and cached pictures are used again
 
 Progress = Callable[[int, int], None]
-"""Called with how many are done, and how many there are."""
+"""Callback with the number of finished trials and of all trials."""
 
 
 def run_all(
@@ -24,16 +24,16 @@ def run_all(
     jobs: int = 0,
     progress: Progress | None = None,
 ) -> list[Result]:
-    """Do all the work and return its results in the order of the orders.
+    """Run the work for each order and return the results in the same order.
 
     Args:
-        work: A function of a module, which other processes can import; what it returns depends on its order alone.
-        orders: One for each result; they and the results can be pickled.
+        work: A function of a module, which other processes can import; its result depends only on its order.
+        orders: One for each result; orders and results can be pickled.
         jobs: Processes; 0: one a core; 1: this one.
-        progress: Told after each result.
+        progress: Called after each result.
 
     Raises:
-        Exception: Whatever the work raised first; nothing more is begun.
+        Exception: The first exception of the work; no further order is begun.
     """
     results: list[Result] = []
     for result in _results(work, orders, jobs or os.cpu_count() or 1):

@@ -1,4 +1,4 @@
-"""How sure a rate is that was counted: Wilson's interval and standard errors. Pure."""
+"""Confidence of a counted rate: Wilson's interval and standard errors. Pure."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ Z95 = 1.959963984540054  # the normal distribution's 97.5 % point
 
 
 def wilson(detected: int, trials: int, z: float = Z95) -> tuple[float, float]:
-    """Return the interval in which the true rate lies, by Wilson's score.
+    """Return Wilson's score interval of the true rate.
 
     Source: E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927.
 
     Args:
         detected: Successes, 0 to ``trials``.
         trials: Above 0.
-        z: How many standard deviations; the default gives 95 %.
+        z: Number of standard deviations; the default gives 95 %.
 
     Raises:
         ValueError: The numbers are no count of successes.
@@ -33,10 +33,10 @@ def wilson(detected: int, trials: int, z: float = Z95) -> tuple[float, float]:
 
 
 def standard_errors_apart(detected: int, trials: int, predicted: float) -> float:
-    """Return how many standard errors a counted rate is from a predicted one.
+    """Return the distance of a counted rate from a predicted one, in standard errors.
 
-    The error is that of the prediction if it were true, but at least that of half a success, so that a prediction
-    of 0 or 1 can be missed by one.
+    The standard error is that of the predicted rate, but at least that of half a success, so that one miss of a
+    prediction of 0 or 1 is no disagreement.
 
     Example:
         >>> round(standard_errors_apart(60, 100, 0.5), 6)

@@ -1,4 +1,4 @@
-"""How detection falls with the number of robots on one channel: the curve of IROS 2001's conclusion.
+"""Load experiment: the detection rate over the number of robots on one channel, as in IROS 2001's conclusion.
 
 Source: IROS 2001, "Conclusions": one channel is of no use beyond about 8 or 9 robots. S107.
 """

@@ -1,4 +1,4 @@
-"""The mission file of a condition: what one trial runs is a mission like any other, checked like any other."""
+"""The mission file of a condition: a trial runs an ordinary, checked mission."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mission_control.experiments.geometry import (
 )
 
 MISSION_PRIORITY = 10
-"""Of the mission among the consoles, and of the consoles that hold the extra Scouts: they are equals."""
+"""Priority of the mission and of the consoles that hold the extra Scouts, which are equals."""
 WORLD = "world"
 FOR_EVER_S = 3600.0  # chosen: longer than any trial; the target passes once
 PERIOD_S, PACKET_TIME_S = 0.1, 0.002  # mission.xml: ten packets a second of two milliseconds
@@ -35,7 +35,7 @@ def watcher_of(robot: str) -> str:
 
 
 def mission_text(condition: Condition) -> str:
-    """Return the mission file of this condition. A target stands in it that never departs: trials say when it does."""
+    """Return the mission file of this condition. Its target never departs; each trial sets the departure."""
     return "\n".join(_lines(condition)) + "\n"
 
 
@@ -52,8 +52,8 @@ def mission_of_trial(condition: Condition, world_seed: int, departs_s: float) ->
     """Return the mission of one trial.
 
     Args:
-        condition: What is tried.
-        world_seed: Of everything random in the world and on the air.
+        condition: The condition.
+        world_seed: Seed of all random processes of world and air.
         departs_s: World time at which the target departs.
     """
     mission = mission_of(condition)

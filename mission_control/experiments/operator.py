@@ -1,7 +1,7 @@
-"""A console of an experiment: somebody who drives one Scout about for a while, rests, and drives again.
+"""Operator: a console of an experiment, which drives one Scout for a while, rests, and drives again.
 
-It claims its ARC as every console does, through the one door, and commands while it is granted and somebody
-drives. Nobody looks at its pictures: it holds a robot and a video frequency, but no framegrabber.
+It claims its ARC through ``arc_client``, as every console does, and sends commands during grants in its phases of
+driving. It needs no pictures, so it holds a robot and a video frequency, but no framegrabber.
 
 Source: IROS 2001, "Experiments": extra Scouts are teleoperated through consoles that hold no framegrabber.
 """
@@ -46,10 +46,10 @@ class OperatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
         minimum_runtime_s: Shortest useful time, seconds.
         period_s: Interval between radio packets, seconds.
         packet_time_s: Air time of one packet, seconds.
-        driven: Share of the time in which somebody drives, 0 to 1.
-        drive_s: How long somebody drives at a time, on average, seconds.
-        yields: True: no time is wanted while nobody drives.
-        seed: Of when somebody drives.
+        driven: Share of the time in which it drives, 0 to 1.
+        drive_s: Mean duration of one phase of driving, seconds.
+        yields: True: it wants no time while it does not drive.
+        seed: Seed of the phases.
     """
 
     robot: str
@@ -63,36 +63,36 @@ class OperatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True
     seed: int = 0
 
 
-class Hands:
-    """When somebody drives: by turns, from a seed, long enough before that the beginning is like any other time.
+class DrivePhases:
+    """Alternating phases of driving and rest, from a seed; their begin lies in the past, so that all times are alike.
 
-    Pure. Driving and resting last exponentially distributed times, whose means give the wanted share.
+    Pure. The phases have exponentially distributed durations, whose means give the wanted share.
 
     Args:
-        seed: Of the times.
-        driven: Share of the time in which somebody drives.
+        seed: Seed of the durations.
+        driven: Share of the time in which the operator drives.
         drive_s: Mean time of driving, seconds.
     """
 
     def __init__(self, seed: int, driven: float, drive_s: float) -> None:
-        self._dice = Random(f"hands {seed}")
+        self._dice = Random(f"phases {seed}")
         self._driven, self._drive_s = driven, drive_s
         self.is_driving = self._dice.random() < driven
 
     def next_change_s(self) -> float:
-        """Return after how long somebody begins or stops; infinite if never. Draws anew at each call."""
+        """Return the time until the next change of phase; infinite: never. Draws at each call."""
         if self._driven in (0.0, 1.0):
             return float("inf")
         rest_s = self._drive_s * (1 - self._driven) / self._driven
         return self._dice.expovariate(1 / (self._drive_s if self.is_driving else rest_s))
 
     def change(self) -> None:
-        """Begin if nobody drives, stop if somebody does."""
+        """Change between driving and rest."""
         self.is_driving = not self.is_driving
 
 
 class Operator(Component[OperatorParameters]):
-    """One console with somebody at it, now and then."""
+    """One console that drives in some phases."""
 
     parameters_type = OperatorParameters
     accepts: ClassVar[Any] = ArcNotice
@@ -100,7 +100,7 @@ class Operator(Component[OperatorParameters]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         given = self.parameters
-        self._hands = Hands(given.seed, given.driven, given.drive_s)
+        self._phases = DrivePhases(given.seed, given.driven, given.drive_s)
         self._arc = ArcClient(bus, arc_name(bus, KIND), self)
         self._may_drive = asyncio.Event()
         self._applied = self._refused = 0
@@ -108,7 +108,7 @@ class Operator(Component[OperatorParameters]):
     async def serve(self) -> None:
         """Claim, then drive and rest."""
         self.start_task(self._drive(), "drive")
-        self.start_task(self._change(), "hands")
+        self.start_task(self._change(), "phases")
         given = self.parameters
         parameters = claim_parameters(
             self.address,
@@ -129,37 +129,37 @@ class Operator(Component[OperatorParameters]):
         return await self._arc.handle(asked.body)
 
     def statistics(self) -> dict[str, float]:
-        """Count commands that were applied, and those that came to nothing."""
+        """Count applied and failed commands."""
         return {"commands_applied": self._applied, "commands_refused": self._refused}
 
     async def arc_resumed(self, notice: Resumed) -> None:  # noqa: ARG002
-        """Drive, if somebody does; see ``ArcListener``."""
+        """Drive, in a phase of driving; see ``ArcListener``."""
         self._look()
 
     async def arc_suspending(self, notice: Suspending) -> None:
-        """Nothing to bring to rest: the radio's last packet stops the robot; see ``ArcListener``."""
+        """Do nothing, because the radio's last packet stops the robot; see ``ArcListener``."""
 
     async def arc_suspended(self, notice: Suspended) -> None:  # noqa: ARG002
-        """Drive no more; see ``ArcListener``."""
+        """Stop driving; see ``ArcListener``."""
         self._look()
 
     @property
     def _wants_nothing(self) -> bool:
-        return self.parameters.yields and not self._hands.is_driving
+        return self.parameters.yields and not self._phases.is_driving
 
     def _look(self) -> None:
-        if self._hands.is_driving and self._arc.granted is not None:
+        if self._phases.is_driving and self._arc.granted is not None:
             self._may_drive.set()
         else:
             self._may_drive.clear()
 
     async def _change(self) -> None:
         while True:
-            after_s = self._hands.next_change_s()
+            after_s = self._phases.next_change_s()
             if after_s == float("inf"):
                 return
             await self.clock.sleep_s(after_s)
-            self._hands.change()
+            self._phases.change()
             self._look()
             if self.parameters.yields:
                 await self._say_whether_wanted()
@@ -167,8 +167,8 @@ class Operator(Component[OperatorParameters]):
     async def _say_whether_wanted(self) -> None:
         try:
             await self._arc.idle(self._wants_nothing)
-        except (Refusal, LinkError) as error:  # its next change says it again
-            self.story.note(self._arc.arc, f"did not hear whether time is wanted: {error}")
+        except (Refusal, LinkError) as error:  # the next change of phase repeats it
+            self.story.note(self._arc.arc, f"did not answer whether time is wanted: {error}")
 
     async def _drive(self) -> None:
         while True:

@@ -1,4 +1,4 @@
-"""A picture of an experiment's rates, as PNG or SVG; needs the extra ``plot``."""
+"""Plot of an experiment's rates, as PNG or SVG; needs the extra ``plot``."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 from backbone.errors import Refusal
 from mission_control.experiments.conditions import PUBLISHED, Condition
 from mission_control.experiments.intervals import wilson
-from mission_control.experiments.surveillance import Outcome, Row, trials_line
+from mission_control.experiments.surveillance import ConditionRow, SurveillanceOutcome, trials_line
 
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
-"""Okabe and Ito, "Color Universal Design", 2008: told apart by every kind of color vision. Without yellow: too pale."""
+"""Okabe and Ito, "Color Universal Design", 2008: distinct for all kinds of color vision. Without yellow: too pale."""
 MARKERS = ("o", "^", "D", "v", "P", "X", "*")
-"""So that series are told apart in grey, too."""
+"""Makes series distinct in grey, too."""
 GREY = "#555555"
 SIDE_BY_SIDE = 0.035  # chosen: intervals of one load stand beside each other, and still belong to it
 LEAST_GAP = 4.5  # chosen: a line of text in percent of the picture's height
@@ -29,14 +29,14 @@ class NoPlotting(Refusal):
 
 
 class Point(NamedTuple):
-    """One rate that was counted, in percent.
+    """One counted rate, in percent.
 
     Attributes:
         extra: Number of extra robots.
-        rate: Counted.
+        rate: The rate.
         low: Lower end of its 95 % interval.
         high: Upper end.
-        predicted: By geometry and schedule alone; None: nothing is.
+        predicted: Rate predicted from geometry and schedule; None: no prediction.
     """
 
     extra: float
@@ -47,10 +47,10 @@ class Point(NamedTuple):
 
 
 def require_plotting() -> None:
-    """Return if pictures can be drawn here.
+    """Return if a plotting library is installed.
 
     Raises:
-        NoPlotting: They cannot.
+        NoPlotting: No plotting library is installed.
     """
     try:
         import_module("matplotlib")
@@ -58,13 +58,13 @@ def require_plotting() -> None:
         raise NoPlotting(f"matplotlib cannot be imported: {error}") from error
 
 
-def plot(outcome: Outcome, file: Path, title: str) -> None:
-    """Write a picture of the rates over the number of extra robots, a line for each policy and way of driving.
+def plot(outcome: SurveillanceOutcome, file: Path, title: str) -> None:
+    """Write a plot of the rates over the number of extra robots, a line for each policy and way of driving.
 
-    Each line has its name beside its end; what was tried how often, and from which seed, stands above.
+    Each line has its name beside its end; conditions, trials and seed stand above.
 
     Raises:
-        NoPlotting: There is no plotting library.
+        NoPlotting: No plotting library is installed.
         OSError: The file cannot be written.
     """
     require_plotting()
@@ -88,8 +88,8 @@ THE_PAPERS = "the papers"
 LEGEND = "bars: Wilson's 95 % intervals; dotted: predicted by geometry and schedule alone"
 
 
-def series(rows: Sequence[Row]) -> Mapping[str, Sequence[Point]]:
-    """Return the points of each line by its name; what the papers counted under these conditions comes last."""
+def series(rows: Sequence[ConditionRow]) -> Mapping[str, Sequence[Point]]:
+    """Return the points of each line by its name; the papers' counts come last."""
     found: dict[str, list[Point]] = {}
     for row in rows:
         low, high = row.interval95
@@ -105,7 +105,7 @@ def series(rows: Sequence[Row]) -> Mapping[str, Sequence[Point]]:
 
 
 def apart(heights: Sequence[float], gap: float = LEAST_GAP) -> list[float]:
-    """Return heights at least a gap apart from each other, in the same order, each near where it was.
+    """Return heights at least a gap apart, in the same order, each near its original.
 
     Example:
         >>> apart([50.0, 50.0, 10.0], 4.0)
@@ -166,7 +166,7 @@ def _name(axes: Any, shown: Mapping[str, Sequence[Point]]) -> None:
 
 
 def _beside(number: int, of: int) -> float:
-    """Return how far the points of this line stand beside their load."""
+    """Return the sideways offset of this line's points."""
     return SIDE_BY_SIDE * (number - (of - 1) / 2)
 
 

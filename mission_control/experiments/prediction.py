@@ -1,8 +1,8 @@
-"""What the geometry alone promises: schedule phases, views, settling and the frames a detector needs, drawn many times.
+"""Prediction from geometry alone: schedule phases, views, settling and the frames of a detector, drawn many times.
 
-Pure; no component runs, no picture is drawn. It knows of the system what stands in its documents: slices in turn
-or of equal time, their settling, the frames a detector is blind for after each swap, the certain frames wanted,
-that a glimpse makes a slice longer, and that bad frames come in bursts.
+Pure; no component runs, no picture is drawn. It uses only documented properties of the system: slices in turn or of
+equal time, their settling, the blind frames of a detector after each swap, the number of certain frames, the extension
+of a slice at a glimpse, and bursts of bad frames.
 
 Source: SCHEDULING.md, section 6: a trial's outcome depends on the phase between target and schedule, the order of
 slots, the time each view lasts, the time a picture needs to settle and the frames the detector needs. Its rule 13:
@@ -31,14 +31,14 @@ from mission_control.experiments.geometry import (
     in_view,
     shortest_view_s,
 )
-from mission_control.experiments.operator import Hands
+from mission_control.experiments.operator import DrivePhases
 from mission_control.vision.motion_detection import FAST_FRAMES, VOTERS, VOTES
 
 SAMPLES = 2000  # chosen: a standard error of 1 %, a third of that of 200 trials
 BAD_SHARE, BAD_BURST_S = 0.25, 0.15  # SCHEDULING.md, section 6, at noise 1
 LEAST_M = 0.05  # measured: a region becomes, or ceases to be, large enough with 0.01 to 0.08 m of a target in view
-DRIVE_S = 5.0  # of the consoles' parameters
-TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: by less than that nobody is ahead of anybody
+DRIVE_S = 5.0  # from the consoles' parameters
+TOLERANCE_S = 0.05  # SCHEDULING.md, section 5: smaller differences of time do not count
 
 
 @lru_cache(maxsize=256)
@@ -49,7 +49,7 @@ def predicted(condition: Condition, samples: int = SAMPLES) -> float:
 
 
 def watcher_parameters(condition: Condition, watcher: Point) -> WatchParameters:
-    """Return what a behavior is told that watches from this place."""
+    """Return the parameters of a behavior that watches from this place."""
     if condition.policy == "paper":
         return WatchParameters(frames_wanted=condition.frames_wanted)
     return WatchParameters(
@@ -61,14 +61,14 @@ def watcher_parameters(condition: Condition, watcher: Point) -> WatchParameters:
 
 
 def departs_s(condition: Condition, phase: float) -> float:
-    """Return when the target departs after the schedule's first turn began, seconds.
+    """Return the target's departure after the begin of the schedule's first turn, seconds.
 
     Slices in turn: within the first round. Equal time: within a round that begins half a round after the first turn,
     when drawn run times have come apart.
 
     Args:
-        condition: What is tried.
-        phase: 0 to 1, of a round: one slice of each, or as many of each as make their times equal.
+        condition: The condition.
+        phase: Phase, 0 to 1, of a round: one slice of each, or as many of each as make their times equal.
     """
     asked_s = [fmean((times.shortest_s, times.longest_s)) for times in _asked(condition)]
     longest_s = max(asked_s)
@@ -78,7 +78,7 @@ def departs_s(condition: Condition, phase: float) -> float:
 
 
 class Bursts:
-    """Which frames are bad: a chain of two states with the wanted share and mean length of bad ones."""
+    """Bursts of bad frames: a Markov chain of two states with the given share and mean length of bad frames."""
 
     def __init__(self, noise: float, dice: Random) -> None:
         self._dice = dice
@@ -94,7 +94,7 @@ class Bursts:
 
 
 def _asked(condition: Condition) -> Iterator[RunTimes]:
-    """Yield what watchers and consoles ask for, in the order of their first turns."""
+    """Yield the run times of watchers and consoles, in the order of their first turns."""
     for robot in condition.in_turn:
         parameters = None
         if robot in condition.watching:
@@ -112,13 +112,13 @@ class _Claimant:
     asks_s: float
     stamp: tuple[float, int]
     views: Sequence[Interval] = ()
-    hands: Hands | None = None
+    phases: DrivePhases | None = None
     changes_s: float = math.inf
     had_s: float = 0.0
 
     @property
     def wants(self) -> bool:
-        return self.hands is None or self.hands.is_driving
+        return self.phases is None or self.phases.is_driving
 
 
 @dataclass(slots=True)
@@ -138,14 +138,14 @@ class _Slice:
             self.certain += is_seen and sum(self.votes) >= VOTES
 
     def missing(self, wanted: int) -> int:
-        """Return how many certain or nearly certain frames must come yet; 0 as long as nothing is glimpsed."""
+        """Return the number of missing certain or nearly certain frames; 0 without a glimpse."""
         if not self.votes or not self.votes[-1]:
             return 0
         return max(0, VOTES - 1 - sum(self.votes)) + wanted - self.certain
 
 
 def _is_detected(condition: Condition, dice: Random) -> bool:
-    """Say whether a passage at a random phase is detected."""
+    """Return whether a passage at a random phase is detected."""
     departs = departs_s(condition, dice.random())
     bursts = Bursts(condition.noise, dice)
     channels: list[list[_Claimant]] = [[] for _ in range(condition.channels)]
@@ -156,15 +156,15 @@ def _is_detected(condition: Condition, dice: Random) -> bool:
             views = in_view(condition.passage, place, least_m=LEAST_M)
             one.views = [(begin_s + departs, end_s + departs) for begin_s, end_s in views]
         elif condition.policy == "adaptive":
-            one.hands = Hands(dice.randrange(2**31), condition.driven, DRIVE_S)
-            one.changes_s = one.hands.next_change_s()
+            one.phases = DrivePhases(dice.randrange(2**31), condition.driven, DRIVE_S)
+            one.changes_s = one.phases.next_change_s()
         min(channels, key=len).append(one)
     over_s = departs + condition.passage.lasts_s
     return any(_Channel(condition, claimants, bursts, dice).detects(over_s) for claimants in channels)
 
 
 class _Channel:
-    """One video frequency and those who share it."""
+    """One video frequency and its claimants."""
 
     def __init__(self, condition: Condition, claimants: list[_Claimant], bursts: Bursts, dice: Random) -> None:
         self._condition, self._claimants, self._bursts, self._dice = condition, claimants, bursts, dice
@@ -174,7 +174,7 @@ class _Channel:
         self._served = len(claimants)
 
     def detects(self, over_s: float) -> bool:
-        """Let them run until then, one after the other; return whether one of them detects the target."""
+        """Run the claimants until this time, one after the other; return whether one of them detects the target."""
         now_s = 0.0
         while now_s < over_s:
             self._catch_up(now_s)
@@ -192,7 +192,7 @@ class _Channel:
                 self._running, self._slice = chosen, _Slice(now_s + chosen.times.maximum_s)
                 chosen.asks_s = chosen.times.drawn_s(self._dice)
             end_s = now_s + asked_s
-            if chosen.hands is not None:
+            if chosen.phases is not None:
                 end_s = min(end_s, max(now_s, chosen.changes_s))
             elif chosen.views:
                 end_s, is_certain = self._watch(chosen, now_s, end_s)
@@ -203,7 +203,7 @@ class _Channel:
         return False
 
     def _seniority(self, one: _Claimant, rivals: Sequence[_Claimant], now_s: float) -> tuple[bool, float, float, int]:
-        """Return the key among equals: smaller comes first. Who runs and had its slice comes after its equals."""
+        """Return the sort key among equals, smallest first. A claimant after its slice comes after its equals."""
         is_running = one is self._running
         stamp = (now_s, 0) if is_running else one.stamp
         if self._condition.policy == "paper":
@@ -213,12 +213,12 @@ class _Channel:
         return (is_late, round(deadline_s, 6), *stamp)
 
     def _catch_up(self, now_s: float) -> None:
-        """Let consoles begin and stop that did until now; who comes again has no credit for the time it was away."""
+        """Apply the consoles' changes of phase until now; a returning console has no credit for its rest."""
         for one in self._claimants:
-            while one.hands is not None and one.changes_s <= now_s:
-                one.hands.change()
-                one.changes_s += one.hands.next_change_s()
-                if one.hands.is_driving:
+            while one.phases is not None and one.changes_s <= now_s:
+                one.phases.change()
+                one.changes_s += one.phases.next_change_s()
+                if one.phases.is_driving:
                     others_s = [other.had_s for other in self._claimants if other is not one and other.wants]
                     one.had_s = max(one.had_s, fmean(others_s)) if others_s else one.had_s
                     self._served += 1

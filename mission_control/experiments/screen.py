@@ -1,4 +1,4 @@
-"""What the terminal shows of an experiment: tables and a progress bar."""
+"""Screen of an experiment: tables and a progress bar for the terminal."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from mission_control.experiments.conditions import PUBLISHED
-from mission_control.experiments.harness import Progress as Told
+from mission_control.experiments.harness import Progress as OnProgress
 from mission_control.experiments.intervals import wilson
 from mission_control.experiments.servoing import ServoOutcome, ServoTrial
-from mission_control.experiments.surveillance import Outcome, Row, trials_line
+from mission_control.experiments.surveillance import ConditionRow, SurveillanceOutcome, trials_line
 
 AGREES_WITHIN = 3.0
 """Standard errors between rate and prediction that are no disagreement."""
@@ -26,8 +26,8 @@ BANDS_DEG = (15.0, 30.0, 45.0)
 """Starts off the zero-angle line, in rows of the table."""
 
 
-def table(outcome: Outcome, title: str) -> Table:
-    """Return the rows as a table: ours, the prediction, and what the papers say beside it."""
+def table(outcome: SurveillanceOutcome, title: str) -> Table:
+    """Return the rows as a table: counted rates, predictions and the papers' results."""
     headline = f"{title}: {trials_line(outcome)}"
     found = Table(title=headline, title_justify="left", caption=EXPLAINED, caption_justify="left")
     for heading in ("condition", "policy"):
@@ -49,8 +49,8 @@ def table(outcome: Outcome, title: str) -> Table:
     return found
 
 
-def summary(outcome: Outcome) -> str:
-    """Return how long it took and whether grants and transmitters agreed, one line."""
+def summary(outcome: SurveillanceOutcome) -> str:
+    """Return the duration and the agreement of grants and transmitters, one line."""
     switches = sum(row.switches for row in outcome.rows)
     wrong = sum(len(row.disagreements) for row in outcome.rows)
     jammed = sum(row.jammed_frames for row in outcome.rows)
@@ -64,15 +64,15 @@ def summary(outcome: Outcome) -> str:
 
 
 @contextmanager
-def progress_bar(console: Console, what: str) -> Iterator[Told]:
-    """Give a function to be told of progress, which the console shows until the end of the block."""
+def progress_bar(console: Console, what: str) -> Iterator[OnProgress]:
+    """Yield a callback for progress; the terminal shows the progress until the end of the block."""
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, of: bar.update(task, completed=done, total=of)
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: ConditionRow) -> list[str]:
     given = PUBLISHED.get(row.condition)
     paper, paper95 = "", ""
     if given is not None:
@@ -99,7 +99,7 @@ def _interval(bounds: tuple[float, float]) -> str:
 
 
 def servo_table(outcome: ServoOutcome) -> Table:
-    """Return the trials by how far off the line they began, and all together."""
+    """Return the trials grouped by their angle off the line, and all together."""
     found = Table(title=f"Servoing: 5 cm and 10°, noise {outcome.noise:g}, seed {outcome.seed}", title_justify="left")
     found.add_column("off the line")
     for heading in ("arrived", "rate", "95 %", "median time", "median off", "approached again"):

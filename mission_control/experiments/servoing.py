@@ -1,8 +1,7 @@
-"""The servoing experiment: from anywhere before a landmark to its place, in whole missions on a virtual clock.
+"""The servoing experiment: from any place before a landmark to the robot's goal, in whole missions on a virtual clock.
 
 Each trial begins up to 2.5 m from the board and up to 45 degrees off its zero-angle line, with any heading, and noise
-on the air. It succeeds if the behavior says that it has arrived and the robot truly stands within 5 cm and 10 degrees
-of its place.
+on the air. It succeeds if the behavior succeeds and the robot really stands within 5 cm and 10 degrees of its goal.
 
 Source: RAM 2002, "Visual Servoing": starts more than 2 m away; reached each time in uniform light.
 """
@@ -38,7 +37,7 @@ NEAREST_M, FARTHEST_M = 1.0, 2.5
 OFF_AXIS_RAD = math.radians(45.0)
 WITHIN_M, WITHIN_RAD = 0.05, math.radians(10.0)
 LIMIT_S = 180.0  # chosen: four times what the usual approach takes
-LOOKED_AT_EVERY_S = 0.5  # chosen: when a trial is over is not measured finer
+LOOKED_AT_EVERY_S = 0.5  # chosen: the resolution of a trial's end
 COMES_TO_REST_S = 1.0  # chosen: a body that was stopped sways for less
 ROBOT, SERVO, WORLD = "scout1", "servo", "world"
 
@@ -75,12 +74,12 @@ _MISSION = f"""<?xml version="1.0" encoding="UTF-8"?>
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
-    """Where a trial begins.
+class TrialStart:
+    """The start of a trial.
 
     Attributes:
-        range_m: From the board.
-        off_axis_rad: Off its zero-angle line, to the left of who looks from the board is positive.
+        range_m: Distance from the board.
+        off_axis_rad: Angle off its zero-angle line; left, seen from the board, is positive.
         x_m: In the room.
         y_m: In the room.
         heading_rad: In the room.
@@ -96,8 +95,8 @@ class Start:
 
 
 @dataclass(frozen=True, slots=True)
-class TrialOrder:
-    """Which trial: of the experiment's seed, and with so much noise."""
+class ServoOrder:
+    """One trial: seed of the experiment, number and noise."""
 
     seed: int
     number: int
@@ -105,18 +104,18 @@ class TrialOrder:
 
 
 class ServoTrial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What came of one trial.
+    """The result of one trial.
 
     Attributes:
-        number: Of the trial, from 0.
-        range_m: From the board, at the start.
-        off_axis_deg: At the start.
-        says_arrived: Whether the behavior succeeded.
-        off_m: How far from its place the robot ended.
-        off_deg: How far it ended turned away from the board.
-        took_s: From bring-up to its end, or to the limit.
-        approaches: How often it came near.
-        acquisitions: How often the target was found.
+        number: Number of the trial, from 0.
+        range_m: Distance from the board, at the start.
+        off_axis_deg: Angle off the line, at the start.
+        says_arrived: True if the behavior succeeded.
+        off_m: Final distance of the robot from its goal.
+        off_deg: Final angle between the robot's heading and the board.
+        took_s: Time from bring-up to its end, or to the limit.
+        approaches: Number of approaches.
+        acquisitions: Number of acquisitions of the target.
     """
 
     number: int
@@ -131,13 +130,13 @@ class ServoTrial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def succeeded(self) -> bool:
-        """Whether it ended at its place and said so."""
+        """True if the robot ended at its goal and the behavior succeeded."""
         return self.says_arrived and self.off_m <= WITHIN_M and abs(self.off_deg) <= math.degrees(WITHIN_RAD)
 
 
 @dataclass(frozen=True, slots=True)
 class ServoOutcome:
-    """What came of the experiment; the same seed gives the same but for ``wall_s``."""
+    """The result of the experiment; the same seed gives the same result except ``wall_s``."""
 
     seed: int
     noise: float
@@ -146,7 +145,7 @@ class ServoOutcome:
 
     @property
     def succeeded(self) -> int:
-        """Trials that ended at their place."""
+        """Number of trials that succeeded."""
         return sum(trial.succeeded for trial in self.trials)
 
     @property
@@ -176,12 +175,12 @@ class ServoOutcome:
         }
 
 
-def draw(seed: int, number: int) -> Start:
-    """Return where this trial begins: the same for the same arguments, whatever the noise."""
+def draw(seed: int, number: int) -> TrialStart:
+    """Return the start of this trial: the same for the same arguments, with any noise."""
     dice = Random(f"{seed} servoing {number}")
     range_m, off_axis_rad = dice.uniform(NEAREST_M, FARTHEST_M), dice.uniform(-OFF_AXIS_RAD, OFF_AXIS_RAD)
     x_m, y_m = BOARD_M[0] - range_m * math.cos(off_axis_rad), BOARD_M[1] + range_m * math.sin(off_axis_rad)
-    return Start(range_m, off_axis_rad, x_m, y_m, dice.uniform(-math.pi, math.pi), dice.randrange(2**31))
+    return TrialStart(range_m, off_axis_rad, x_m, y_m, dice.uniform(-math.pi, math.pi), dice.randrange(2**31))
 
 
 def run_servoing(
@@ -190,25 +189,25 @@ def run_servoing(
     """Run the trials.
 
     Args:
-        trials: At least 1.
-        seed: Two runs of the same give the same, whatever the jobs.
-        noise: Of the pictures: 0 none, 1 as in the papers, at most 10.
+        trials: Number of trials, at least 1.
+        seed: Seed of the experiment; the same seed gives the same result with any number of jobs.
+        noise: Noise of the pictures: 0 none, 1 as in the papers, at most 10.
         jobs: Processes; 0: one a core.
-        progress: Told after each trial.
+        progress: Called after each trial.
     """
     began_s = time.monotonic()
-    orders = [TrialOrder(seed, number, noise) for number in range(trials)]
+    orders = [ServoOrder(seed, number, noise) for number in range(trials)]
     return ServoOutcome(
         seed, noise, tuple(run_all(run_trial, orders, jobs=jobs, progress=progress)), time.monotonic() - began_s
     )
 
 
-def run_trial(order: TrialOrder) -> ServoTrial:
+def run_trial(order: ServoOrder) -> ServoTrial:
     """Run one trial to the behavior's end, or to ``LIMIT_S``."""
     return run_virtual(_play(order))
 
 
-async def _play(order: TrialOrder) -> ServoTrial:
+async def _play(order: ServoOrder) -> ServoTrial:
     start = draw(order.seed, order.number)
     async with mission_in_one_process(_mission_from(start, order.noise)) as running:
         behavior = running.component(SERVO)
@@ -248,7 +247,7 @@ def _mission() -> MissionDescription:
         return read_mission(file)
 
 
-def _mission_from(start: Start, noise: float) -> MissionDescription:
+def _mission_from(start: TrialStart, noise: float) -> MissionDescription:
     mission = _mission()
     (world,) = mission.components
     content = dict(world.parameters[WORLD])

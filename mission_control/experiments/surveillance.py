@@ -1,4 +1,4 @@
-"""The surveillance experiments of both papers, and what better run-time requests make of them.
+"""The surveillance experiments of both papers, with and without adaptive run times.
 
 Sources: IROS 2001, "Experiments", figure 4; RAM 2002, "Distributed Surveillance Task"; SCHEDULING.md, section 6.
 """
@@ -21,16 +21,16 @@ from mission_control.experiments.prediction import predicted
 from mission_control.experiments.trial import Trial, run_trial
 
 TRIALS = 200
-"""S105: of each condition, unless told otherwise."""
+"""S105: number of trials of each condition, by default."""
 
 
 class TrialOrder(msgspec.Struct, frozen=True):
     """One trial to be run.
 
     Attributes:
-        condition: What is tried.
-        seed: Of the experiment.
-        number: Of the trial.
+        condition: The condition.
+        seed: Seed of the experiment.
+        number: Number of the trial.
         trace: File for its schedule trace; empty: none.
     """
 
@@ -40,21 +40,21 @@ class TrialOrder(msgspec.Struct, frozen=True):
     trace: str = ""
 
 
-class Row(msgspec.Struct, frozen=True):
-    """What came of one condition.
+class ConditionRow(msgspec.Struct, frozen=True):
+    """The result of one condition.
 
     Attributes:
-        condition: What was tried.
-        trials: How often.
-        detected: In how many of them the target was detected.
-        predicted: Share of detections by geometry and schedule alone.
-        false_alarms: In all trials.
+        condition: The condition.
+        trials: Number of trials.
+        detected: Number of trials with a detection.
+        predicted: Share of detections predicted from geometry and schedule.
+        false_alarms: Number of false alarms, in all trials.
         switches: Grants and ends of holds compared with the transmitters, in all trials.
-        disagreements: What of that was not so, by trial.
+        disagreements: Disagreements, by trial.
         jammed_frames: Frames with two transmitters on one frequency, in all trials.
-        stale_packets: Packets of an epoch that was over, in all trials.
+        stale_packets: Packets of stale epochs, in all trials.
         simulated_s: Mission time of all trials.
-        digest: Fingerprint of all that was decided and seen, in all trials.
+        digest: Fingerprint of all decisions and events, in all trials.
     """
 
     condition: Condition
@@ -86,7 +86,7 @@ class Row(msgspec.Struct, frozen=True):
 
     @property
     def is_sound(self) -> bool:
-        """Whether grants and transmitters agreed at every switch, and no frequency ever had two."""
+        """True if grants and transmitters agreed at every switch, and no frequency ever had two transmitters."""
         return not self.disagreements and not self.jammed_frames and not self.stale_packets
 
     def to_json(self) -> dict[str, Any]:
@@ -113,11 +113,11 @@ class Row(msgspec.Struct, frozen=True):
         }
 
 
-class Outcome(msgspec.Struct, frozen=True):
-    """What came of the experiment; the same seed gives the same but for ``wall_s``."""
+class SurveillanceOutcome(msgspec.Struct, frozen=True):
+    """The result of the experiment; the same seed gives the same result except ``wall_s``."""
 
     seed: int
-    rows: list[Row]
+    rows: list[ConditionRow]
     wall_s: float
 
     @property
@@ -127,7 +127,7 @@ class Outcome(msgspec.Struct, frozen=True):
 
     @property
     def is_sound(self) -> bool:
-        """Whether it is in all rows."""
+        """True if all rows are sound."""
         return all(row.is_sound for row in self.rows)
 
     def to_json(self) -> dict[str, Any]:
@@ -142,14 +142,14 @@ class Outcome(msgspec.Struct, frozen=True):
         }
 
 
-def trials_line(outcome: Outcome) -> str:
-    """Return how often each condition was tried, and from which seed."""
+def trials_line(outcome: SurveillanceOutcome) -> str:
+    """Return the number of trials of each condition, and the seed."""
     counts = sorted({row.trials for row in outcome.rows})
     return f"{' or '.join(map(str, counts))} trials of each condition, seed {outcome.seed}"
 
 
 def geometry_json() -> Mapping[str, Any]:
-    """Return what is the same in all conditions, as plain data."""
+    """Return the geometry of all conditions as plain data."""
     return {
         "room_m": list(geometry.ROOM_M),
         "path_m": [list(point) for point in geometry.PATH],
@@ -174,16 +174,16 @@ def run_surveillance(
     jobs: int = 0,
     progress: Progress | None = None,
     traces: Path | None = None,
-) -> Outcome:
-    """Run so many trials of each condition and return what came of them.
+) -> SurveillanceOutcome:
+    """Run trials of each condition and return the results.
 
     Args:
-        conditions: What to try, in the order of the rows.
-        trials: Of each, above 0.
-        seed: Two runs of the same give the same rows, whatever the jobs.
+        conditions: The conditions, in the order of the rows.
+        trials: Number of trials of each condition, above 0.
+        seed: Seed of the experiment; the same seed gives the same rows with any number of jobs.
         jobs: Processes; 0: one a core.
-        progress: Told after each trial.
-        traces: Folder for the schedule trace of each trial; None: none are kept.
+        progress: Called after each trial.
+        traces: Folder for the schedule traces of all trials; None: no traces.
     """
     began_s = time.monotonic()
     orders = [
@@ -195,7 +195,7 @@ def run_surveillance(
     rows = [
         _row(condition, results[place * trials : (place + 1) * trials]) for place, condition in enumerate(conditions)
     ]
-    return Outcome(seed, rows, time.monotonic() - began_s)
+    return SurveillanceOutcome(seed, rows, time.monotonic() - began_s)
 
 
 def run_order(order: TrialOrder) -> Trial:
@@ -203,8 +203,8 @@ def run_order(order: TrialOrder) -> Trial:
     return run_trial(order.condition, order.seed, order.number, trace=Path(order.trace) if order.trace else None)
 
 
-def _row(condition: Condition, trials: Sequence[Trial]) -> Row:
-    return Row(
+def _row(condition: Condition, trials: Sequence[Trial]) -> ConditionRow:
+    return ConditionRow(
         condition=condition,
         trials=len(trials),
         detected=sum(trial.detected for trial in trials),

@@ -1,4 +1,4 @@
-"""One trial of the surveillance experiment: a whole mission on a virtual clock, and what passes through its room."""
+"""One trial of the surveillance experiment: a whole mission on a virtual clock, with a target that passes."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ from resource_pool.messages import WorldState
 from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
 
 CLAIMS_FROM_FRAME = 15  # chosen: half a second in which the Scouts come to rest on the floor
-AFTERWARDS_S = 0.5  # chosen: pictures are on their way for less
+AFTERWARDS_S = 0.5  # chosen: longer than the delay of a picture
 
 
 class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What came of one trial.
+    """The result of one trial.
 
     Attributes:
-        number: Of the trial, from 0.
-        detected: Whether a watcher told of motion while the target was in its view.
-        detected_s: Seconds after the target's departure at which the first such picture was taken; -1: none was.
-        seen_by: Scout that saw it; empty: none.
-        false_alarms: How often a watcher told of motion while the target was not in its view.
+        number: Number of the trial, from 0.
+        detected: True if a watcher published motion while the target was in its view.
+        detected_s: Time of the first such picture after the target's departure, seconds; -1: no detection.
+        seen_by: Scout that detected it; empty: none.
+        false_alarms: Number of times that a watcher published motion while the target was not in its view.
         switches: Grants and ends of holds compared with the transmitters.
-        disagreements: What of that was not so.
+        disagreements: Disagreements, one line each.
         jammed_frames: Frames with two transmitters on one frequency.
-        stale_packets: Packets on the air of an epoch that was over.
-        simulated_s: Mission time it took.
-        digest: Fingerprint of all decisions of the RC manager and all that was seen.
+        stale_packets: Packets of stale epochs on the air.
+        simulated_s: Its mission time.
+        digest: Fingerprint of all decisions of the RC manager and all events.
     """
 
     number: int
@@ -71,12 +71,12 @@ class Trial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """What is random about a trial.
+    """The random values of a trial.
 
     Attributes:
-        first: Which of those in turn has the first slice.
+        first: Number of the claimant with the first slice.
         departs_frame: Frames from the first connection to the target's departure.
-        world_seed: Of the world and its air.
+        world_seed: Seed of the world and its air.
     """
 
     first: int
@@ -85,11 +85,11 @@ class Draw:
 
 
 def draw(condition: Condition, seed: int, number: int) -> Draw:
-    """Return what is random about this trial: the same for the same arguments.
+    """Return the random values of this trial: the same for the same arguments.
 
-    The phase between the target's departure and the schedule is uniform over a round. Where slices are equal and
-    share one frequency, it is made of whole turns, which are a matter of who begins, and the rest of one, which is
-    waited for; else all of it is, after everybody had a first turn.
+    The phase between the target's departure and the schedule is uniform over a round. If slices are equal and share one
+    frequency, the choice of the first claimant gives the whole turns of the phase, and a wait gives the rest. Otherwise
+    a wait gives all of it, after the first turn of every claimant.
     """
     dice = Random(f"{seed} trial {number}")
     phase, world_seed = dice.random(), dice.randrange(2**31)
@@ -106,10 +106,10 @@ def run_trial(
     """Run one trial from its beginning to the detection, or until the target has passed.
 
     Args:
-        condition: What is tried.
-        seed: Of the experiment.
-        number: Of the trial.
-        to_the_end: True: it goes on after the detection.
+        condition: The condition.
+        seed: Seed of the experiment.
+        number: Number of the trial.
+        to_the_end: True: the trial continues after the detection.
         trace: File for its schedule trace, JSON lines.
     """
     result, lines = run_virtual(_Trial(condition, seed, number, to_the_end=to_the_end).run())
@@ -150,9 +150,9 @@ class _Trial:
             lines = list(running.trace)
         return self._judge(lines, world, over_s), lines
 
-    # ------------------------------------------------------------------ what happens
+    # ------------------------------------------------------------------ course of the trial
     async def _claim(self, running: RunningMission) -> None:
-        """Let watchers and consoles claim in their order, each after the one before has asked."""
+        """Let watchers and consoles claim in order, each after the request of the one before."""
         condition = self._condition
         watchers = {order.name: order for order in behavior_orders(self._mission)}
         turns = condition.in_turn
@@ -195,13 +195,13 @@ class _Trial:
             await asyncio.wait({passing, detecting})
 
     async def _frame_number(self, number: int) -> None:
-        """Return when the world has told of this frame."""
+        """Return when the world has published this frame."""
         if self._frame < number:
             event = asyncio.Event()
             self._waits_for = number, event
             await event.wait()
 
-    # ------------------------------------------------------------------ what is heard
+    # ------------------------------------------------------------------ published messages
     def _decided(self, line: dict[str, Any]) -> None:
         if line["ev"] == "request" and line["arc"] in self._requested:
             self._requested[line["arc"]].set()
@@ -223,7 +223,7 @@ class _Trial:
         if is_true and not self._to_the_end:
             self._detected.set()
 
-    # ------------------------------------------------------------------ what comes of it
+    # ------------------------------------------------------------------ result
     def _judge(self, trace: list[dict[str, Any]], world: dict[str, float], over_s: float) -> Trial:
         frequencies = [f"video{channel}" for channel in range(1, self._condition.channels + 1)]
         agreed = agreement(trace, self._samples, self._condition.robots, frequencies, over_s)

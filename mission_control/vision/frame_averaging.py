@@ -64,7 +64,7 @@ class FrameAveraging:
         self._frames: deque[Picture] = deque(maxlen=2 * averaged)
 
     def swapped_in(self) -> None:
-        """Begin anew: older pictures may show another view."""
+        """Begin again, because older pictures may show another view."""
         self._frames.clear()
 
     def look(self, frame: Picture) -> Blob | None:

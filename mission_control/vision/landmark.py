@@ -1,6 +1,6 @@
 """The landmark on a home base: four dark discs in a T on a white board, upright on the floor.
 
-The board's frame: seen by who stands in front of it and faces it, ``left`` is positive to the left of
+The board's frame: seen from a place in front of it and facing it, ``left`` is positive to the left of
 the board's middle, heights are above the floor.
 
 Source: RAM 2002, "Visual Servoing": an easy-to-detect landmark of four blobs marks a home base or a

@@ -251,10 +251,10 @@ class MotionDetector:
         """Take one of the first pictures after a swap; after the last of them there is an average again.
 
         Where these pictures agree, the scene stands still, and is learned as it is now: who left or came meanwhile
-        does not move. Where they do not agree something passes, and the old view stays to tell it from.
+        does not move. Where they do not agree something passes, and the old view stays for comparison.
 
         If enough of them show the old view, only those count; otherwise the view is new, and a slipped picture
-        cannot be told from a turned robot. Their median is taken, which a few bad ones do not move; while most of
+        looks like a turned robot. Their median is taken, which a few bad ones do not move; while most of
         them are not like it, one more picture is waited for.
         """
         self._fresh.append(picture)

@@ -23,10 +23,10 @@ WORSE = 12.0  # chosen: in squared pixel errors; the other side is then given up
 
 
 class PoseFilter:
-    """Where the robot stands, by all sightings so far.
+    """The robot's pose, from all sightings so far.
 
     Args:
-        camera: Of the robot.
+        camera: Camera of the robot.
     """
 
     def __init__(self, camera: CameraModel = SCOUT_CAMERA) -> None:
@@ -35,15 +35,15 @@ class PoseFilter:
         self._refuted = 0
 
     def forget(self) -> None:
-        """Know nothing: somebody else may have moved the robot."""
+        """Forget the pose, because the robot may have been moved."""
         self._hypotheses = []
 
     def moved(self, forward_m: float, turn_rad: float) -> None:
-        """Take in that the robot drove an arc, counter-clockwise is positive."""
+        """Add the motion of the robot along an arc, counter-clockwise is positive."""
         self._hypotheses = [(pose.moved(forward_m, turn_rad), badness) for pose, badness in self._hypotheses]
 
     def saw(self, sighting: Sighting) -> TargetPose | None:
-        """Take in a sighting and return the likeliest pose.
+        """Add a sighting and return the likeliest pose.
 
         Returns:
             None if no place on the floor explains the sighting, or none near the pose known before.  That

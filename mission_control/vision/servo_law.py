@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mission_control.vision.skeleton_tracking import Phase
+from mission_control.vision.skeleton_tracking import TrackingPhase
 from mission_control.vision.target_pose import TargetPose
 
 STOP_M = 0.45  # chosen: the nearest place from which the landmark fits into the picture with a margin
@@ -136,7 +136,7 @@ def steer(pose: TargetPose, stage: Stage, last: Command, elapsed_s: float, stop_
 
 
 def has_arrived(pose: TargetPose, stop_m: float = STOP_M) -> bool:
-    """Return whether the robot is at its place and faces the board, as far as one can tell from a picture."""
+    """Return whether the robot is at its place and faces the board, as far as a picture shows."""
     return (
         abs(pose.left_m) <= ARRIVED_ASIDE_M
         and abs(pose.ahead_m - stop_m) <= ARRIVED_AHEAD_M
@@ -182,7 +182,7 @@ class Approach:
         self._last = HALT
         self._search()
 
-    def step(self, phase: Phase, pose: TargetPose | None, elapsed_s: float) -> Command:
+    def step(self, phase: TrackingPhase, pose: TargetPose | None, elapsed_s: float) -> Command:
         """Return the next command.
 
         Args:
@@ -191,7 +191,7 @@ class Approach:
             elapsed_s: Since the step before.
         """
         self._since_s += elapsed_s
-        if phase is not Phase.TRACKING or pose is None:
+        if phase is not TrackingPhase.TRACKING or pose is None:
             self._last = self._blind(phase, elapsed_s)
             return self._last
         self._unseen_s = 0.0
@@ -201,12 +201,12 @@ class Approach:
         self._last = steer(pose, self._stage, self._last, elapsed_s, self._stop_m)
         return self._last
 
-    def _blind(self, phase: Phase, elapsed_s: float) -> Command:
+    def _blind(self, phase: TrackingPhase, elapsed_s: float) -> Command:
         """Stop; after a while without the target, turn step by step and look."""
         self._steady_frames = 0
         self._unseen_s += elapsed_s
         if self._stage is not Stage.SEARCHING:
-            if self._unseen_s >= HOLD_S and phase is Phase.ACQUIRING and self._stage is not Stage.ARRIVED:
+            if self._unseen_s >= HOLD_S and phase is TrackingPhase.ACQUIRING and self._stage is not Stage.ARRIVED:
                 self._search()
             return slewed(HALT, self._last, elapsed_s)
         turning_s = SEARCH_STEP_RAD / SEARCH_TURN_RAD_S

@@ -198,7 +198,7 @@ class TargetModel:
 
 
 def correlation(one: Picture, other: Picture) -> float:
-    """Return how alike two pictures of one shape are, whatever their brightness and contrast.
+    """Return the likeness of two pictures of one shape, independent of brightness and contrast.
 
     What OpenCV's normalized template match says for one place, many times faster.
 

@@ -34,7 +34,7 @@ SEARCH_FRAMES = 8  # chosen: 0.27 s, longer than nearly every burst of bad pictu
 STEADY_PX, STEADY_SHARE = 0.5, 0.05  # chosen: of the pitch; twice the noise, and the growth of an approach
 
 
-class Phase(StrEnum):
+class TrackingPhase(StrEnum):
     """What the tracker does with pictures."""
 
     ACQUIRING = "acquiring"
@@ -44,7 +44,7 @@ class Phase(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """What one picture said.
+    """The result of one picture.
 
     Attributes:
         phase: ``TRACKING``: here it is.  ``SEARCHING``: not found, stop and keep the camera still.
@@ -53,7 +53,7 @@ class Track:
         match: Share of the target that agreed with the best model, 0 to 1.
     """
 
-    phase: Phase
+    phase: TrackingPhase
     sighting: Sighting | None
     match: float
 
@@ -92,26 +92,26 @@ class TargetTracker:
             return self._found(frame, self._model, sighting)
         self._frames_left -= 1
         if self._frames_left > 0:
-            return Track(Phase.SEARCHING, None, match)
+            return Track(TrackingPhase.SEARCHING, None, match)
         self.forget()
-        return Track(Phase.ACQUIRING, None, match)
+        return Track(TrackingPhase.ACQUIRING, None, match)
 
     def forget(self) -> None:
-        """Begin again with acquisition: somebody else may have moved the robot."""
+        """Begin again with acquisition, because the robot may have been moved."""
         self._model = None
 
     def _acquire(self, frame: Picture) -> Track:
         sighting = acquire(frame)
         if sighting is None:
-            return Track(Phase.ACQUIRING, None, 0.0)
+            return Track(TrackingPhase.ACQUIRING, None, 0.0)
         self._model = TargetModel.seen(frame, sighting.blobs_px)
         self._frames_left = SEARCH_FRAMES
-        return Track(Phase.TRACKING, sighting, sighting.match)
+        return Track(TrackingPhase.TRACKING, sighting, sighting.match)
 
     def _found(self, frame: Picture, model: TargetModel, sighting: Sighting) -> Track:
         self._model = model.updated(frame, sighting.blobs_px)
         self._frames_left = SEARCH_FRAMES
-        return Track(Phase.TRACKING, sighting, sighting.match)
+        return Track(TrackingPhase.TRACKING, sighting, sighting.match)
 
 
 def track_skeleton(frame: Picture, model: TargetModel) -> Sighting | None:

@@ -1,4 +1,4 @@
-"""From pictures to commands: tracker, pose and servo law in one; what a behavior holds.
+"""Visual servo: tracker, pose and servo law in one, from pictures to commands, for a behavior.
 
 Source: RAM 2002, "Visual Servoing".
 """
@@ -20,8 +20,8 @@ LONGEST_GAP_S = 0.5  # chosen: the robots' own watchdog has stopped the wheels b
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """What one picture led to.
+class ServoStep:
+    """The decision of one picture.
 
     Attributes:
         command: What the robot shall do now.
@@ -75,7 +75,7 @@ class VisualServo:
 
     @property
     def searched_rad(self) -> float:
-        """How far the robot turned since it last saw the target; a full turn and more means it is not there."""
+        """The robot's turn since it last saw the target; after a full turn the target is not there."""
         return self._approach.searched_rad
 
     @property
@@ -83,8 +83,8 @@ class VisualServo:
         """For a look at its models."""
         return self._tracker
 
-    def see(self, frame: Picture, elapsed_s: float) -> Step:
-        """Return what to do after this picture.
+    def see(self, frame: Picture, elapsed_s: float) -> ServoStep:
+        """Return the decision of this picture.
 
         Args:
             frame: Grey levels 0 to 255, shape (240, 320), row 0 on top.
@@ -96,14 +96,14 @@ class VisualServo:
         if elapsed_s < 0:
             raise ValueError(f"a picture comes {-elapsed_s} s before the one before it")
         if self._is_fresh:
-            # What passed while somebody else had the robot is no time in which it looked or drove.
+            # The time between two grants counts neither as search nor as motion.
             self._is_fresh, elapsed_s = False, 0.0
         self._dead_reckon(elapsed_s)
         track = self._tracker.look(frame)
         pose = None if track.sighting is None else self._filter.saw(track.sighting)
         command = self._approach.step(track.phase, pose, min(elapsed_s, LONGEST_GAP_S))
         self._sent.append((self._now_s + self._latency_s, command))
-        return Step(command, self._approach.stage, track, pose)
+        return ServoStep(command, self._approach.stage, track, pose)
 
     def resumed(self) -> None:
         """Begin again with acquisition, the robot standing still; how often it approached is kept."""

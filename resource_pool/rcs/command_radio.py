@@ -101,7 +101,9 @@ class CommandRadio(ResourceController[RcParameters]):
         """Drop the ARC's packets, and send its robots their safe packets last."""
         count = self._schedule.counts().get(hold.arc)
         if count is not None and count.overruns:
-            self.tell(hold.arc, f"{count.overruns} of its packets on {self.name} were late or lost, {count.sent} sent")
+            self.publish_event(
+                hold.arc, f"{count.overruns} of its packets on {self.name} were late or lost, {count.sent} sent"
+            )
             self._overruns += count.overruns
         self._owed += self._schedule.disconnect(hold.arc)
         for waiting in [one for one in self._waiting.values() if one.arc == hold.arc]:
@@ -272,4 +274,4 @@ class CommandRadio(ResourceController[RcParameters]):
         self._worst_packet_s = max(self._worst_packet_s, took_s)
         for news in self._schedule.sent(sending, begun_s, took_s):
             log.warning("%s: %s", packet.arc, news)
-            self.tell(packet.arc, f"on {self.name}: {news}")
+            self.publish_event(packet.arc, f"on {self.name}: {news}")

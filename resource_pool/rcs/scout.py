@@ -195,7 +195,7 @@ class Scout(ResourceController[ScoutParameters]):
                 self._latch.confirm(True)
         self._publish_stop()
         if is_new:
-            self.tell(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
+            self.publish_event(self.name, f"was stopped{f': {reason}' if reason else ''} (by {by})")
         return self._latch.state
 
     def standing_stop(self) -> StandingStop | None:
@@ -208,7 +208,7 @@ class Scout(ResourceController[ScoutParameters]):
 
     def _tell_stop(self, state: StopState, what: str) -> None:
         self._publish_stop()
-        self.tell(self.name, f"{what} (by {state.by})")
+        self.publish_event(self.name, f"{what} (by {state.by})")
 
     def _publish_stop(self) -> None:
         self.changed()
@@ -223,7 +223,9 @@ class Scout(ResourceController[ScoutParameters]):
             replace_file(self._stop_file, msgspec.msgpack.encode(self._latch.state), is_lasting=False)
         except OSError as error:
             news = "is stopped" if self._latch.state.is_stopped else "is free again"
-            self.tell(self.name, f"a restart of this RC will not know that {self.name} {news}: {error.strerror}")
+            self.publish_event(
+                self.name, f"a restart of this RC will not know that {self.name} {news}: {error.strerror}"
+            )
 
     def _stopped(self, hold: Hold) -> None:
         """Record that the wheels stand still, unless the robot has another holder by now."""

@@ -37,8 +37,8 @@ class Happening:
 
     def concerns(self, names: Iterable[str]) -> bool:
         """Return whether the event is about one of these names."""
-        told = {self.who, *(str(value) for value in _flat(self.values))}
-        return not told.isdisjoint(names)
+        mentioned = {self.who, *(str(value) for value in _flat(self.values))}
+        return not mentioned.isdisjoint(names)
 
     def __str__(self) -> str:
         values = ", ".join(f"{name} {_short(value)}" for name, value in self.values.items())

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import msgspec
 
-from resource_pool.simulation.faults import Fault, Hang, Kill, MessageFault
+from resource_pool.simulation.faults import Fault, Hang, KillFault, MessageFault
 from resource_pool.simulation.laws import Broken, story_of
 from resource_pool.simulation.mission_run import MissionRun, run_mission
 from resource_pool.simulation.shrink import smallest
@@ -28,7 +28,7 @@ AnyFault = Fault | SupervisionFault
 
 
 @dataclass(frozen=True, slots=True)
-class Count:
+class CampaignCount:
     """Counts of some runs.
 
     Attributes:
@@ -45,9 +45,9 @@ class Count:
     packets: int = 0
     faults: int = 0
 
-    def __add__(self, other: Count) -> Count:
+    def __add__(self, other: CampaignCount) -> CampaignCount:
         """Return the sum of both counts."""
-        return Count(
+        return CampaignCount(
             self.runs + other.runs,
             self.happenings + other.happenings,
             self.grants + other.grants,
@@ -91,7 +91,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CampaignOutcome:
     """The result of all runs.
 
     Attributes:
@@ -100,7 +100,7 @@ class Outcome:
         took_s: Duration, machine seconds.
     """
 
-    count: Count
+    count: CampaignCount
     finding: Finding | None
     took_s: float
 
@@ -116,9 +116,9 @@ class Outcome:
     def to_json(self) -> dict[str, object]:
         """Return the result as plain data, for ``--json``."""
         finding = self.finding
-        told: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
+        plain: dict[str, object] = {**msgspec.to_builtins(self.count), "took_s": round(self.took_s, 3), "broken": None}
         if finding is not None:
-            told["broken"] = {
+            plain["broken"] = {
                 "law": finding.broken.law,
                 "seed": finding.seed,
                 "supervised": finding.supervised,
@@ -130,12 +130,12 @@ class Outcome:
                 "faults_before": finding.faults_before,
                 "story": list(finding.story),
             }
-        return told
+        return plain
 
 
 def simulate(
     first: int, seeds: int, *, chaos: bool, tell: Callable[[str], None], processes: int | None = None
-) -> Outcome:
+) -> CampaignOutcome:
     """Run the missions of these seeds until one breaks a law; reproduce and shrink that one.
 
     Args:
@@ -148,7 +148,7 @@ def simulate(
     began_s = time.monotonic()
     batches = [range(at, min(at + BATCH, first + seeds)) for at in range(first, first + seeds, BATCH)]
     workers = processes or (1 if seeds <= ALONE else min(os.cpu_count() or 1, len(batches)))
-    counted, failed = Count(), list[int]()
+    counted, failed = CampaignCount(), list[int]()
     for count, seed in _in_turn(batches, chaos) if workers == 1 else _spread(batches, chaos, workers):
         counted += count
         if seed is not None:
@@ -158,7 +158,7 @@ def simulate(
     if failed:
         tell(f"seed {min(failed)} breaks a law; looking for the fewest faults that do")
         finding = find(min(failed), chaos=chaos)
-    return Outcome(counted, finding, time.monotonic() - began_s)
+    return CampaignOutcome(counted, finding, time.monotonic() - began_s)
 
 
 def find(seed: int, *, chaos: bool) -> Finding | None:
@@ -183,7 +183,7 @@ def find(seed: int, *, chaos: bool) -> Finding | None:
     return Finding(seed, supervised, chaos, broken, least.faults, faults_before, story)
 
 
-def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[Count, int | None]]:
+def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[CampaignCount, int | None]]:
     for batch in batches:
         count, failed = _run_batch(batch, chaos)
         yield count, failed
@@ -191,7 +191,7 @@ def _in_turn(batches: Sequence[range], chaos: bool) -> Iterator[tuple[Count, int
             return
 
 
-def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tuple[Count, int | None]]:
+def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tuple[CampaignCount, int | None]]:
     """Run the batches in fresh processes, one for each worker; begin none after a broken law."""
     waiting = iter(batches)
     with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -206,11 +206,11 @@ def _spread(batches: Sequence[range], chaos: bool, workers: int) -> Iterator[tup
             running |= {pool.submit(_run_batch, batch, chaos) for batch in itertools.islice(waiting, len(done))}
 
 
-def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[Count, int | None]:
+def _run_batch(batch: Sequence[int], chaos: bool) -> tuple[CampaignCount, int | None]:
     """Run missions until one breaks a law; return the counts, and the seed of that mission."""
-    counted = Count()
+    counted = CampaignCount()
     for seed in batch:
-        counted += Count(1)
+        counted += CampaignCount(1)
         for supervised in (False, True):
             run = _run_quietly(seed, supervised, chaos)
             counted += _count(run)
@@ -227,12 +227,14 @@ def _run_quietly(seed: int, supervised: bool, chaos: bool, faults: Sequence[AnyF
         if supervised:
             struck = None if faults is None else [each for each in faults if isinstance(each, SupervisionFault)]
             return run_supervised(seed, chaos=chaos, faults=struck)
-        said = None if faults is None else [each for each in faults if isinstance(each, MessageFault | Kill | Hang)]
+        said = (
+            None if faults is None else [each for each in faults if isinstance(each, MessageFault | KillFault | Hang)]
+        )
         return run_mission(seed, chaos=chaos, faults=said)
     finally:
         logging.disable(before)
 
 
-def _count(run: MissionRun) -> Count:
+def _count(run: MissionRun) -> CampaignCount:
     words = [happening.what for happening in run.happenings]
-    return Count(0, len(words), words.count("grant"), words.count("packet"), len(run.faults))
+    return CampaignCount(0, len(words), words.count("grant"), words.count("packet"), len(run.faults))

@@ -43,7 +43,7 @@ class MessageFault:
 
 
 @dataclass(frozen=True, slots=True)
-class Kill:
+class KillFault:
     """The death of a component as by SIGKILL.
 
     Attributes:
@@ -78,7 +78,7 @@ class Hang:
         return f"{self.target} is cut off at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
 
 
-Fault = MessageFault | Kill | Hang
+Fault = MessageFault | KillFault | Hang
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,17 +115,17 @@ def draw_weather(seed: int) -> Weather:
     return Weather(bad, bad, bad, kills, hangs)
 
 
-def draw_moments(shape: MissionShape, weather: Weather) -> list[Kill | Hang]:
+def draw_moments(shape: MissionShape, weather: Weather) -> list[KillFault | Hang]:
     """Return the kills and hangs of this mission, in order of time."""
     dice = Random(f"moments {shape.seed}")
     rcs = [resource.name for resource in shape.resources]
     arcs = [owner.arc for owner in shape.owners]
     owners = [owner.name for owner in shape.owners]
     begin_s, end_s = BRING_UP_S, shape.active_s
-    found: list[Kill | Hang] = []
+    found: list[KillFault | Hang] = []
     for _ in range(weather.kills):
         target = dice.choice(dice.choice((["rc_manager"], rcs, arcs, owners)))
-        found.append(Kill(_moment(dice, begin_s, end_s), target, round(dice.uniform(0.05, LONGEST_ABSENCE_S), 3)))
+        found.append(KillFault(_moment(dice, begin_s, end_s), target, round(dice.uniform(0.05, LONGEST_ABSENCE_S), 3)))
     for _ in range(weather.hangs):
         target = dice.choice(dice.choice((["rc_manager"], rcs, arcs, owners)))
         found.append(Hang(_moment(dice, begin_s, end_s), target, round(dice.uniform(0.2, LONGEST_HANG_S), 3)))

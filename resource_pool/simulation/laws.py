@@ -94,14 +94,14 @@ def first_broken(
 
 def story_of(broken: Broken, happenings: Sequence[Happening], length: int = STORY_LENGTH) -> list[Happening]:
     """Return the last events of the concerned components before the breach, equal packets once."""
-    told: list[Happening] = []
+    story: list[Happening] = []
     for happening in reversed([h for h in happenings if h.at_s <= broken.at_s and h.concerns(broken.names)]):
-        if told and happening.what == told[-1].what == "packet" and happening.values == told[-1].values:
+        if story and happening.what == story[-1].what == "packet" and happening.values == story[-1].values:
             continue
-        told.append(happening)
-        if len(told) == length:
+        story.append(happening)
+        if len(story) == length:
             break
-    return told[::-1]
+    return story[::-1]
 
 
 @dataclass(slots=True)

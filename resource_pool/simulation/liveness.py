@@ -134,6 +134,6 @@ def _at_the_end(h: Happening) -> Broken | None:
         if name not in named:
             return Broken("liveness", h.at_s, f"{name} is wanted and {why}; no component reports it as absent", (name,))
     if not missing and h.values["word"] != HealthWord.OK:
-        told = "; ".join(f"{name}: {cause}" for name, cause in named.items())
-        return Broken("no-false-alarm", h.at_s, f"all that is wanted runs, and health says {told}", tuple(named))
+        reported = "; ".join(f"{name}: {cause}" for name, cause in named.items())
+        return Broken("no-false-alarm", h.at_s, f"all that is wanted runs, and health says {reported}", tuple(named))
     return None

@@ -27,13 +27,13 @@ from resource_pool.simulation.faults import (
     Fault,
     GivenFates,
     Hang,
-    Kill,
+    KillFault,
     Weather,
     draw_moments,
     draw_weather,
 )
 from resource_pool.simulation.laws import Broken, first_broken
-from resource_pool.simulation.played_hosts import PlayedHosts, PlayedPlacer, Role
+from resource_pool.simulation.played_hosts import PlayedHosts, PlayedPlacer, PlayedRole
 from resource_pool.simulation.shape import BRING_UP_S, MISSION, MissionShape, draw_shape
 from resource_pool.simulation.simulated_owner import SimulatedOwner
 from resource_pool.simulation.supervision_faults import SupervisionFault
@@ -69,17 +69,17 @@ def run_mission(seed: int, *, chaos: bool, faults: Sequence[Fault] | None = None
     """
     shape = draw_shape(seed)
     weather = draw_weather(seed) if chaos else CALM_WEATHER
-    moments: list[Kill | Hang]
+    moments: list[KillFault | Hang]
     fates: Fates
     if faults is None:
         moments, fates = draw_moments(shape, weather), DrawnFates(seed, weather)
     else:
-        moments, fates = [fault for fault in faults if isinstance(fault, Kill | Hang)], GivenFates(faults)
-    return run_virtual(_Mission(shape, weather, moments, fates).run())
+        moments, fates = [fault for fault in faults if isinstance(fault, KillFault | Hang)], GivenFates(faults)
+    return run_virtual(_PoolMission(shape, weather, moments, fates).run())
 
 
-class _Mission:
-    def __init__(self, shape: MissionShape, weather: Weather, moments: list[Kill | Hang], fates: Fates) -> None:
+class _PoolMission:
+    def __init__(self, shape: MissionShape, weather: Weather, moments: list[KillFault | Hang], fates: Fates) -> None:
         self._shape, self._weather, self._moments = shape, weather, moments
         self._audit = Audit()
         self._clock = VirtualClock()
@@ -104,9 +104,9 @@ class _Mission:
         broken = first_broken(self._shape, happenings, all_arrived=not self._network.suffered)
         return MissionRun(self._shape, faults, happenings, self._audit.digest(), broken)
 
-    def _strike(self, fault: Kill | Hang) -> None:
+    def _strike(self, fault: KillFault | Hang) -> None:
         match fault:
-            case Kill(target=target, away_s=away_s):
+            case KillFault(target=target, away_s=away_s):
                 self._hosts.kill(target, away_s)
             case Hang(target=target, lasts_s=lasts_s):
                 self._audit.note(target, "cut off", lasts_s=lasts_s)
@@ -136,14 +136,16 @@ class _Mission:
             "policy": shape.policy,
         }
         core = Subsystem.BACKBONE
-        await self._hosts.start(Role(Nameserver, core, "nameserver", "nameserver", {}))
-        await self._hosts.start(Role(placer, core, "placer", "placer", {}))
+        await self._hosts.start(PlayedRole(Nameserver, core, "nameserver", "nameserver", {}))
+        await self._hosts.start(PlayedRole(placer, core, "placer", "placer", {}))
         known = {"resources": [msgspec.to_builtins(resource) for resource in shape.resources]}
-        await self._hosts.start(Role(DependencyDatabase, core, "dependency_database", "dependency_database", known))
-        await self._hosts.start(Role(AuditedRcManager, core, "rc_manager", "rc_manager", manager))
+        await self._hosts.start(
+            PlayedRole(DependencyDatabase, core, "dependency_database", "dependency_database", known)
+        )
+        await self._hosts.start(PlayedRole(AuditedRcManager, core, "rc_manager", "rc_manager", manager))
         for resource in shape.resources:
             if resource.name not in shape.asleep:
-                role = Role(
+                role = PlayedRole(
                     COMPONENTS[resource.type],
                     Subsystem.RESOURCE_POOL,
                     resource.name,
@@ -166,4 +168,4 @@ class _Mission:
                 "calm_at_s": shape.active_s,
                 "rests": owner.rests,
             }
-            await self._hosts.start(Role(SimulatedOwner, subsystem, owner.name, owner.name, parameters))
+            await self._hosts.start(PlayedRole(SimulatedOwner, subsystem, owner.name, owner.name, parameters))

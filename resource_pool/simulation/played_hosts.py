@@ -29,7 +29,7 @@ STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when 
 
 
 @dataclass(frozen=True, slots=True)
-class Role:
+class PlayedRole:
     """All that is needed to start a component repeatedly.
 
     Attributes:
@@ -51,7 +51,7 @@ class Role:
 
 @dataclass
 class _Life:
-    role: Role
+    role: PlayedRole
     component: Component[Any] | None = None
     task: asyncio.Task[None] | None = None
     ready: asyncio.Event = field(default_factory=asyncio.Event)
@@ -66,7 +66,7 @@ class PlayedHosts:
         self._lives: dict[str, _Life] = {}
         self._watching: dict[str, asyncio.Task[None]] = {}
 
-    def begin(self, role: Role) -> None:
+    def begin(self, role: PlayedRole) -> None:
         """Start the component; restart it when it falls, if its role says so.
 
         Raises:
@@ -77,7 +77,7 @@ class PlayedHosts:
         life = self._lives[role.name] = _Life(role)
         self._watching[role.name] = asyncio.create_task(self._watch(life), name=f"creator of {role.name}")
 
-    async def start(self, role: Role) -> bool:
+    async def start(self, role: PlayedRole) -> bool:
         """Start the component; return when it is ready (True) or has ended before (False).
 
         Raises:
@@ -218,7 +218,7 @@ class PlayedPlacer(Component[NoParameters]):
         match asked.body:
             case Start(type=kind, name=name, parameters=parameters):
                 is_rc = name in self._resources
-                role = Role(self._components[kind], Subsystem.RESOURCE_POOL, name, kind, parameters, is_rc)
+                role = PlayedRole(self._components[kind], Subsystem.RESOURCE_POOL, name, kind, parameters, is_rc)
                 if not await self._hosts.start(role):
                     raise StoppedMeanwhile(f"{name} ended before it was ready", name=name)
                 return Started(f"{Subsystem.RESOURCE_POOL}/{name}", HOST, 0, [])

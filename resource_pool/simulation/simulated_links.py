@@ -18,7 +18,7 @@ from contextvars import Context
 from typing import Any
 
 from backbone.bus.interface import Clock, LinkListener
-from backbone.bus.local_bus import Answered, Declared, Listening, LocalBus, LocalNetwork, Watching
+from backbone.bus.local_bus import Answered, Declaration, Listening, LocalBus, LocalNetwork, Watching
 from backbone.errors import NoResponder
 from backbone.wire import Envelope
 from resource_pool.simulation.simulated_processes import SimulatedProcess, current_process
@@ -135,7 +135,7 @@ class LinkedBus(LocalBus):
         super().__init__(network, source, clock)
         self.link = link
 
-    def declare_to_neighbors(self, address: str) -> Declared:
+    def declare_to_neighbors(self, address: str) -> Declaration:
         """Raise a token; behind a cut link another token of this address may stand."""
         tokens = self.network.tokens.setdefault(address, [])
         self.link.shown[address] = None
@@ -144,12 +144,12 @@ class LinkedBus(LocalBus):
             tokens.remove(token)
             self._tell_watchers(address, alive=False)
 
-        token = Declared(self, fall)
+        token = Declaration(self, fall)
         tokens.append(token)
         self._tell_watchers(address, alive=True)
         return token
 
-    def watch_link(self, listener: LinkListener) -> Declared:
+    def watch_link(self, listener: LinkListener) -> Declaration:
         """Report the process's link; see ``Bus.watch_link``."""
         self.require_open()
 
@@ -157,7 +157,7 @@ class LinkedBus(LocalBus):
             if not watching.closed:
                 self.call("", listener, up)
 
-        watching = Declared(self, lambda: self.link.listeners.remove(hand_over))
+        watching = Declaration(self, lambda: self.link.listeners.remove(hand_over))
         self.link.listeners.append(hand_over)
         asyncio.get_running_loop().call_soon(hand_over, self.link.is_up)
         return watching
@@ -353,13 +353,13 @@ class LinkedNetwork(LocalNetwork):
             for token in self.tokens.get(address, ())
             if not _bus(token).link.process.is_dead
         )
-        told = self._reported.setdefault(watching, set())
-        if stands is (address in told):
+        reported = self._reported.setdefault(watching, set())
+        if stands is (address in reported):
             return
         if stands:
-            told.add(address)
+            reported.add(address)
         else:
-            told.discard(address)
+            reported.discard(address)
 
         def tell() -> None:
             link.process.run(watching.notify, address, stands)
@@ -369,11 +369,11 @@ class LinkedNetwork(LocalNetwork):
         elif not link.process.is_dead:
             tell()
 
-    def _link_of(self, declared: Declared) -> Link | None:
+    def _link_of(self, declared: Declaration) -> Link | None:
         return self.links.get(_bus(declared).link.process)
 
 
-def _bus(declared: Declared) -> LinkedBus:
+def _bus(declared: Declaration) -> LinkedBus:
     bus = declared.owner
     assert isinstance(bus, LinkedBus)  # noqa: S101  ``join`` returns no other class
     return bus

@@ -61,7 +61,7 @@ def run_supervised(
     shape = shape or draw_supervised_shape(seed)
     if faults is None:
         faults = draw_supervision_faults(shape) if chaos else []
-    return run_processes(_Mission(shape, sorted(faults, key=lambda fault: fault.at_s)).run())
+    return run_processes(_SupervisedMission(shape, sorted(faults, key=lambda fault: fault.at_s)).run())
 
 
 class _Observer:
@@ -84,7 +84,7 @@ class _Observer:
         await asyncio.Event().wait()
 
 
-class _Mission:
+class _SupervisedMission:
     def __init__(self, shape: SupervisedShape, faults: list[SupervisionFault]) -> None:
         self._shape, self._faults = shape, faults
         self._audit, self._clock = Audit(), VirtualClock()
@@ -196,12 +196,12 @@ class _Mission:
             run_directory=folder,
         )
 
-    def _note_also(self, told: Callable[[ProcessFell], None]) -> Callable[[ProcessFell], None]:
-        def note_and_tell(fell: ProcessFell) -> None:
+    def _note_also(self, listener: Callable[[ProcessFell], None]) -> Callable[[ProcessFell], None]:
+        def note_and_call(fell: ProcessFell) -> None:
             self._note_fall(fell)
-            told(fell)
+            listener(fell)
 
-        return note_and_tell
+        return note_and_call
 
     def _heard_fall(self, heard: Envelope[ProcessFell]) -> None:
         self._note_fall(heard.body)

@@ -53,7 +53,7 @@ from backbone.rc_manager.messages import TraceLine
 from backbone.rc_manager.service import RcManager
 from backbone.wire import Envelope, Message
 from resource_pool.simulation.audit import Audit, Happening
-from resource_pool.simulation.played_hosts import HOST, PlayedHosts, Role
+from resource_pool.simulation.played_hosts import HOST, PlayedHosts, PlayedRole
 
 START_TIME_S = 60.0  # chosen: virtual time, in which only settling and back-offs pass
 REPLY_TIME_S = 5.0  # chosen: virtual time; an answer takes none
@@ -235,7 +235,7 @@ async def _bring_up(
         (RcManager, "rc_manager", manager),
     ]
     for component, name, parameters in core:
-        if not await hosts.start(Role(component, Subsystem.BACKBONE, name, name, parameters, may_fall)):
+        if not await hosts.start(PlayedRole(component, Subsystem.BACKBONE, name, name, parameters, may_fall)):
             raise MissionFell(f"{name} ended before it was ready")
     hardware = [Start(part.type, part.name, part.parameters) for part in mission.components]
     hardware += [Start(part.type, part.name, part.rc_parameters()) for part in mission.resources]
@@ -297,14 +297,14 @@ class WholePlacer(Component[NoParameters]):
             raise StoppedMeanwhile(f"{name} ended before it was ready", name=name)
         return Started(address(subsystem, name), HOST, 0, [])
 
-    def _role(self, order: Start, name: str) -> Role:
+    def _role(self, order: Start, name: str) -> PlayedRole:
         console, known = self._consoles.get(order.type), self._types.get(order.type)
         if console is not None:
-            return Role(console, Subsystem.UI_CONSOLE, name, order.type, order.parameters, is_restarted=False)
+            return PlayedRole(console, Subsystem.UI_CONSOLE, name, order.type, order.parameters, is_restarted=False)
         if known is None:
             raise UnknownType(f"{order.type} is no component type of this mission", type=order.type)
         made = component_class(known.class_path)
-        return Role(made, known.subsystem, name, order.type, order.parameters, known.restart and self._may_fall)
+        return PlayedRole(made, known.subsystem, name, order.type, order.parameters, known.restart and self._may_fall)
 
 
 def component_class(class_path: str) -> type[Component[Any]]:

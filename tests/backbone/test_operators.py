@@ -7,7 +7,7 @@ import pytest
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.keys import Conversation
-from backbone.operators import OperatorActed, OperatorAction, login_name, tell_acted
+from backbone.operators import OperatorActed, OperatorAction, login_name, publish_action
 
 
 @pytest.mark.parametrize("action", OperatorAction)
@@ -23,7 +23,7 @@ def test_what_a_command_did_is_published_once_by_who_is_logged_in() -> None:
         command, recorder = network.join("ui_console/cli-1", clock), network.join("ui_console/recorder", clock)
         heard: list[OperatorActed] = []
         recorder.subscribe("*/*", Conversation.OPERATORS, OperatorActed, lambda said: heard.append(said.body))
-        tell_acted(command, clock, OperatorAction.STOP_COMPONENT, "scout1", "ended by asking")
+        publish_action(command, clock, OperatorAction.STOP_COMPONENT, "scout1", "ended by asking")
         await clock.sleep_s(1.0)
         await command.close()
         await recorder.close()

@@ -19,7 +19,7 @@ from backbone.mission.behavior_orders import behavior_order
 from backbone.placer.messages import Ended, NoHost, StopComponent
 from mission_control.behavior import Behavior, NotAChild
 from mission_control.behavior_tree import Decision
-from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, Report, ReportNoted
+from mission_control.messages import AskBehavior, BehaviorState, BehaviorStatus, ChildReport, ReportNoted
 from resource_pool.arc_client import EmergencyStopped, Frame, Noted, NotMyArc, Resumed, StopState
 from resource_pool.messages import AskStop
 from resource_pool.stop_latch import StopLatch
@@ -641,7 +641,7 @@ def test_a_child_that_a_parent_goes_on_without_is_reported_with_its_cause(placer
 def test_only_children_may_report(placer_world: Run) -> None:
     async def scene(placer: FakePlacer) -> None:
         await root(placer, node("top", "parent", 5, children=[node("leaf")]))
-        report = Report("leaf", BehaviorStatus.SUCCESS)
+        report = ChildReport("leaf", BehaviorStatus.SUCCESS)
         with pytest.raises(NotAChild):
             await placer.bus.ask("mission_control/top", report, ReportNoted, within_s=1.0)
 

@@ -87,7 +87,7 @@ def test_a_packet_moves_its_own_robot_and_no_other(local_mission: Any) -> None:
             assert await here.moved_m("scout2", 0.2) > 0.005
             audit = here.pool.audit
             assert (audit["packets_delivered_scout1"], audit["packets_delivered_scout2"]) == (0, 5)
-            assert (audit["packets"], audit["packets_lost"], audit["packets_for_nobody"]) == (5, 0, 0)
+            assert (audit["packets"], audit["packets_lost"], audit["packets_for_no_robot"]) == (5, 0, 0)
 
     run_virtual(main())
 
@@ -144,7 +144,7 @@ def test_a_packet_to_an_id_nobody_has_is_counted_and_moves_nobody(local_mission:
         async with played(local_mission) as here:
             await here.send(SimulatedRadio(here.site("radio")), 77, DRIVE)
             assert abs(await here.moved_m("scout1", 0.3)) < STILL_M
-            assert here.pool.audit["packets_for_nobody"] == 1
+            assert here.pool.audit["packets_for_no_robot"] == 1
 
     run_virtual(main())
 

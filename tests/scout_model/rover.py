@@ -58,13 +58,13 @@ class Rover:
             return
         self._heard += 1
         match packet:
-            case radio_link.Drive(left_rad_s, right_rad_s):
+            case radio_link.DrivePacket(left_rad_s, right_rad_s):
                 self._speeds_rad_s = left_rad_s, right_rad_s
             case radio_link.TransmitterOn(frequency):
                 self._frequency = frequency
             case radio_link.TransmitterOff():
                 self._frequency = ""
-            case radio_link.Halt() | radio_link.Jump():  # it has no foot to jump with
+            case radio_link.HaltPacket() | radio_link.JumpPacket():  # it has no foot to jump with
                 self._speeds_rad_s = 0.0, 0.0
             case radio_link.Safe():
                 self._speeds_rad_s, self._frequency = (0.0, 0.0), ""

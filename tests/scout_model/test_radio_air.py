@@ -65,7 +65,7 @@ def test_the_share_that_is_lost_anywhere_is_as_described_and_all_are_counted(los
 def test_packets_to_an_id_nobody_has_reach_nobody_and_are_counted() -> None:
     air = RadioAir(1, AirDescription())
     assert fates(air, [packet(number, network_id=200) for number in range(7)], None) == set()
-    assert (air.for_nobody, dict(air.delivered), dict(air.lost)) == (7, {}, {})
+    assert (air.for_no_robot, dict(air.delivered), dict(air.lost)) == (7, {}, {})
 
 
 @given(

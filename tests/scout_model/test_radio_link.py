@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from scout_model import radio_link
 from scout_model.errors import MalformedPacket
-from scout_model.radio_link import Drive, Halt, Jump, Safe, TransmitterOff, TransmitterOn
+from scout_model.radio_link import DrivePacket, HaltPacket, JumpPacket, Safe, TransmitterOff, TransmitterOn
 
 speeds = st.floats(allow_nan=False, allow_infinity=False, width=32)
 names = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, max_size=15)
@@ -12,7 +12,7 @@ names = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1, 
 
 @given(speeds, speeds)
 def test_a_drive_packet_says_what_was_put_in(left_rad_s: float, right_rad_s: float) -> None:
-    assert radio_link.decode(radio_link.encode_drive(left_rad_s, right_rad_s)) == Drive(left_rad_s, right_rad_s)
+    assert radio_link.decode(radio_link.encode_drive(left_rad_s, right_rad_s)) == DrivePacket(left_rad_s, right_rad_s)
 
 
 @given(names)
@@ -23,8 +23,8 @@ def test_a_transmitter_packet_says_which_frequency_was_put_in(frequency: str) ->
 @pytest.mark.parametrize(
     ("payload", "packet"),
     [
-        (radio_link.encode_halt(), Halt()),
-        (radio_link.encode_jump(), Jump()),
+        (radio_link.encode_halt(), HaltPacket()),
+        (radio_link.encode_jump(), JumpPacket()),
         (radio_link.encode_safe(), Safe()),
         (radio_link.encode_transmitter_off(), TransmitterOff()),
     ],
@@ -41,7 +41,7 @@ def test_any_bytes_are_a_packet_that_encodes_to_the_same_bytes_or_are_refused(pa
     except MalformedPacket:
         return
     match packet:
-        case Drive(left_rad_s, right_rad_s):
+        case DrivePacket(left_rad_s, right_rad_s):
             again = radio_link.encode_drive(left_rad_s, right_rad_s)
         case TransmitterOn(frequency):
             again = radio_link.encode_transmitter_on(frequency)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from resource_pool.simulation.faults import Fault, Kill, MessageFault
+from resource_pool.simulation.faults import Fault, KillFault, MessageFault
 from resource_pool.simulation.mission_run import run_mission
 from resource_pool.simulation.supervised_mission import run_supervised
 from resource_pool.simulation.supervision_faults import Cut, End, Pause, SupervisionFault
@@ -18,9 +18,9 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
         136,
         [
             MessageFault("backbone/nameserver > backbone/rc_manager Appeared 11", "lost"),
-            Kill(3.712, "video2", 1.397),
-            Kill(5.064, "console1-drive", 0.69),
-            Kill(6.786, "radio1", 0.597),
+            KillFault(3.712, "video2", 1.397),
+            KillFault(5.064, "console1-drive", 0.69),
+            KillFault(6.786, "radio1", 0.597),
         ],
     ),
     "an order to open that comes twice does not shut the gate": (
@@ -60,7 +60,7 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
         [
             MessageFault("resource_pool/video2 > backbone/nameserver Register 1", "late", 0.126381),
             MessageFault("backbone/rc_manager > resource_pool/radio1 Leases 10", "late", 0.948966),
-            Kill(4.200287, "rc_manager", 0.326),
+            KillFault(4.200287, "rc_manager", 0.326),
         ],
     ),
     "an owner hears the end of its grant also when the order to shut the gate was lost": (
@@ -77,8 +77,8 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
             MessageFault("resource_pool/behavior5-drive > mission_control/behavior5 AskBeat 9", "lost"),
             MessageFault("backbone/nameserver > backbone/rc_manager answer Registered 1", "late", 0.344429),
             MessageFault("backbone/rc_manager > resource_pool/behavior5-drive AskRequest 2", "late", 0.400806),
-            Kill(8.011902, "console2", 1.447),
-            Kill(11.299141, "rc_manager", 0.271),
+            KillFault(8.011902, "console2", 1.447),
+            KillFault(11.299141, "rc_manager", 0.271),
         ],
     ),
 }

@@ -17,7 +17,7 @@ from backbone.wire import Envelope
 from resource_pool.simulation.faults import (
     DrawnFates,
     GivenFates,
-    Kill,
+    KillFault,
     MessageFault,
     Weather,
     draw_moments,
@@ -200,4 +200,4 @@ def test_some_seeds_mean_kills_only_and_some_a_bad_network_only() -> None:
     shape = draw_shape(5)
     for fault in draw_moments(shape, Weather(kills=5, hangs=2)):
         assert 1.0 <= fault.at_s <= shape.active_s
-        assert isinstance(fault, Kill) or "/" not in fault.target
+        assert isinstance(fault, KillFault) or "/" not in fault.target

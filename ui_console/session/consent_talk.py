@@ -127,7 +127,9 @@ class ConsentTalk:
         self._unanswered -= 1
         if not consent.is_given:
             because = consent.reason or "no reason given"
-            console.tell(question.robot, f"{consent.user} keeps it from {console.user}: {because}", LogLevel.NOTICE)
+            console.publish_event(
+                question.robot, f"{consent.user} keeps it from {console.user}: {because}", LogLevel.NOTICE
+            )
         now_s = console.clock.now_s()
         console.show(ConsentHeard(now_s, question.robot, consent.user, consent.is_given, consent.reason))
 

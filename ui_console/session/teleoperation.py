@@ -338,7 +338,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         again, self._grants = self._grants > 0, self._grants + 1
         self.report(f"drives {robot}")
         if not again:
-            self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
+            self.publish_event(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
         self.show(events.Granted(self.clock.now_s(), notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()

@@ -127,7 +127,7 @@ class WebHub:
             self._told_s[offence.fault] = now_s
             log.warning("%s", line)
             if self.observer.state is LifeState.READY:
-                self.observer.tell("web", line, LogLevel.WARNING)
+                self.observer.publish_event("web", line, LogLevel.WARNING)
 
     async def tell_all(self) -> None:
         """Keep every operator's view fresh; until cancelled. Nobody there: nothing is done."""

@@ -29,7 +29,7 @@ HUB_PORT = 7447  # Zenoh's own
 
 
 def is_loopback(address: str) -> bool:
-    """Say whether this IP address or name means the machine itself."""
+    """Return whether this IP address or name means the machine itself."""
     try:
         return ipaddress.ip_address(address).is_loopback
     except ValueError:

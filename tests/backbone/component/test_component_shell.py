@@ -119,7 +119,7 @@ class Walker(Component[Gait]):
 
     async def note_later(self) -> None:
         await self.clock.sleep_s(0.01)
-        self.tell("way", "was walked")
+        self.publish_event("way", "was walked")
         self.report("walked")
 
 

@@ -15,11 +15,11 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.launch import Launch
 from backbone.component.membership import (
-    Admit,
-    Admitted,
     AlreadyMember,
     AskedAgain,
     AwaitEnd,
+    BeginMember,
+    MemberBegun,
     MemberEnded,
     NotAMember,
     NotItsCreator,
@@ -262,7 +262,7 @@ def test_only_its_creator_may_speak_to_a_shared_process(on_bench: Callable) -> N
         at = process_address("local", "pool", await bench.start("Quiet", "scout1"))
         stranger = bench.network.join("ui_console/stranger", VirtualClock())
         with pytest.raises(NotItsCreator):
-            await stranger.ask(at, Admit(launch("Quiet", "radio"), 99), Admitted, within_s=1.0)
+            await stranger.ask(at, BeginMember(launch("Quiet", "radio"), 99), MemberBegun, within_s=1.0)
         await stranger.close()
 
     on_bench(body)
@@ -289,9 +289,9 @@ def test_admission_may_be_asked_twice_and_a_name_lives_once(local_mission: Calla
             bus = network.join(CREATOR, VirtualClock())
             await VirtualClock().sleep_s(0.1)
             for _ in range(2):
-                await bus.ask(shared.address, Admit(launch("Quiet", "scout1"), 1), Admitted, within_s=1.0)
+                await bus.ask(shared.address, BeginMember(launch("Quiet", "scout1"), 1), MemberBegun, within_s=1.0)
             with pytest.raises(AlreadyMember):
-                await bus.ask(shared.address, Admit(launch("Quiet", "scout1"), 2), Admitted, within_s=1.0)
+                await bus.ask(shared.address, BeginMember(launch("Quiet", "scout1"), 2), MemberBegun, within_s=1.0)
             with pytest.raises(NotAMember):
                 await bus.ask(shared.address, AwaitEnd(2), MemberEnded, within_s=1.0)
             given_up = asyncio.create_task(bus.ask(shared.address, AwaitEnd(1), MemberEnded, within_s=10.0))

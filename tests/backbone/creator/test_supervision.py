@@ -10,7 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from backbone.creator.decisions import (
     AskToStop,
-    Fork,
+    ForkComponent,
     Instruction,
     ReportEnded,
     ReportFell,
@@ -18,8 +18,8 @@ from backbone.creator.decisions import (
     ReportReady,
     ReportSilent,
     ReportStartFailed,
-    Signal,
-    WakeAt,
+    SendSignal,
+    SupervisionWakesAt,
 )
 from backbone.creator.messages import START_MOST_S, AlreadyHere, EndedBy, NotHere, RestartPolicy
 from backbone.creator.supervision import LEAVE_S, TERM_S, Phase, Supervision, describe
@@ -55,7 +55,7 @@ class RandomHistories(RuleBasedStateMachine):
     def do(self, instructions: list[Instruction], ordered: str = "") -> None:
         for instruction in instructions:
             match instruction:
-                case Fork(name=name):
+                case ForkComponent(name=name):
                     assert name not in self.live, f"{name} would run twice"
                     assert name not in self.forking, f"{name} would be forked twice"
                     self.forking.append(name)
@@ -63,7 +63,7 @@ class RandomHistories(RuleBasedStateMachine):
                         self.count_restart(name)
                 case AskToStop(name=name):
                     assert name in self.live
-                case Signal(name=name, pid=pid, number=number):
+                case SendSignal(name=name, pid=pid, number=number):
                     assert self.live[name] == pid
                     if number is signal.SIGKILL:
                         self.killed.add(pid)
@@ -89,7 +89,7 @@ class RandomHistories(RuleBasedStateMachine):
                     self.failing[name] = failing
                 case ReportSilent(name=name):
                     assert name in self.live
-                case WakeAt(at_s=at_s):
+                case SupervisionWakesAt(at_s=at_s):
                     self.wake_s = at_s
 
     def count_restart(self, name: str) -> None:
@@ -212,17 +212,17 @@ def running(policy: RestartPolicy | None = None, *, asked_by_signal: bool = Fals
 
 def test_ending_escalates_from_asking_to_sigterm_to_sigkill() -> None:
     supervision = running()
-    assert supervision.end_ordered("scout1", 1.5, 0.5, 10.0) == [AskToStop("scout1", 1.5), WakeAt(11.5)]
-    assert supervision.woken(11.5) == [Signal("scout1", 7, signal.SIGTERM), WakeAt(12.0)]
-    assert supervision.woken(12.0) == [Signal("scout1", 7, signal.SIGKILL)]
+    assert supervision.end_ordered("scout1", 1.5, 0.5, 10.0) == [AskToStop("scout1", 1.5), SupervisionWakesAt(11.5)]
+    assert supervision.woken(11.5) == [SendSignal("scout1", 7, signal.SIGTERM), SupervisionWakesAt(12.0)]
+    assert supervision.woken(12.0) == [SendSignal("scout1", 7, signal.SIGKILL)]
     assert supervision.exited(7, -9, 12.1) == [ReportEnded("scout1", EndedBy.SIGKILL, -9)]
 
 
 def test_who_cannot_be_asked_gets_sigterm_unless_it_is_about_to_leave() -> None:
     supervision = running()
     supervision.end_ordered("scout1", 1.5, 0.5, 10.0)
-    assert supervision.ask_failed("scout1", 10.0) == [WakeAt(10.0 + LEAVE_S)]
-    assert supervision.woken(10.0 + LEAVE_S)[0] == Signal("scout1", 7, signal.SIGTERM)
+    assert supervision.ask_failed("scout1", 10.0) == [SupervisionWakesAt(10.0 + LEAVE_S)]
+    assert supervision.woken(10.0 + LEAVE_S)[0] == SendSignal("scout1", 7, signal.SIGTERM)
     assert supervision.exited(7, 0, 10.2) == [ReportEnded("scout1", EndedBy.SIGTERM, 0)]
 
 
@@ -235,22 +235,22 @@ def test_who_was_about_to_leave_when_asked_ended_by_itself() -> None:
 
 def test_a_hub_is_asked_by_signal() -> None:
     supervision = running(asked_by_signal=True)
-    assert supervision.end_ordered("scout1", 1.5, 0.5, 10.0)[0] == Signal("scout1", 7, signal.SIGTERM)
+    assert supervision.end_ordered("scout1", 1.5, 0.5, 10.0)[0] == SendSignal("scout1", 7, signal.SIGTERM)
     assert supervision.exited(7, 0, 10.2) == [ReportEnded("scout1", EndedBy.ASKING, 0)]
 
 
 def test_a_second_order_to_end_can_only_hurry() -> None:
     supervision = running()
     supervision.end_ordered("scout1", 1.5, 0.5, 10.0)
-    assert supervision.end_ordered("scout1", 9.0, 9.0, 10.5) == [WakeAt(11.5)]
-    assert supervision.end_ordered("scout1", 0.1, 0.1, 10.5) == [WakeAt(10.6)]
+    assert supervision.end_ordered("scout1", 9.0, 9.0, 10.5) == [SupervisionWakesAt(11.5)]
+    assert supervision.end_ordered("scout1", 0.1, 0.1, 10.5) == [SupervisionWakesAt(10.6)]
 
 
 def test_what_is_not_ready_is_ended_without_asking() -> None:
     supervision = Supervision()
     supervision.start_ordered("scout1", RestartPolicy(), 5.0, 0.0)
     supervision.forked("scout1", 7, 0.0)
-    assert supervision.end_ordered("scout1", 1.5, 0.5, 1.0)[0] == Signal("scout1", 7, signal.SIGTERM)
+    assert supervision.end_ordered("scout1", 1.5, 0.5, 1.0)[0] == SendSignal("scout1", 7, signal.SIGTERM)
     assert supervision.exited(7, 0, 1.1) == [
         ReportStartFailed("scout1", "exit code 0"),
         ReportEnded("scout1", EndedBy.SIGTERM, 0),
@@ -267,7 +267,7 @@ def test_back_off_doubles_up_to_its_most_and_from_the_limit_on_pauses_are_long()
         assert fell.failing == (len(pauses) > policy.limit)
         if not fell.failing:
             now_s += fell.restart_in_s
-            assert supervision.woken(now_s)[0] == Fork("scout1")
+            assert supervision.woken(now_s)[0] == ForkComponent("scout1")
             supervision.forked("scout1", pid + 1, now_s)
             supervision.ready("scout1")
     assert pauses == [0.1, 0.2, 0.3, policy.failing_pause_s]
@@ -293,7 +293,7 @@ def test_a_component_without_restart_that_ends_in_good_order_is_left_to_its_owne
 def test_what_is_wanted_is_restarted_however_it_ended(returncode: int) -> None:
     supervision = running(RestartPolicy(back_off_s=0.1))
     told = supervision.exited(7, returncode, 1.0)
-    assert told == [ReportFell("scout1", describe(returncode), 0.1), WakeAt(1.1)]
+    assert told == [ReportFell("scout1", describe(returncode), 0.1), SupervisionWakesAt(1.1)]
     assert [(each.name, each.since_s) for each in supervision.absences(1.0)] == [("scout1", 1.0)]
     supervision.woken(1.1)
     supervision.forked("scout1", 8, 1.1)
@@ -306,8 +306,8 @@ def test_a_first_start_that_a_signal_ended_is_begun_again() -> None:
     supervision = Supervision()
     supervision.start_ordered("scout1", RestartPolicy(back_off_s=0.1), 5.0, 0.0)
     supervision.forked("scout1", 7, 0.0)
-    assert supervision.exited(7, -15, 1.0) == [ReportFell("scout1", "killed by SIGTERM", 0.1), WakeAt(1.1)]
-    assert supervision.woken(1.1)[0] == Fork("scout1")
+    assert supervision.exited(7, -15, 1.0) == [ReportFell("scout1", "killed by SIGTERM", 0.1), SupervisionWakesAt(1.1)]
+    assert supervision.woken(1.1)[0] == ForkComponent("scout1")
     supervision.forked("scout1", 8, 1.1)
     assert supervision.ready("scout1") == [ReportReady("scout1", 8)]
 
@@ -318,7 +318,7 @@ def test_a_silent_process_is_shown_then_killed_then_restarted() -> None:
     assert supervision.observed("scout1", 0.8, 9.8) == [ReportSilent("scout1", 0.8)]
     assert supervision.absences(10.0)[0].since_s == pytest.approx(9.0)
     assert supervision.observed("scout1", 2.9, 11.9) == []
-    assert supervision.observed("scout1", 3.0, 12.0) == [Signal("scout1", 7, signal.SIGKILL)]
+    assert supervision.observed("scout1", 3.0, 12.0) == [SendSignal("scout1", 7, signal.SIGKILL)]
     assert supervision.exited(7, -9, 12.1)[0] == ReportFell("scout1", "hung: no sign of life for 3.0 s", 0.1)
 
 
@@ -333,14 +333,14 @@ def test_a_start_that_shows_signs_of_life_is_not_late() -> None:
     supervision = Supervision()
     supervision.start_ordered("scout1", RestartPolicy(), 5.0, 0.0)
     supervision.forked("scout1", 7, 0.0)
-    assert supervision.observed("scout1", 0.0, 4.9) == [WakeAt(9.9)]
-    assert supervision.observed("scout1", 0.0, 60.0) == [WakeAt(65.0)]
-    assert supervision.observed("scout1", 1.0, START_MOST_S) == [WakeAt(START_MOST_S)]
+    assert supervision.observed("scout1", 0.0, 4.9) == [SupervisionWakesAt(9.9)]
+    assert supervision.observed("scout1", 0.0, 60.0) == [SupervisionWakesAt(65.0)]
+    assert supervision.observed("scout1", 1.0, START_MOST_S) == [SupervisionWakesAt(START_MOST_S)]
 
 
 def test_the_restart_of_a_service_reports_its_pause() -> None:
     supervision = running(RestartPolicy(back_off_s=0.1))
-    assert supervision.exited(7, 0, 1.0) == [ReportFell("scout1", "exit code 0", 0.1), WakeAt(1.1)]
+    assert supervision.exited(7, 0, 1.0) == [ReportFell("scout1", "exit code 0", 0.1), SupervisionWakesAt(1.1)]
 
 
 def test_a_first_start_that_fails_is_not_repeated() -> None:
@@ -355,7 +355,7 @@ def test_who_is_not_ready_in_time_is_ended_before_the_start_is_answered() -> Non
     supervision = Supervision()
     supervision.start_ordered("scout1", RestartPolicy(), 5.0, 0.0)
     supervision.forked("scout1", 7, 0.0)
-    assert supervision.woken(5.0) == [Signal("scout1", 7, signal.SIGTERM), WakeAt(5.0 + TERM_S)]
+    assert supervision.woken(5.0) == [SendSignal("scout1", 7, signal.SIGTERM), SupervisionWakesAt(5.0 + TERM_S)]
     assert supervision.ready("scout1") == []
     assert supervision.exited(7, 0, 5.1) == [
         ReportStartFailed("scout1", "was not ready and showed no sign of life for 5 s")
@@ -368,7 +368,7 @@ def test_a_zygote_that_hangs_holds_no_order_up() -> None:
     late_s = START_MOST_S
     failed = ReportStartFailed("scout1", "was not ready and showed no sign of life for 5 s")
     assert supervision.woken(late_s) == [failed]
-    assert supervision.forked("scout1", 7, late_s + 1.0)[0] == Signal("scout1", 7, signal.SIGTERM)
+    assert supervision.forked("scout1", 7, late_s + 1.0)[0] == SendSignal("scout1", 7, signal.SIGTERM)
     assert supervision.exited(7, 0, late_s + 1.1) == []
     assert supervision.find("scout1") is None
 
@@ -387,7 +387,7 @@ def test_tokens_say_nothing_about_those_that_are_ready() -> None:
 def test_a_name_that_is_left_to_its_owner_may_be_ordered_anew() -> None:
     supervision = running(RestartPolicy(restart=False))
     supervision.exited(7, 1, 1.0)
-    assert supervision.start_ordered("scout1", RestartPolicy(), 5.0, 2.0)[0] == Fork("scout1")
+    assert supervision.start_ordered("scout1", RestartPolicy(), 5.0, 2.0)[0] == ForkComponent("scout1")
 
 
 def test_a_name_in_use_is_refused_with_its_pid() -> None:
@@ -408,4 +408,4 @@ def test_a_start_that_is_ended_from_outside_is_begun_again_also_without_restart(
     (fell, _) = supervision.exited(7, returncode, 1.2)
     assert isinstance(fell, ReportFell)
     assert fell.restart_in_s >= 0
-    assert Fork("arc") in supervision.woken(1.2 + fell.restart_in_s)
+    assert ForkComponent("arc") in supervision.woken(1.2 + fell.restart_in_s)

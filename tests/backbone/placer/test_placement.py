@@ -9,16 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.placer.messages import NoHost
-from backbone.placer.placement import Choice, HostView, obstacle, place
+from backbone.placer.placement import CandidateHost, Choice, obstacle, place
 
 TAGS = ["gl", "serial", "video"]
 NAMES = ["alpha", "beta", "gamma", "delta"]
 
 
 @st.composite
-def hosts(draw: st.DrawFn) -> list[HostView]:
+def hosts(draw: st.DrawFn) -> list[CandidateHost]:
     return [
-        HostView(
+        CandidateHost(
             name,
             frozenset(draw(st.sets(st.sampled_from(TAGS)))),
             draw(st.booleans()),
@@ -35,7 +35,7 @@ WANTED_TAGS = st.sets(st.sampled_from(TAGS), max_size=2)
 PINS = st.sampled_from(["", *NAMES])
 
 
-def filled(views: list[HostView], count: int) -> dict[str, int]:
+def filled(views: list[CandidateHost], count: int) -> dict[str, int]:
     """Place that many equal components one after the other and count them by host."""
     known = {view.name: view for view in views}
     placed = dict.fromkeys(known, 0)
@@ -48,7 +48,7 @@ def filled(views: list[HostView], count: int) -> dict[str, int]:
 
 @given(hosts(), WANTED_TAGS, PINS)
 def test_a_chosen_host_lives_has_the_tags_and_is_the_one_asked_for(
-    views: list[HostView], tags: set[str], pin: str
+    views: list[CandidateHost], tags: set[str], pin: str
 ) -> None:
     able = [view for view in views if view.alive and tags <= view.tags and pin in ("", view.name)]
     try:
@@ -65,9 +65,9 @@ def test_a_chosen_host_lives_has_the_tags_and_is_the_one_asked_for(
 
 @given(hosts(), WANTED_TAGS, PINS, st.randoms(use_true_random=False))
 def test_the_order_in_which_hosts_are_known_does_not_matter(
-    views: list[HostView], tags: set[str], pin: str, rng: object
+    views: list[CandidateHost], tags: set[str], pin: str, rng: object
 ) -> None:
-    def outcome(of: list[HostView]) -> Choice | str:
+    def outcome(of: list[CandidateHost]) -> Choice | str:
         try:
             return place("c", tags, pin, of)
         except NoHost as refused:
@@ -82,7 +82,9 @@ def test_the_order_in_which_hosts_are_known_does_not_matter(
 def test_equal_hosts_get_equal_numbers_whatever_noise_their_load_has(
     count: int, cores: int, noise: float, other_noise: float
 ) -> None:
-    views = [HostView(name, cpu=cpu, cores=cores) for name, cpu in zip(NAMES, (0.0, noise, other_noise), strict=False)]
+    views = [
+        CandidateHost(name, cpu=cpu, cores=cores) for name, cpu in zip(NAMES, (0.0, noise, other_noise), strict=False)
+    ]
     placed = filled(views, count)
     assert max(placed.values()) - min(placed.values()) <= 1
 
@@ -90,27 +92,31 @@ def test_equal_hosts_get_equal_numbers_whatever_noise_their_load_has(
 @given(st.integers(1, 40), st.floats(0, 1), st.floats(0, 1))
 def test_the_busier_of_two_equal_hosts_never_gets_more(count: int, cpu: float, other_cpu: float) -> None:
     idle, busy = sorted((cpu, other_cpu))
-    placed = filled([HostView("z_idle", cpu=idle), HostView("a_busy", cpu=busy)], count)
+    placed = filled([CandidateHost("z_idle", cpu=idle), CandidateHost("a_busy", cpu=busy)], count)
     assert placed["a_busy"] - placed["z_idle"] <= 1
 
 
 def test_twelve_equal_components_over_three_hosts_end_four_each() -> None:
-    assert filled([HostView(name) for name in NAMES[:3]], 12) == {"alpha": 4, "beta": 4, "gamma": 4}
+    assert filled([CandidateHost(name) for name in NAMES[:3]], 12) == {"alpha": 4, "beta": 4, "gamma": 4}
 
 
 def test_a_loaded_host_gets_fewer() -> None:
-    views = [HostView("alpha", cpu=0.9, cores=2), HostView("beta", cores=2), HostView("gamma", cores=2)]
+    views = [CandidateHost("alpha", cpu=0.9, cores=2), CandidateHost("beta", cores=2), CandidateHost("gamma", cores=2)]
     assert filled(views, 12) == {"alpha": 0, "beta": 6, "gamma": 6}
     assert filled([replace(views[0], cpu=0.2), *views[1:]], 12) == {"alpha": 2, "beta": 5, "gamma": 5}
 
 
 def test_a_host_with_full_memory_is_the_last_choice_but_one() -> None:
-    assert place("c", [], "", [HostView("alpha", memory=0.95), HostView("beta", components=5)]).host == "beta"
-    assert place("c", [], "", [HostView("alpha", memory=0.95)]).host == "alpha"
+    assert place("c", [], "", [CandidateHost("alpha", memory=0.95), CandidateHost("beta", components=5)]).host == "beta"
+    assert place("c", [], "", [CandidateHost("alpha", memory=0.95)]).host == "alpha"
 
 
 def test_a_refusal_names_every_host_and_why_not() -> None:
-    views = [HostView("alpha"), HostView("beta", frozenset({"gl"}), alive=False), HostView("gamma", frozenset({"gl"}))]
+    views = [
+        CandidateHost("alpha"),
+        CandidateHost("beta", frozenset({"gl"}), alive=False),
+        CandidateHost("gamma", frozenset({"gl"})),
+    ]
     with pytest.raises(NoHost) as refused:
         place("world", {"gl", "video"}, "", views)
     assert refused.value.detail == ("no host for world: alpha: lacks gl, video; beta: lacks video; gamma: lacks video")
@@ -120,10 +126,10 @@ def test_a_refusal_names_every_host_and_why_not() -> None:
 
 def test_a_host_that_does_not_exist_is_answered_with_the_nearest_one() -> None:
     with pytest.raises(NoHost, match=r"alhpa is no host with a creator \(did you mean 'alpha'\?\)"):
-        place("world", [], "alhpa", [HostView("alpha")])
+        place("world", [], "alhpa", [CandidateHost("alpha")])
     with pytest.raises(NoHost, match="no creator is known"):
         place("world", [], "", [])
 
 
 def test_a_host_without_obstacle_is_told_by_nothing() -> None:
-    assert obstacle(HostView("alpha"), [], "") == ""
+    assert obstacle(CandidateHost("alpha"), [], "") == ""

@@ -19,9 +19,9 @@ from backbone.placer.placement_book import (
     Inspect,
     Instruction,
     Note,
-    Phase,
     PlaceAgain,
     PlacementBook,
+    PlacementPhase,
 )
 
 
@@ -79,7 +79,7 @@ class World:
 
     def place(self, name: str) -> None:
         record = self.book.find(name)
-        if record is None or record.phase not in (Phase.WAITING, Phase.STARTING):
+        if record is None or record.phase not in (PlacementPhase.WAITING, PlacementPhase.STARTING):
             return
         try:
             host = self.book.choose(name, self.now_s).host
@@ -165,13 +165,13 @@ def test_nothing_runs_twice_and_what_is_wanted_runs_while_a_host_can_have_it(
             case _:
                 world.end_by_itself(host, name)
         real = [(where, what) for where in sorted(world.connected) for what in sorted(world.running[where])]
-        booked = [(r.host, r.spawn.name) for r in world.book.records() if r.phase is Phase.RUNNING]
+        booked = [(r.host, r.spawn.name) for r in world.book.records() if r.phase is PlacementPhase.RUNNING]
         assert sorted(real) == sorted(booked)
         assert len({what for _, what in real}) == len(real)
         for record in world.book.records():
-            if record.phase is Phase.WAITING:
+            if record.phase is PlacementPhase.WAITING:
                 assert not (world.connected if not record.pin else world.connected & {record.pin})
-            assert record.pin in ("", record.host) or record.phase is Phase.WAITING
+            assert record.pin in ("", record.host) or record.phase is PlacementPhase.WAITING
         assert sum(view.components for view in world.book.hosts()) == len(booked)
 
 
@@ -250,7 +250,7 @@ def test_an_old_listing_does_not_end_what_started_after_it_was_asked_for() -> No
     book = book_with("a")
     run(book, spawn("w1"), now_s=5.0)
     assert book.inspected("a", [], 4.0) == []
-    assert book.record("w1").phase is Phase.RUNNING
+    assert book.record("w1").phase is PlacementPhase.RUNNING
 
 
 def test_a_wanted_component_that_is_missing_is_placed_again_and_reported() -> None:

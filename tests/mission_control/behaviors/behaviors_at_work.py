@@ -29,7 +29,7 @@ MANY_MOMENTS = settings(max_examples=share(30), phases=[Phase.generate], derando
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 PEOPLE = 100  # a console's priority above every mission of these tests
-Hands = Callable[[Teleoperation], Awaitable[None]]
+Course = Callable[[Teleoperation], Awaitable[None]]
 
 
 def filmed_at(mission: MissionDescription, frame_rate_hz: float) -> MissionDescription:
@@ -57,35 +57,35 @@ class Person:
 
     def __init__(self) -> None:
         self.running: RunningMission | None = None
-        self._hands: list[Hands] = []
+        self._courses: list[Course] = []
         self._taken = 0
 
     def console(self, launch: Launch, bus: Bus, clock: Clock) -> Teleoperation:
-        return Teleoperation(launch, bus, clock, show=lambda _event: None, work=self._hands.pop(0), watches=False)
+        return Teleoperation(launch, bus, clock, show=lambda _event: None, work=self._courses.pop(0), watches=False)
 
-    async def take_over(self, robot: str, hands: Hands, kind: str = "drive") -> None:
-        """Take the robot, do with it what the hands do, give it back; return when all that is done."""
+    async def take_over(self, robot: str, course: Course, kind: str = "drive") -> None:
+        """Take the robot, drive the course, give the robot back, and return."""
         assert self.running is not None
         self._taken += 1
         name = f"console-{self._taken}"
-        self._hands.append(hands)
+        self._courses.append(course)
         given = {"robot": robot, "kind": kind, "priority": PEOPLE, "minimum_runtime_s": 0.1}
         await self.running.start(Start("console", name, given))
         while self.running.hosts.knows(name):
             await self.running.clock.sleep_s(0.05)
 
 
-def driving(left_rad_s: float, right_rad_s: float, lasts_s: float) -> Hands:
-    """Return hands that drive like this for so long."""
+def driving(left_rad_s: float, right_rad_s: float, lasts_s: float) -> Course:
+    """Return a course with these wheel speeds for this time."""
 
-    async def hands(console: Teleoperation) -> None:
+    async def course(console: Teleoperation) -> None:
         await console.wait_granted()
         until_s = console.clock.now_s() + lasts_s
         while console.clock.now_s() < until_s:
             await console.do(Drive(left_rad_s, right_rad_s))
             await console.clock.sleep_s(0.1)
 
-    return hands
+    return course
 
 
 @asynccontextmanager

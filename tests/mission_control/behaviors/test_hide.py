@@ -19,19 +19,19 @@ from mission_control.behaviors.dark_search import (
     VIEW_ROWS,
     DarkSearch,
     Glimpse,
-    Stage,
+    SearchStage,
     glimpse,
     is_same_view,
     sectors,
 )
 from mission_control.behaviors.hide import Hide, HideParameters
-from mission_control.behaviors.motion import STILL, Motion, Place, Position, turned
+from mission_control.behaviors.motion import STILL, FloorPoint, Motion, Position, turned
 from mission_control.messages import BehaviorStatus
 
 NAME, ROBOT = "hide-scout4", "scout4"
 STEP_S = 0.1
 PATTERN = np.random.default_rng(5).uniform(-12.0, 12.0, (VIEW_ROWS, 2))
-DARK, RADIUS_M = Place(3.0, 3.0), 0.7
+DARK, RADIUS_M = FloorPoint(3.0, 3.0), 0.7
 
 
 class PlayedRoom:
@@ -84,7 +84,7 @@ near_the_dark = st.builds(Position, st.floats(1.5, 4.5), st.floats(1.5, 4.5), st
 def test_from_anywhere_near_it_ends_in_the_dark_and_looks_out(begin: Position) -> None:
     search, room = dark_search(), PlayedRoom(begin)
     go_on(search, room, 600.0)
-    assert search.stage is Stage.HIDDEN
+    assert search.stage is SearchStage.HIDDEN
     assert room.distance_m < RADIUS_M
     assert search.decide(room.seen(), room.now_s) == STILL
 
@@ -106,7 +106,7 @@ def test_suspended_and_moved_at_any_moment_it_ends_in_the_dark_and_forgets_no_lo
         room.position = room.position if search.is_final else left_at or room.position
         assert search.looks == looks
     go_on(search, room, 900.0)
-    assert search.stage is Stage.HIDDEN
+    assert search.stage is SearchStage.HIDDEN
     assert room.distance_m < RADIUS_M
 
 
@@ -117,24 +117,24 @@ def test_a_look_around_goes_on_over_many_short_slices_if_the_robot_is_not_moved(
         search.interrupt()
         room.now_s += 10.0
         assert room.now_s < 120.0
-    assert search.stage in (Stage.TURN, Stage.GO)
+    assert search.stage in (SearchStage.TURN, SearchStage.GO)
 
 
 def test_a_robot_that_was_carried_away_looks_around_anew() -> None:
     search, room = dark_search(), PlayedRoom(Position(1.5, 1.5, 0.0))
     go_on(search, room, 12.0)
-    assert search.stage in (Stage.TURN, Stage.GO)
+    assert search.stage in (SearchStage.TURN, SearchStage.GO)
     search.interrupt()
     room.position = Position(4.2, 1.4, 2.0)
     go_on(search, room, 2.0)
-    assert search.stage is Stage.LOOK
+    assert search.stage is SearchStage.LOOK
     assert search.looks == 1
 
 
 def test_where_it_is_nowhere_dark_it_gives_up_after_its_looks() -> None:
     search, room = dark_search(looks=3), PlayedRoom(Position(60.0, 60.0, 0.0))
     go_on(search, room, 120.0)
-    assert search.stage is Stage.FAILED
+    assert search.stage is SearchStage.FAILED
     assert search.looks == 3
 
 

@@ -16,16 +16,16 @@ from mission_control.behaviors.jump_course import (
     LANDED_AFTER_S,
     Act,
     JumpCourse,
+    JumpStage,
     Obstacle,
-    Stage,
 )
 from mission_control.behaviors.jump_over import JumpOver, JumpOverParameters
-from mission_control.behaviors.motion import Motion, Place, Position, turned
+from mission_control.behaviors.motion import FloorPoint, Motion, Position, turned
 from mission_control.messages import BehaviorStatus
 
 STEP_S = 0.1
 NAME, ROBOT = "jump-scout2", "scout2"
-BOX = Obstacle(Place(3.0, 2.0), 0.0, 0.1)
+BOX = Obstacle(FloorPoint(3.0, 2.0), 0.0, 0.1)
 
 
 class PlayedRobot:
@@ -92,7 +92,7 @@ somewhere = st.builds(
 def test_from_anywhere_before_the_box_one_jump_brings_the_robot_over_and_it_drives_on(begin: Position) -> None:
     course, robot = jump_course(), PlayedRobot(begin)
     go_on(course, robot, 120.0)
-    assert course.stage is Stage.OVER
+    assert course.stage is JumpStage.OVER
     assert course.jumps == len(robot.jumped_s) == 1
     assert BOX.passed_m(robot.position) > BOX.depth_m + 0.5
 
@@ -100,7 +100,7 @@ def test_from_anywhere_before_the_box_one_jump_brings_the_robot_over_and_it_driv
 def test_a_robot_that_landed_on_its_back_is_righted_before_it_drives_on() -> None:
     course, robot = jump_course(), PlayedRobot(Position(2.0, 2.0, 0.0), lands_on_its_back=True)
     go_on(course, robot, 60.0)
-    assert course.stage is Stage.OVER
+    assert course.stage is JumpStage.OVER
     assert not robot.is_on_its_back
 
 
@@ -117,7 +117,7 @@ def test_suspended_at_any_moment_it_gets_over_and_never_disturbs_a_jump(
         robot.now_s += lasts_s
         robot.position = left_at or robot.position
     go_on(course, robot, 200.0)
-    assert course.stage is Stage.OVER
+    assert course.stage is JumpStage.OVER
     assert course.jumps == len(robot.jumped_s)
     assert robot.disturbed == 0
 
@@ -132,7 +132,7 @@ def test_it_gives_up_after_as_many_jumps_as_it_may_try() -> None:
             robot.now_s += STEP_S
         else:
             robot.obey(told)
-    assert course.stage is Stage.FAILED
+    assert course.stage is JumpStage.FAILED
     assert course.jumps == 2
 
 
@@ -145,7 +145,7 @@ def test_a_jump_that_was_not_obeyed_does_not_count() -> None:
     course.interrupt()
     robot.now_s += 10.0
     go_on(course, robot, 60.0)
-    assert course.stage is Stage.OVER
+    assert course.stage is JumpStage.OVER
     assert course.jumps == 1
 
 

@@ -16,9 +16,9 @@ from mission_control.behaviors.motion import (
     STILL,
     TRACK_M,
     WHEEL_RADIUS_M,
+    FloorPoint,
     Maneuver,
     Motion,
-    Place,
     Position,
     Watchdog,
     head_for,
@@ -29,10 +29,10 @@ from mission_control.behaviors.patrol_route import PatrolRoute
 from scout_model import dimensions
 
 STEP_S = 0.1
-SQUARE = [Place(1.0, 1.0), Place(3.0, 1.0), Place(3.0, 3.0), Place(1.0, 3.0)]
+SQUARE = [FloorPoint(1.0, 1.0), FloorPoint(3.0, 1.0), FloorPoint(3.0, 3.0), FloorPoint(1.0, 3.0)]
 
 coordinates = st.floats(0.0, 6.0)
-places = st.builds(Place, coordinates, coordinates)
+places = st.builds(FloorPoint, coordinates, coordinates)
 positions = st.builds(Position, coordinates, coordinates, st.floats(-math.pi, math.pi))
 
 
@@ -46,7 +46,7 @@ def obey(position: Position, motion: Motion, lasts_s: float = STEP_S) -> Positio
     )
 
 
-def route(waypoints: list[Place], *, rounds: int = 1, rest_s: float = 0.0) -> PatrolRoute:
+def route(waypoints: list[FloorPoint], *, rounds: int = 1, rest_s: float = 0.0) -> PatrolRoute:
     return PatrolRoute(waypoints, rounds=rounds, speed_m_s=0.25, reached_within_m=0.08, rest_s=rest_s)
 
 
@@ -54,7 +54,7 @@ def record(patrol: PatrolRoute) -> list[tuple[int, int]]:
     return [(visit.number, visit.waypoint) for visit in patrol.visits]
 
 
-def undisturbed(waypoints: list[Place], rounds: int) -> list[tuple[int, int]]:
+def undisturbed(waypoints: list[FloorPoint], rounds: int) -> list[tuple[int, int]]:
     return [(number + 1, number % len(waypoints)) for number in range(rounds * len(waypoints))]
 
 
@@ -86,7 +86,9 @@ def test_the_robot_has_the_sizes_of_the_model() -> None:
 
 
 @given(positions, places, st.floats(0.05, 0.3))
-def test_head_for_never_asks_for_more_than_the_robot_can_do(position: Position, place: Place, speed_m_s: float) -> None:
+def test_head_for_never_asks_for_more_than_the_robot_can_do(
+    position: Position, place: FloorPoint, speed_m_s: float
+) -> None:
     motion = head_for(position, place, speed_m_s)
     assert 0 <= motion.forward_m_s <= speed_m_s
     assert abs(motion.turn_rad_s) <= MOST_RAD_S
@@ -94,7 +96,7 @@ def test_head_for_never_asks_for_more_than_the_robot_can_do(position: Position, 
 
 @settings(max_examples=share(60))
 @given(positions, places)
-def test_head_for_brings_a_robot_there_and_to_rest(position: Position, place: Place) -> None:
+def test_head_for_brings_a_robot_there_and_to_rest(position: Position, place: FloorPoint) -> None:
     for _step in range(600):
         position = obey(position, head_for(position, place, 0.25))
     assert place.distance_m(position) < 0.02
@@ -140,7 +142,7 @@ def test_an_undisturbed_patrol_reaches_every_way_point_in_order_and_is_over() ->
 @settings(max_examples=share(80))
 @given(st.lists(places, min_size=1, max_size=5), st.integers(1, 2), positions, take_overs)
 def test_after_any_take_overs_the_record_is_that_of_an_undisturbed_patrol(
-    waypoints: list[Place], rounds: int, position: Position, disturbances: list[TakeOver]
+    waypoints: list[FloorPoint], rounds: int, position: Position, disturbances: list[TakeOver]
 ) -> None:
     patrol, now_s = route(waypoints, rounds=rounds), 0.0
     for disturbance in disturbances:

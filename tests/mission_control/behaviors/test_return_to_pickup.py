@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.bus.clock import run_virtual
-from mission_control.behaviors.motion import Motion, Place, Position
-from mission_control.behaviors.pickup_route import AWAY_M, NEAR_M, PickupRoute, Stage
+from mission_control.behaviors.motion import FloorPoint, Motion, Position
+from mission_control.behaviors.pickup_route import AWAY_M, NEAR_M, PickupRoute, PickupStage
 from mission_control.behaviors.return_to_pickup import PickupParameters, ReturnToPickup
 from mission_control.messages import BehaviorStatus
 
 NAME, ROBOT = "return-scout5", "scout5"
-NEAR = Place(2.0, 2.0)
+NEAR = FloorPoint(2.0, 2.0)
 positions = st.builds(Position, st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-math.pi, math.pi))
 
 
@@ -30,10 +30,10 @@ def test_far_from_the_mark_it_travels_first_and_near_it_goes_by_sight_at_once(po
     route = pickup_route()
     motion = route.decide(position, 0.0)
     if NEAR.distance_m(position) > AWAY_M:
-        assert route.stage is Stage.TRAVEL
+        assert route.stage is PickupStage.TRAVEL
         assert motion != Motion()
     else:
-        assert route.stage is Stage.BY_SIGHT
+        assert route.stage is PickupStage.BY_SIGHT
         assert motion == Motion()
 
 
@@ -42,9 +42,9 @@ def test_wherever_it_was_left_after_a_suspension_it_goes_on_from_there(before: P
     route = pickup_route()
     route.decide(before, 0.0)
     route.interrupt()
-    assert route.stage is Stage.UNKNOWN
+    assert route.stage is PickupStage.UNKNOWN
     route.decide(after, 100.0)
-    assert (route.stage is Stage.TRAVEL) == (NEAR.distance_m(after) > AWAY_M)
+    assert (route.stage is PickupStage.TRAVEL) == (NEAR.distance_m(after) > AWAY_M)
 
 
 def test_it_travels_until_it_is_near_and_is_freed_when_it_does_not_get_on() -> None:
@@ -52,21 +52,21 @@ def test_it_travels_until_it_is_near_and_is_freed_when_it_does_not_get_on() -> N
     motions = [route.decide(stuck, tenth / 10) for tenth in range(60)]
     assert Motion(-0.35) in motions
     assert route.decide(Position(2.0 + NEAR_M / 2, 2.0, 0.0), 6.0) == Motion()
-    assert route.stage is Stage.BY_SIGHT
+    assert route.stage is PickupStage.BY_SIGHT
 
 
 def test_what_was_looked_for_in_vain_is_remembered_over_a_suspension() -> None:
     route = pickup_route(attempts=2)
     route.decide(Position(2.0, 2.0, 0.0), 0.0)
     route.not_found()
-    assert route.stage is Stage.TRAVEL
+    assert route.stage is PickupStage.TRAVEL
     route.interrupt()
     assert route.in_vain == 1
     route.decide(Position(2.0, 2.0, 0.0), 50.0)
     route.not_found()
-    assert route.stage is Stage.FAILED
+    assert route.stage is PickupStage.FAILED
     route.interrupt()
-    assert route.stage is Stage.FAILED
+    assert route.stage is PickupStage.FAILED
 
 
 def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark() -> None:
@@ -75,7 +75,7 @@ def test_in_the_world_a_robot_that_was_driven_away_meanwhile_returns_to_its_mark
         async with at_work(example(NAME), person) as running:
             behavior = running.component(NAME)
             assert isinstance(behavior, ReturnToPickup)
-            await wait_until(running, lambda: behavior.route.stage is Stage.BY_SIGHT, 30.0)
+            await wait_until(running, lambda: behavior.route.stage is PickupStage.BY_SIGHT, 30.0)
             await person.take_over(ROBOT, driving(-12.0, -13.0, 6.0))
             await wait_until(running, lambda: behavior.status.is_final, 120.0)
             assert behavior.status is BehaviorStatus.SUCCESS, behavior.payload

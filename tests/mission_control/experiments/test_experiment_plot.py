@@ -24,14 +24,14 @@ from mission_control.experiments.plot import (
     series,
 )
 from mission_control.experiments.screen import table
-from mission_control.experiments.surveillance import Outcome, Row
+from mission_control.experiments.surveillance import ConditionRow, SurveillanceOutcome
 
 
-def row(condition: Condition, detected: int = 40, trials: int = 50, predicted: float = 0.8) -> Row:
-    return Row(condition, trials, detected, predicted, 0, 0, [], 0, 0, 1.0, "")
+def row(condition: Condition, detected: int = 40, trials: int = 50, predicted: float = 0.8) -> ConditionRow:
+    return ConditionRow(condition, trials, detected, predicted, 0, 0, [], 0, 0, 1.0, "")
 
 
-OUTCOME = Outcome(7, [row(condition) for condition in (*PAPERS, *QUARTER, *ALWAYS)], 1.0)
+OUTCOME = SurveillanceOutcome(7, [row(condition) for condition in (*PAPERS, *QUARTER, *ALWAYS)], 1.0)
 
 
 def luminance(color: str) -> float:
@@ -87,7 +87,7 @@ def test_the_picture_says_how_often_from_which_seed_and_what_each_line_is(tmp_pa
 def test_the_table_says_how_often_from_which_seed_and_explains_its_mark() -> None:
     console = Console(width=200, file=io.StringIO())
     with console.capture() as captured:
-        console.print(table(Outcome(3, [row(Condition(), 20, 50, 0.8)], 1.0), "Surveillance"))
+        console.print(table(SurveillanceOutcome(3, [row(Condition(), 20, 50, 0.8)], 1.0), "Surveillance"))
     drawn = captured.get()
     assert "Surveillance: 50 trials of each condition, seed 3" in drawn
     assert "s.e. !" in drawn

@@ -18,9 +18,9 @@ from mission_control.experiments.servoing import (
     OFF_AXIS_RAD,
     ROOM_M,
     STOP_M,
+    ServoOrder,
     ServoOutcome,
     ServoTrial,
-    TrialOrder,
     draw,
     run_servoing,
     run_trial,
@@ -71,7 +71,7 @@ def test_the_outcome_tells_rate_interval_and_every_failure() -> None:
 
 
 def test_a_trial_with_noise_ends_at_its_place_and_the_same_seed_gives_the_same() -> None:
-    trial = run_trial(TrialOrder(1, 0, 1.0))
+    trial = run_trial(ServoOrder(1, 0, 1.0))
     assert trial.succeeded, trial
     assert run_servoing(trials=1, seed=1, noise=1.0, jobs=1).trials == (trial,)
 

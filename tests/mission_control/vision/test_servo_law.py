@@ -31,7 +31,7 @@ from mission_control.vision.servo_law import (
     slewed,
     steer,
 )
-from mission_control.vision.skeleton_tracking import Phase
+from mission_control.vision.skeleton_tracking import TrackingPhase
 from mission_control.vision.target_pose import TargetPose
 
 FRAME_S = 1 / 30
@@ -58,7 +58,7 @@ class Robot:
         half_target_rad = math.atan(0.08 / max(self.pose.ahead_m, 0.01))
         is_seen = abs(self.pose.bearing_rad) + half_target_rad * math.cos(self.pose.off_axis_rad) < HALF_VIEW_RAD
         self.lost += not is_seen and bool(self.stages) and self.stages[-1] is not Stage.SEARCHING
-        phase, pose = (Phase.TRACKING, self.pose) if is_seen else (Phase.ACQUIRING, None)
+        phase, pose = (TrackingPhase.TRACKING, self.pose) if is_seen else (TrackingPhase.ACQUIRING, None)
         command = self.approach.step(phase, pose, FRAME_S)
         self.pose = self.pose.moved(command.forward_m_s * FRAME_S, command.turn_rad_s * FRAME_S)
         self.stages.append(self.approach.stage)
@@ -163,7 +163,7 @@ def test_taken_away_at_any_moment_it_arrives_after_it_is_resumed(
             robot.pose = robot.pose.moved(0.0, turned_rad)
             robot.approach.resumed()
             robot.stages.clear()
-            assert abs(robot.approach.step(Phase.ACQUIRING, None, 0.0).forward_m_s) == 0.0
+            assert abs(robot.approach.step(TrackingPhase.ACQUIRING, None, 0.0).forward_m_s) == 0.0
         robot.step()
     assert robot.approach.stage is Stage.ARRIVED
 
@@ -171,14 +171,14 @@ def test_taken_away_at_any_moment_it_arrives_after_it_is_resumed(
 def test_a_lost_target_stops_the_robot_and_is_looked_for_where_it_went() -> None:
     approach = Approach()
     for _ in range(20):
-        approach.step(Phase.TRACKING, at(1.5, 10.0, -9.0), FRAME_S)
+        approach.step(TrackingPhase.TRACKING, at(1.5, 10.0, -9.0), FRAME_S)
     assert approach.stage is Stage.FORWARD
-    moving = approach.step(Phase.TRACKING, at(1.5, 10.0, -9.0), FRAME_S)
-    stopping = [approach.step(Phase.SEARCHING, None, FRAME_S) for _ in range(20)]
+    moving = approach.step(TrackingPhase.TRACKING, at(1.5, 10.0, -9.0), FRAME_S)
+    stopping = [approach.step(TrackingPhase.SEARCHING, None, FRAME_S) for _ in range(20)]
     assert abs(moving.turn_rad_s) > 0
     assert stopping[-1] == HALT
     assert approach.stage is Stage.FORWARD
-    turns = [approach.step(Phase.ACQUIRING, None, FRAME_S).turn_rad_s for _ in range(60)]
+    turns = [approach.step(TrackingPhase.ACQUIRING, None, FRAME_S).turn_rad_s for _ in range(60)]
     assert approach.stage is Stage.SEARCHING
     assert min(turns) == -SEARCH_TURN_RAD_S
     assert max(turns) <= 0
@@ -187,10 +187,10 @@ def test_a_lost_target_stops_the_robot_and_is_looked_for_where_it_went() -> None
 def test_a_burst_of_bad_pictures_does_not_start_a_search() -> None:
     approach = Approach()
     for _ in range(20):
-        approach.step(Phase.TRACKING, at(1.5, 10.0), FRAME_S)
+        approach.step(TrackingPhase.TRACKING, at(1.5, 10.0), FRAME_S)
     for _ in range(8):
-        approach.step(Phase.SEARCHING, None, FRAME_S)
-    assert approach.step(Phase.TRACKING, at(1.5, 10.0), FRAME_S).forward_m_s >= 0
+        approach.step(TrackingPhase.SEARCHING, None, FRAME_S)
+    assert approach.step(TrackingPhase.TRACKING, at(1.5, 10.0), FRAME_S).forward_m_s >= 0
     assert approach.stage is Stage.FORWARD
 
 
@@ -198,7 +198,7 @@ def test_without_a_target_it_looks_all_around_standing_still_between_steps() -> 
     """RAM 2002: it rotates a few degrees and tries again."""
     approach, heading_rad, looked_at = Approach(), 0.0, []
     for _ in range(1200):
-        command = approach.step(Phase.ACQUIRING, None, FRAME_S)
+        command = approach.step(TrackingPhase.ACQUIRING, None, FRAME_S)
         assert command.forward_m_s == 0.0
         if command == HALT:
             looked_at.append(heading_rad)
@@ -212,10 +212,10 @@ def test_without_a_target_it_looks_all_around_standing_still_between_steps() -> 
 def test_who_is_stuck_while_backing_off_approaches_again() -> None:
     approach, near = Approach(), at(STOP_M, 20.0)
     for _ in range(12):
-        approach.step(Phase.TRACKING, near, FRAME_S)
+        approach.step(TrackingPhase.TRACKING, near, FRAME_S)
     seen = []
     for _ in range(30 * 40):
-        approach.step(Phase.TRACKING, near, FRAME_S)
+        approach.step(TrackingPhase.TRACKING, near, FRAME_S)
         seen.append(approach.stage)
     assert Stage.BACKING in seen
     assert Stage.FORWARD in seen[seen.index(Stage.BACKING) :]

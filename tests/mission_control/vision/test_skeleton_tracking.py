@@ -15,8 +15,8 @@ from mission_control.vision.skeleton_tracking import (
     REACH_COLUMNS_PX,
     REACH_ROWS_PX,
     SEARCH_FRAMES,
-    Phase,
     TargetTracker,
+    TrackingPhase,
     best_shift_px,
     search_subimage,
     steadied,
@@ -32,7 +32,7 @@ def model_of(frame: Picture) -> TargetModel:
     return TargetModel.seen(frame, sighting.blobs_px)
 
 
-def phases(tracker: TargetTracker, pictures: list[Picture]) -> list[Phase]:
+def phases(tracker: TargetTracker, pictures: list[Picture]) -> list[TrackingPhase]:
     return [tracker.look(picture).phase for picture in pictures]
 
 
@@ -101,18 +101,18 @@ def test_the_phases_of_a_target_that_disappears_and_comes_back() -> None:
     tracker, frame = TargetTracker(), view(1.0)
     seen = phases(tracker, [blank(), frame, frame, *[blank()] * 3, frame, *[blank()] * (SEARCH_FRAMES + 1), frame])
     assert seen == [
-        Phase.ACQUIRING,
-        *[Phase.TRACKING] * 2,
-        *[Phase.SEARCHING] * 3,
-        Phase.TRACKING,
-        *[Phase.SEARCHING] * (SEARCH_FRAMES - 1),
-        *[Phase.ACQUIRING] * 2,
-        Phase.TRACKING,
+        TrackingPhase.ACQUIRING,
+        *[TrackingPhase.TRACKING] * 2,
+        *[TrackingPhase.SEARCHING] * 3,
+        TrackingPhase.TRACKING,
+        *[TrackingPhase.SEARCHING] * (SEARCH_FRAMES - 1),
+        *[TrackingPhase.ACQUIRING] * 2,
+        TrackingPhase.TRACKING,
     ]
 
 
-@pytest.mark.parametrize(("match", "ends_in"), [(0.71, Phase.TRACKING), (0.69, Phase.ACQUIRING)])
-def test_at_71_percent_tracking_goes_on_and_at_69_it_ends_in_acquisition(match: float, ends_in: Phase) -> None:
+@pytest.mark.parametrize(("match", "ends_in"), [(0.71, TrackingPhase.TRACKING), (0.69, TrackingPhase.ACQUIRING)])
+def test_at_71_percent_tracking_goes_on_and_at_69_it_ends_in_acquisition(match: float, ends_in: TrackingPhase) -> None:
     """RAM 2002: back to acquisition if the best target model matches less than 70 % of the target."""
     frame = view(0.6)
     model, spoiled = model_of(frame), spoiled_to(frame, match)
@@ -121,7 +121,7 @@ def test_at_71_percent_tracking_goes_on_and_at_69_it_ends_in_acquisition(match: 
     tracker = TargetTracker()
     tracker.look(frame)
     seen = phases(tracker, [spoiled] * SEARCH_FRAMES)
-    assert seen[0] is (Phase.TRACKING if match > 0.7 else Phase.SEARCHING)
+    assert seen[0] is (TrackingPhase.TRACKING if match > 0.7 else TrackingPhase.SEARCHING)
     assert seen[-1] is ends_in
 
 
@@ -134,7 +134,7 @@ def test_an_approaching_target_is_followed_from_picture_to_picture(seed: int, si
         pose = polar(1.6 - 0.04 * number, start_deg, -6.0 + 0.4 * number)
         track = tracker.look(noisy(view(*pose), rng, sigma))
         if number > 2:
-            assert track.phase is Phase.TRACKING
+            assert track.phase is TrackingPhase.TRACKING
             assert track.sighting is not None
             assert np.abs(track.sighting.blobs_px - discs_in_picture(*pose)).max() < 2.0
 
@@ -145,9 +145,9 @@ def test_a_spoiled_picture_does_not_spoil_the_model() -> None:
     before = tracker.model
     for _ in range(SEARCH_FRAMES - 1):
         snow = rng.integers(0, 256, frame.shape).astype(np.uint8)
-        assert tracker.look(snow).phase is Phase.SEARCHING
+        assert tracker.look(snow).phase is TrackingPhase.SEARCHING
         assert tracker.model is before
-    assert tracker.look(frame).phase is Phase.TRACKING
+    assert tracker.look(frame).phase is TrackingPhase.TRACKING
 
 
 def test_a_match_updates_the_model() -> None:
@@ -204,10 +204,10 @@ def test_a_shape_that_was_wrong_at_the_beginning_comes_right() -> None:
 
 def test_who_forgets_begins_with_acquisition() -> None:
     tracker, frame = TargetTracker(), view(1.0)
-    assert tracker.look(frame).phase is Phase.TRACKING
+    assert tracker.look(frame).phase is TrackingPhase.TRACKING
     tracker.forget()
     assert tracker.model is None
-    assert tracker.look(blank()).phase is Phase.ACQUIRING
+    assert tracker.look(blank()).phase is TrackingPhase.ACQUIRING
 
 
 def test_only_grey_pictures_are_tracked() -> None:

@@ -9,7 +9,7 @@ import pytest
 from landmark_pictures import BOARD, polar, view, world_with_landmark
 
 from mission_control.vision.servo_law import CREEP_M_S, HALT, STOP_M, Command, Stage
-from mission_control.vision.skeleton_tracking import Phase
+from mission_control.vision.skeleton_tracking import TrackingPhase
 from mission_control.vision.visual_servo import VisualServo
 from scout_model.camera import Camera
 from scout_model.description import AS_THE_PAPERS
@@ -74,7 +74,12 @@ def test_after_it_is_resumed_it_begins_with_acquisition_and_at_rest() -> None:
     assert step.command != HALT
     servo.resumed()
     step = servo.see(np.full((240, 320), 128, np.uint8), 3.0)
-    assert (step.stage, step.track.phase, step.command, step.pose) == (Stage.SEARCHING, Phase.ACQUIRING, HALT, None)
+    assert (step.stage, step.track.phase, step.command, step.pose) == (
+        Stage.SEARCHING,
+        TrackingPhase.ACQUIRING,
+        HALT,
+        None,
+    )
 
 
 def test_a_way_driven_between_two_pictures_is_taken_into_account() -> None:

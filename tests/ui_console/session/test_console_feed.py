@@ -131,7 +131,7 @@ def test_one_that_comes_late_hears_how_things_are_and_then_what_changes(stage: C
                 manager.bus.publish(RC_MANAGER, Conversation.SCHEDULE, Schedule(9.0, [], [], []))
                 await on.until(lambda: not on.model.robots(9.0))
                 manager.bus.publish(RC_MANAGER, Conversation.LEASES, Leases([Lease("a", "b", 1)], 2.0))
-                manager.tell("scout1", "saw something")
+                manager.publish_event("scout1", "saw something")
                 await on.until(lambda: "leases" in on.words() and on.model.log())
                 assert on.model.log()[-1].what == "saw something"
 

@@ -119,6 +119,6 @@ async def test_what_was_found_stands_still_while_the_mission_goes_on(stage: Stag
         await page.get_by_role("button", name="Search").click()
         assert len(await rows(page)) == 1
         await page.evaluate("() => { window.row = document.querySelector('#panel tbody tr'); }")
-        stage.hub.observer.tell("scout2", "did something else")
+        stage.hub.observer.publish_event("scout2", "did something else")
         await page.wait_for_timeout(1500)
         assert await page.evaluate("() => window.row.isConnected")
