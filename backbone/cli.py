@@ -6,7 +6,6 @@ and ``check`` stay quick. Exit codes are those of ARCHITECTURE.md, section 5; se
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 import sys
@@ -20,13 +19,14 @@ import typer
 
 from backbone.cli_options import (
     AsJson,
+    CommandTable,
     ComponentName,
     Endpoint,
     MissionFile,
     MissionName,
     NameOrCause,
     SecretFile,
-    WholeHelp,
+    Version,
     complete_name,
     complete_person,
     complete_resource,
@@ -39,7 +39,7 @@ from backbone.errors import BackboneError
 from backbone.spoken import counted, value_text
 
 app = typer.Typer(
-    cls=WholeHelp,
+    cls=CommandTable,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -69,6 +69,8 @@ def main() -> None:
 
 def run(work: Callable[[], Awaitable[int]]) -> None:
     """Run a command's coroutine and end the process with its exit code; refusals become one line."""
+    import asyncio
+
     import uvloop
 
     async def guarded() -> int:
@@ -121,6 +123,11 @@ def read_or_exit(mission_file: Path) -> Any:
     except MissionInvalid as invalid:
         print(invalid)
         raise typer.Exit(int(ExitCode.MISSION_INVALID)) from None
+
+
+@app.callback()
+def _before_each_command(version: Version = False) -> None:
+    """Read the options that go before a command."""
 
 
 @app.command()

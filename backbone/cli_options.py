@@ -1,34 +1,70 @@
-"""What the command lines share: options, the names that shells complete, and help that is told whole.
+"""What the command lines share: options, completed names, whole summaries, and a table that loads only what it needs.
 
-What a completion needs is imported inside it, so that ``--help`` stays quick.
+A completion imports what it needs when a shell asks for it, so that ``--help`` stays quick.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
+DISTRIBUTION = "scout-backbone"
 
-class WholeHelp(TyperGroup):
-    """Lists commands with all that is said of each; other lists cut it at the end of the line."""
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write a row for each command."""
-        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        rows = [
-            (name, _first_paragraph(one.help or "")) for name, one in commands if one is not None and not one.hidden
-        ]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
+class CommandTable(TyperGroup):
+    """Shows each command's summary whole, and converts only those values that need it.
+
+    Typer cuts summaries at the end of the line. It also loads pydantic to convert a value, even if the value is absent
+    or a shell asks for completions; that import takes longer than everything else that ``status`` loads.
+    """
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for command in self.commands.values():
+            command.short_help = command.short_help or _first_paragraph(command.help or "")
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the words before the command's name."""
+        _convert_only_what_needs_it(self.get_params(ctx))
+        return super().parse_args(ctx, args)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> tuple[Any, Any, list[str]]:
+        """Find the command that the words name."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            _convert_only_what_needs_it(command.get_params(ctx))
+        return name, command, rest
+
+
+def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
+    for parameter in parameters:
+        parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
+
+
+def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: Any) -> Any:
+    """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
+    is_absent = value is None and not is_required
+    return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)
 
 
 def _first_paragraph(text: str) -> str:
     return " ".join(text.partition("\n\n")[0].split())
+
+
+def print_version(is_asked: bool) -> None:
+    """Print the installed version and end the command; for the option ``--version``."""
+    if is_asked:
+        from importlib.metadata import version
+
+        print(f"{DISTRIBUTION} {version(DISTRIBUTION)}")
+        raise typer.Exit
 
 
 ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/[^\s/]+:[0-9]{1,5}([?#]\S*)?|unixsock-stream/\S+")
@@ -43,42 +79,63 @@ def hub_endpoint(value: str | None) -> str | None:
 
 def complete_mission() -> list[str]:
     """Return the missions that are up on this machine."""
-    from backbone.completion import missions_now
+    from backbone.errors import BackboneError
+    from backbone.run_files import find_all
 
-    return missions_now()
+    try:
+        return [run_file.mission for run_file in find_all()]
+    except (BackboneError, OSError):
+        return []
 
 
 def picture_for(ctx: typer.Context) -> Any:
-    """Return how the mission is that the words typed so far are about; None if there is none."""
+    """Return the picture of the mission that the words typed so far name; None if there is none.
+
+    The bus is loaded only if there is a mission to ask.
+    """
+    mission, endpoint = ctx.params.get("mission"), ctx.params.get("connect")
+    can_ask = (mission and ENDPOINT.fullmatch(endpoint)) if endpoint is not None else complete_mission()
+    if not can_ask:
+        return None
     from backbone.completion import picture_now
 
-    return picture_now(ctx.params.get("mission"), ctx.params.get("connect"), ctx.params.get("secret_file"))
+    secret_file = ctx.params.get("secret_file")
+    return picture_now(mission, endpoint, Path(secret_file) if secret_file is not None else None)
 
 
 def complete_name(ctx: typer.Context) -> list[str]:
     """Return what can be asked about in the mission that is up."""
+    picture = picture_for(ctx)
+    if picture is None:
+        return []
     from backbone.completion import names_of
 
-    picture = picture_for(ctx)
-    return names_of(picture) if picture is not None else []
+    return names_of(picture)
 
 
 def complete_resource(ctx: typer.Context) -> list[str]:
     """Return the resources of the mission that is up."""
+    picture = picture_for(ctx)
+    if picture is None:
+        return []
     from backbone.completion import resources_of
 
-    picture = picture_for(ctx)
-    return resources_of(picture) if picture is not None else []
+    return resources_of(picture)
 
 
 def complete_person(ctx: typer.Context) -> list[str]:
     """Return the people at the consoles of the mission that is up."""
+    picture = picture_for(ctx)
+    if picture is None:
+        return []
     from backbone.completion import people_of
 
-    picture = picture_for(ctx)
-    return people_of(picture) if picture is not None else []
+    return people_of(picture)
 
 
+Version = Annotated[
+    bool, typer.Option("--version", callback=print_version, is_eager=True, help="Show the version and exit.")
+]
 MissionFile = Annotated[Path, typer.Argument(help="The mission file.", metavar="MISSION.xml")]
 MissionName = Annotated[
     str | None,

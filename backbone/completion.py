@@ -15,7 +15,6 @@ from backbone.errors import BackboneError
 from backbone.mission_picture import MissionPicture, look
 from backbone.naming import component_of
 from backbone.people import is_console
-from backbone.run_files import find_all
 from backbone.visit import visiting
 
 WITHIN_S = 1.5  # chosen: a person who pressed Tab waits no longer
@@ -61,11 +60,3 @@ def picture_now(mission: str | None, connect: str | None, secret_file: Path | No
         return asyncio.run(looked())
     except (BackboneError, TimeoutError, OSError):
         return None
-
-
-def missions_now() -> list[str]:
-    """Return the missions that are up on this machine."""
-    try:
-        return [run_file.mission for run_file in find_all()]
-    except (BackboneError, OSError):
-        return []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from backbone.cli import run
-from backbone.cli_options import SecretFile, WholeHelp, complete_mission, finite, hub_endpoint, picture_for
+from backbone.cli_options import CommandTable, SecretFile, Version, complete_mission, finite, hub_endpoint, picture_for
 from backbone.endings import ExitCode, say
 from ui_console.profile import Profile
 
@@ -27,7 +27,7 @@ SHORTEST_RUNTIME_S = 0.01  # chosen: shorter than a switch
 AWAY_AFTER_S = 120.0  # chosen: longer than a look at something else; then the robot goes on with useful work
 
 app = typer.Typer(
-    cls=WholeHelp,
+    cls=CommandTable,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,
@@ -39,10 +39,12 @@ app = typer.Typer(
 
 def complete_robot(ctx: typer.Context) -> list[str]:
     """Return the robots of the mission that is up, for a shell."""
-    from ui_console.team_model import ROBOT_KIND
-
     picture = picture_for(ctx)
     rcs = picture.schedule.rcs if picture is not None and picture.schedule is not None else []
+    if not rcs:
+        return []
+    from ui_console.team_model import ROBOT_KIND
+
     return sorted(rc.rc for rc in rcs if rc.kind == ROBOT_KIND)
 
 
@@ -56,6 +58,11 @@ Connect = Annotated[
 
 
 User = Annotated[str, typer.Option("--user", help="Who you are, for the record; default: who is logged in.")]
+
+
+@app.callback()
+def _before_each_command(version: Version = False) -> None:
+    """Read the options that go before a command."""
 
 
 @app.command()

@@ -10,10 +10,11 @@ from typing import Annotated, Any
 
 import typer
 
-from backbone.cli_options import finite
+from backbone.cli_options import CommandTable, finite
 from backbone.errors import Refusal, code_of
 
 app = typer.Typer(
+    cls=CommandTable,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     no_args_is_help=True,

@@ -1,0 +1,104 @@
+"""How long a person waits for the command line: help, version, completion, status, beside a bare interpreter.
+
+Prints one JSON line for each command: its median time from the start of the process to its end, and as floor that of
+``python -c pass``, both measured in turns. Completion and status run without a mission and beside the smallest one.
+``--aim`` ends with 1 if a median is above its aim.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+
+from measuring import report
+
+MISSION = Path(__file__).parents[1] / "docs" / "examples" / "smallest.xml"
+PROGRAMS = Path(sys.executable).parent
+FLOOR = (sys.executable, "-c", "pass")
+HELP_S = COMPLETION_S = 0.12  # chosen: a person takes a tenth of a second for at once
+STATUS_S = 0.3  # chosen: with the time that the mission takes to answer
+
+
+def completion(*typed: str) -> dict[str, str]:
+    """Return what bash sets to ask for completions of the last word."""
+    name = f"_{typed[0].replace('-', '_').upper()}_COMPLETE"
+    return {name: "complete_bash", "COMP_WORDS": " ".join(typed), "COMP_CWORD": str(len(typed) - 1)}
+
+
+def seconds(command: Sequence[str], environment: Mapping[str, str]) -> float:
+    """Run the command once, and return how long it lived."""
+    began_s = time.perf_counter()
+    subprocess.run(command, env=environment, check=False, capture_output=True)
+    return time.perf_counter() - began_s
+
+
+def measure(name: str, command: Sequence[str], aim_s: float, rounds: int, environment: Mapping[str, str]) -> bool:
+    """Print one JSON line about the command, and say whether it is within its aim."""
+    took, floors = [], []
+    for _ in range(rounds):
+        floors.append(seconds(FLOOR, environment))
+        took.append(seconds(command, environment))
+    took_s, floor_s = median(took), median(floors)
+    report(
+        f"command_line {name}",
+        rounds=rounds,
+        ms=round(took_s * 1e3, 1),
+        best_ms=round(min(took) * 1e3, 1),
+        aim_ms=round(aim_s * 1e3),
+        floor="python -c pass",
+        floor_ms=round(floor_s * 1e3, 1),
+        ratio=round(took_s / floor_s, 1),
+    )
+    return took_s <= aim_s
+
+
+@contextmanager
+def mission(environment: Mapping[str, str]) -> Iterator[None]:
+    """Have the smallest mission up until the block ends."""
+    program = str(PROGRAMS / "scout-backbone")
+    subprocess.run([program, "up", str(MISSION), "--detach"], env=environment, check=True, capture_output=True)
+    try:
+        yield
+    finally:
+        subprocess.run([program, "down"], env=environment, check=True, capture_output=True)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=20)
+    parser.add_argument("--aim", action="store_true")
+    given = parser.parse_args()
+    backbone, console = str(PROGRAMS / "scout-backbone"), str(PROGRAMS / "scout-console")
+    with tempfile.TemporaryDirectory() as folder:
+        plain = {**os.environ, "XDG_RUNTIME_DIR": folder}
+        names = {**plain, **completion("scout-backbone", "why", "")}
+        robots = {**plain, **completion("scout-console", "attach", "")}
+        commands = {**plain, **completion("scout-backbone", "st")}
+        within = [
+            measure("scout-backbone --help", (backbone, "--help"), HELP_S, given.rounds, plain),
+            measure("scout-console --help", (console, "--help"), HELP_S, given.rounds, plain),
+            measure("scout-backbone --version", (backbone, "--version"), HELP_S, given.rounds, plain),
+            measure("scout-backbone st<Tab>", (backbone,), COMPLETION_S, given.rounds, commands),
+            measure("scout-backbone why <Tab>, no mission", (backbone,), COMPLETION_S, given.rounds, names),
+        ]
+        with mission(plain):
+            within += [
+                measure("scout-backbone why <Tab>, mission up", (backbone,), COMPLETION_S, given.rounds, names),
+                measure("scout-console attach <Tab>, mission up", (console,), COMPLETION_S, given.rounds, robots),
+                measure("scout-backbone status, mission up", (backbone, "status"), STATUS_S, given.rounds, plain),
+            ]
+    if given.aim and not all(within):
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()
