@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import limits
 import pytest
 from hypothesis import settings
 
@@ -23,14 +24,22 @@ from backbone.component.launch import Launch
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
 
-# The same examples every time, so that two runs of one commit say the same; SCOUT_SEARCH=1 looks for new ones.
-settings.register_profile("repeatable", derandomize=True)
-settings.register_profile("searching", derandomize=False)
-settings.load_profile("searching" if os.environ.get("SCOUT_SEARCH") else "repeatable")
+# Few examples for a person who waits, all of them in CI; both the same in every run, so that two runs of one commit say
+# the same. "search" looks for new ones. No deadline: how long an example takes is the machine's affair.
+settings.register_profile("quick", max_examples=25, derandomize=True, deadline=None)
+settings.register_profile("full", max_examples=100, derandomize=True, deadline=None)
+settings.register_profile("search", max_examples=100, derandomize=False, deadline=None)
+settings.load_profile(os.environ.get("SCOUT_EXAMPLES", "quick"))
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that starts us in the background has SIGINT ignored, and all our children would inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Have limits for each test, and failures printed when they happen."""
+    limits.watch(config)
+
 
 MissionNetwork = Callable[..., AbstractAsyncContextManager[LocalNetwork]]
 

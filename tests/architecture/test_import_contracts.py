@@ -93,10 +93,12 @@ def test_what_is_allowed_is_not_complained_about(
     assert broken_with(edges, tmp_path, file, line) == {}
 
 
+@pytest.mark.processes
 def test_import_linter_finds_the_walls_standing() -> None:
     assert "0 broken" in lint_imports(TOP)
 
 
+@pytest.mark.processes
 def test_import_linter_finds_a_violation_of_each_wall_in_a_copy_of_the_tree(tmp_path: Path) -> None:
     shutil.copy(TOP / "pyproject.toml", tmp_path)
     for package in PACKAGES:

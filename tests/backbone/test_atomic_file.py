@@ -40,6 +40,7 @@ def test_a_file_is_replaced_and_keeps_its_mode(tmp_path: Path) -> None:
     assert names(tmp_path) == ["mission.xml"]
 
 
+@pytest.mark.processes
 def test_kills_while_saving_leave_one_file_which_the_next_save_uses_up(tmp_path: Path) -> None:
     target = tmp_path / "mission.xml"
     replace_file(target, b"old")
@@ -51,6 +52,7 @@ def test_kills_while_saving_leave_one_file_which_the_next_save_uses_up(tmp_path:
     assert (target.read_bytes(), names(tmp_path)) == (b"n", ["mission.xml"])
 
 
+@pytest.mark.processes
 def test_the_leftover_of_a_killed_save_is_removed_at_the_next_opening(tmp_path: Path) -> None:
     target = tmp_path / "mission.xml"
     kill_while_saving(target)

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.processes
+
 HEAVY = {"asyncio", "cv2", "lxml", "mujoco", "numpy", "pydantic", "rich", "textual", "uvloop", "zenoh"}
 PROGRAMS = {"scout-backbone": "backbone.cli", "scout-console": "ui_console.cli"}
 RUN = """

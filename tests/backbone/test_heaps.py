@@ -41,5 +41,6 @@ def heaps(how: str) -> int:
     return len(re.findall("<heap nr=", done.stdout))
 
 
+@pytest.mark.processes
 def test_threads_share_few_heaps_where_each_would_have_its_own() -> None:
     assert heaps("few") <= FEW < heaps("as it is")

@@ -55,6 +55,7 @@ def test_of_several_missions_one_must_be_named() -> None:
     assert run_files.find("two").mission == "two"
 
 
+@pytest.mark.processes
 def test_the_file_of_a_launcher_that_ended_is_stale() -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as launcher:
         run_files.write(up("iros2001", launcher.pid))
@@ -109,6 +110,7 @@ def test_a_mission_name_cannot_lead_out_of_the_folder() -> None:
         run_files.run_directory("../elsewhere")
 
 
+@pytest.mark.processes
 def test_folders_that_killed_zygotes_hid_are_removed_at_the_next_beginning() -> None:
     directory = run_files.prepare("iros2001")
     child = subprocess.Popen(["true"])

@@ -667,6 +667,7 @@ def test_parameters_that_do_not_fit_are_refused_before_anything_runs(placer_worl
     placer_world(scene)
 
 
+@pytest.mark.processes
 def test_a_behaviors_process_loads_neither_pydantic_nor_a_screen() -> None:
     check = (
         "import sys, mission_control.behaviors.watch_for_motion, mission_control.behaviors.surveillance;"

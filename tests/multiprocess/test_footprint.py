@@ -15,6 +15,8 @@ from running_mission import RunningMission, mission_up
 from backbone.bus.zenoh_bus import client_config
 from backbone.keys import Conversation, key
 
+pytestmark = pytest.mark.processes
+
 WARM_UP_S, HOSTILE_S = 180.0, 180.0  # a framegrabber fills its stores of noise and pictures for three minutes
 LOG_KB = 2 * 1024 + 256  # a log and the one before it, each a little over its size
 FEW_BYTES = 10_000  # the big ones are for a test of their own; here it is many that counts

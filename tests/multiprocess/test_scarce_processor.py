@@ -58,11 +58,13 @@ def test_a_mission_on_one_core_comes_up_and_stays_whole() -> None:
         stays_whole(mission)
 
 
+@pytest.mark.alone
 def test_a_mission_beside_twenty_busy_processes_comes_up_and_stays_whole() -> None:
     with busy_neighbors(20), mission_up() as mission:
         stays_whole(mission)
 
 
+@pytest.mark.alone
 def test_a_mission_beside_busy_processes_on_its_one_core_comes_up_and_stays_whole() -> None:
     with one_core(), busy_neighbors(5), mission_up() as mission:
         stays_whole(mission)

@@ -20,6 +20,7 @@ LIGHT = [
 ]
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize("modules", [", ".join(LIGHT)])
 def test_rcs_and_arcs_load_no_arrays_no_pictures_and_no_physics(modules: str) -> None:
     program = f"import sys, {modules}; print(*(name for name in {HEAVY!r} if name in sys.modules))"

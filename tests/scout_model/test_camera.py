@@ -118,10 +118,12 @@ def test_a_process_not_prepared_for_opengl_is_told_so(monkeypatch: pytest.Monkey
         prepare("egl")
 
 
+@pytest.mark.processes
 def test_a_painting_process_needs_no_opengl(tmp_path: Path) -> None:
     assert len(views("none", tmp_path)) == 9
 
 
+@pytest.mark.processes
 def test_rendered_and_painted_pictures_show_the_same(gl: GlSupport, tmp_path: Path) -> None:
     if gl.backend == "none":
         pytest.skip(f"no OpenGL here; install {gl.missing_packages}")
@@ -190,6 +192,7 @@ def test_a_disk_that_is_full_makes_probing_only_slower(tmp_path: Path, monkeypat
     assert len(probed) == 3, "kept as soon as there is room"
 
 
+@pytest.mark.processes
 def test_probing_imports_no_mujoco() -> None:
     program = "import sys; from scout_model.gl_probe import probe; probe(0.001); assert 'mujoco' not in sys.modules"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)

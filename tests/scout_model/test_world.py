@@ -244,6 +244,7 @@ def test_a_description_that_makes_no_sense_is_refused(description: WorldDescript
         World(description)
 
 
+@pytest.mark.processes
 def test_the_world_needs_neither_opencv_nor_opengl() -> None:
     program = "import sys, scout_model.world; assert not {'cv2', 'OpenGL.GL', 'OpenGL.EGL'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)

@@ -43,6 +43,7 @@ def test_missions_are_busy() -> None:
         assert word in words, f"no mission in which anybody is told: {word}"
 
 
+@pytest.mark.processes
 def test_a_seed_means_one_run_to_the_byte_in_every_process() -> None:
     found = set()
     for hash_seed in ("1", "2"):

@@ -52,6 +52,7 @@ def test_another_machines_mission_must_be_named() -> None:
     assert done.exit_code == 2
 
 
+@pytest.mark.processes
 def test_help_loads_no_screen_and_no_bus() -> None:
     check = (
         "import sys, ui_console.cli;"

@@ -67,6 +67,7 @@ def test_a_question_takes_no_virtual_time() -> None:
     run_virtual(main())
 
 
+@pytest.mark.virtual_limit(1e5)
 def test_a_deadline_is_exact_in_virtual_time() -> None:
     async def main() -> None:
         bus = LocalNetwork().join("backbone/source", VirtualClock())

@@ -211,6 +211,7 @@ def test_before_it_is_ready_nobody_can_ask() -> None:
     live(law())
 
 
+@pytest.mark.virtual_limit(4e3)
 def test_a_component_whose_work_is_done_lives_on() -> None:
     async def law() -> None:
         stage = Stage()

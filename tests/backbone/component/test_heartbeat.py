@@ -76,6 +76,7 @@ def test_a_full_disk_stops_no_heartbeat(tmp_path: Path, monkeypatch: pytest.Monk
     assert (vitals.beats, vitals.doing) == (11, "")
 
 
+@pytest.mark.processes
 def test_a_process_that_has_ended_has_no_vitals(tmp_path: Path) -> None:
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from backbone.component.logs import ENDED_KEPT, FOLDER_BYTES, LINE_BYTES, LOG_BYTES, log_path, open_log, tidy
 
 BEGIN = """
@@ -33,6 +35,7 @@ def sizes(logs: Path) -> dict[str, int]:
     return {path.name: path.stat().st_size for path in logs.glob("scout1.*")}
 
 
+@pytest.mark.processes
 def test_a_log_that_grows_is_kept_in_two_small_files(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     talk = "".join(f"log.info('%d' + 'x' * 1000, number)  # {place}\n    " for place in range(10))
@@ -43,6 +46,7 @@ def test_a_log_that_grows_is_kept_in_two_small_files(tmp_path: Path) -> None:
     assert "the end" in (logs / "scout1.log").read_text()
 
 
+@pytest.mark.processes
 def test_what_c_libraries_say_is_kept_small_too_and_goes_to_the_new_file(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     program = f"os.write(2, b'x' * {LOG_BYTES + 1})\nkept.look_after()\nos.write(1, b'out')\nos.write(2, b'err')"
@@ -50,6 +54,7 @@ def test_what_c_libraries_say_is_kept_small_too_and_goes_to_the_new_file(tmp_pat
     assert sizes(logs) == {"scout1.log": 6, "scout1.log.1": LOG_BYTES + 1}
 
 
+@pytest.mark.processes
 def test_the_loop_looks_after_the_file_when_nothing_is_logged(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     program = f"""
@@ -65,6 +70,7 @@ with asyncio.Runner(loop_factory=VirtualLoop) as runner:
     assert sizes(logs) == {"scout1.log": 0, "scout1.log.1": LOG_BYTES + 1}
 
 
+@pytest.mark.processes
 def test_a_process_follows_when_another_life_of_its_name_began_a_new_file(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     other = f"os.replace('{logs}/scout1.log', '{logs}/scout1.log.1'); open('{logs}/scout1.log', 'w').close()"
@@ -73,6 +79,7 @@ def test_a_process_follows_when_another_life_of_its_name_began_a_new_file(tmp_pa
     assert sizes(logs) == {"scout1.log": 4, "scout1.log.1": LOG_BYTES + 1}
 
 
+@pytest.mark.processes
 def test_a_full_disk_ends_nothing(tmp_path: Path) -> None:
     log_folder(tmp_path)
     program = (
@@ -83,11 +90,13 @@ def test_a_full_disk_ends_nothing(tmp_path: Path) -> None:
     assert run(tmp_path, program) == 7
 
 
+@pytest.mark.processes
 def test_without_a_folder_output_goes_nowhere_and_brings_no_folder_back(tmp_path: Path) -> None:
     assert run(tmp_path / "ended", "log.error('x'); kept.look_after()") == 0
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.processes
 def test_lines_of_strangers_are_cut_and_move_no_cursor(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     assert run(tmp_path, "log.warning('\\x1b[2J\\x9b\\r\\ud800'); log.warning('x' * 1_000_000)") == 0
@@ -96,6 +105,7 @@ def test_lines_of_strangers_are_cut_and_move_no_cursor(tmp_path: Path) -> None:
     assert len(text) < LINE_BYTES + 300
 
 
+@pytest.mark.processes
 def test_the_time_of_what_was_counted_is_told(tmp_path: Path) -> None:
     logs = log_folder(tmp_path)
     assert run(tmp_path, "for _ in range(513): log.warning('late')\nkept.close()") == 0

@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from backbone.creator.process_table import (
     MARK,
     Process,
@@ -69,6 +71,7 @@ def test_an_environment_that_cannot_be_read_is_empty() -> None:
     assert environment(0) == []
 
 
+@pytest.mark.processes
 def test_what_left_the_session_by_another_program_is_known_by_its_environment() -> None:
     component = 4_194_305  # no pid: Linux gives none above 2**22
     environ = {**os.environ, MARK: str(component)}
@@ -83,6 +86,7 @@ def sleeper() -> subprocess.Popen[bytes]:
     return subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
 
 
+@pytest.mark.processes
 async def test_waiting_for_the_gone_returns_when_all_are() -> None:
     sleepers = [sleeper(), sleeper()]
     waiting = asyncio.create_task(wait_gone([one.pid for one in sleepers]))

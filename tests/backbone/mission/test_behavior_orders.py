@@ -68,6 +68,7 @@ def test_a_parameter_of_a_reserved_name_is_refused_at_any_depth() -> None:
         behavior_orders(mission(Behavior(type="surveillance", name="s", priority=1, children=(bad,))))
 
 
+@pytest.mark.processes
 def test_ordering_a_child_needs_no_pydantic() -> None:
     check = "import sys, backbone.mission.behavior_orders; sys.exit('pydantic' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

@@ -127,6 +127,7 @@ def test_a_second_of_the_same_name_ends_with_the_refusal_and_is_never_heard_of(l
     run_virtual(main())
 
 
+@pytest.mark.processes
 def test_a_name_whose_process_was_killed_before_its_claim_stood_is_waited_for(local_mission: Any) -> None:
     """A creator that was killed while a mission came up ended the mission: its successor found its name taken."""
 

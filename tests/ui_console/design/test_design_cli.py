@@ -65,6 +65,7 @@ def test_the_command_of_the_terminals_designer_is_refused_and_names_the_page(wor
     assert "design" not in CliRunner().invoke(app, ["--help"]).output.replace("designer", "").replace("--design", "")
 
 
+@pytest.mark.processes
 def test_the_designer_loads_neither_opencv_nor_mujoco_nor_textual() -> None:
     check = (
         "import sys, ui_console.design.server;sys.exit(', '.join({'cv2', 'textual', 'mujoco'} & set(sys.modules)) or 0)"

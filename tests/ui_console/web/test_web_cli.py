@@ -29,6 +29,7 @@ def test_wrong_options_are_refused_before_a_mission_is_looked_for(arguments: lis
     assert CliRunner().invoke(app, ["serve", *arguments]).exit_code == 2
 
 
+@pytest.mark.processes
 def test_other_commands_load_neither_the_server_nor_its_library() -> None:
     check = (
         "import sys, ui_console.cli, ui_console.teleoperation, ui_console.scripted;"
@@ -38,6 +39,7 @@ def test_other_commands_load_neither_the_server_nor_its_library() -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.processes
 def test_without_its_library_it_says_what_to_install() -> None:
     check = (
         "import sys, asyncio; sys.modules['websockets'] = None\n"

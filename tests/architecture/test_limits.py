@@ -1,0 +1,117 @@
+"""The limits of tests hold: tried on a suite of five tests that break them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.processes
+
+CONFTEST = """
+import sys
+from pathlib import Path
+sys.path[:0] = [{tests!r}, {project!r}]
+import limits
+
+def pytest_configure(config):
+    for marker in ("processes", "alone", "virtual_limit(seconds)"):
+        config.addinivalue_line("markers", marker)
+    here = Path(__file__)
+    limits.watch(config, grace_s=2.0, locks=(here, here.with_name("test_suite.py")))
+"""
+SUITE = """
+import asyncio, signal, subprocess, sys, time
+import pytest
+from backbone.bus.clock import VirtualClock, run_virtual
+
+@pytest.mark.timeout(1)
+def test_sleeps():
+    time.sleep(600.0)
+
+def test_starts():
+    subprocess.run([sys.executable, "-c", "pass"])
+
+def test_plays_for_long():
+    run_virtual(VirtualClock().sleep_s(1001.0))
+
+@pytest.mark.virtual_limit(2000.0)
+def test_may_play_for_long():
+    run_virtual(VirtualClock().sleep_s(1001.0))
+
+@pytest.mark.timeout(1)
+def test_hangs():
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
+    time.sleep(600.0)
+
+def test_comes_after_one_that_hangs():
+    pass
+"""
+ALONE = ("test_sleeps", "test_starts", "test_plays_for_long")
+
+
+def run(folder: Path, *options: str, suite: str = SUITE) -> str:
+    """Return what pytest prints of the suite."""
+    top = Path(__file__).parents[2]
+    (folder / "conftest.py").write_text(CONFTEST.format(tests=str(top / "tests"), project=str(top)))
+    (folder / "test_suite.py").write_text(suite)
+    (folder / "pytest.ini").write_text("[pytest]\ntimeout_method = signal\ntimeout = 60\n")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *options, str(folder)]
+    done = subprocess.run(command, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder)
+    return done.stdout
+
+
+def test_a_run_that_is_ended_has_named_each_failure_before(tmp_path: Path) -> None:
+    printed = run(tmp_path)
+    for name in ALONE:
+        assert f"FAILED test_suite.py::{name} (call)" in printed
+    assert "test_may_play" not in printed
+    assert "in test_hangs" in printed, "the stack of the test that hangs"
+    assert "short test summary" not in printed
+
+
+def test_with_workers_a_test_that_hangs_fails_alone(tmp_path: Path) -> None:
+    printed = run(tmp_path, "-n", "1")
+    for name in (*ALONE, "test_hangs"):
+        assert f"FAILED test_suite.py::{name}" in printed
+    assert "4 failed, 2 passed" in printed
+
+
+TOGETHER = """
+import os, time
+from pathlib import Path
+import pytest
+
+def note(name, what, s=0.3):
+    with Path("log").open("a") as log:
+        log.write(f"{name} {what}\\n")
+    if what == "begins":
+        time.sleep(s)
+
+@pytest.mark.processes
+@pytest.mark.alone
+@pytest.mark.parametrize("number", range(2))
+def test_alone(number):
+    note(f"alone{number}", "begins")
+    note(f"alone{number}", "ends")
+
+@pytest.mark.processes
+@pytest.mark.parametrize("number", range(12))
+def test_together(number):
+    note(f"together{number}", "begins")
+    note(f"together{number}", "ends")
+"""
+
+
+def test_no_test_with_processes_runs_beside_one_that_is_alone(tmp_path: Path) -> None:
+    assert "14 passed" in run(tmp_path, "-n", "3", suite=TOGETHER)
+    busy: list[str] = []
+    most = 0
+    for line in (tmp_path / "log").read_text().splitlines():
+        name, what = line.split()
+        busy = [*busy, name] if what == "begins" else [each for each in busy if each != name]
+        assert len(busy) < 2 or not any(each.startswith("alone") for each in busy), busy
+        most = max(most, len(busy))
+    assert most > 1, "nothing ran together"
