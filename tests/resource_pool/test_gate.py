@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from examples import share
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
@@ -54,7 +55,7 @@ class GateHistory(RuleBasedStateMachine):
         assert self.gate.granted_s < 0
 
 
-GateHistory.TestCase.settings = settings(max_examples=60, stateful_step_count=25, deadline=None)
+GateHistory.TestCase.settings = settings(max_examples=share(60), stateful_step_count=25)
 TestGateHistory = GateHistory.TestCase
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import pytest
+from examples import share
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -90,7 +91,7 @@ def play(schedule: PacketSchedule, asked: dict[str, Asked]) -> list[tuple[float,
     return sent + serve(schedule, free_s, 0.5)
 
 
-@settings(max_examples=150)
+@settings(max_examples=share(150))
 @given(demands())
 def test_of_admitted_streams_no_request_is_late_and_none_is_later_than_analyzed(asked: dict[str, Asked]) -> None:
     """Also when ARCs send once and soon as often as they like."""
@@ -112,7 +113,7 @@ def test_of_admitted_streams_no_request_is_late_and_none_is_later_than_analyzed(
         assert (at_s + sending.air_time_s - sending.release_s) * 1e6 <= limit_us + 1
 
 
-@settings(max_examples=50)
+@settings(max_examples=share(50))
 @given(demands())
 def test_no_stream_sends_two_packets_of_one_interval_whatever_is_sent_once(asked: dict[str, Asked]) -> None:
     releases: dict[tuple[str, int], list[float]] = {}

@@ -6,6 +6,7 @@ import random
 import mujoco
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -64,7 +65,7 @@ def test_it_slips_on_a_steeper_one(slope_deg: float) -> None:
 
 
 @given(st.floats(-0.3, 0.3), st.floats(-2.0, 2.0))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share(20))
 def test_it_drives_the_arc_that_its_wheels_describe(forward_m_s: float, turn_rad_s: float) -> None:
     room, (left, right) = world(x_m=4.5), wheels(forward_m_s, turn_rad_s)
     if max(abs(left), abs(right)) > LIMIT_RAD_S:
@@ -83,7 +84,7 @@ def test_it_drives_the_arc_that_its_wheels_describe(forward_m_s: float, turn_rad
 
 
 @given(st.lists(st.tuples(st.floats(-30, 30), st.floats(-30, 30), st.integers(1, 20)), max_size=6))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=share(15))
 def test_whatever_it_is_told_it_is_never_faster_than_its_wheels(told: list[tuple[float, float, int]]) -> None:
     room = world(x_m=4.5)
     drive(room, 30, 0.0, 0.0)
@@ -181,7 +182,7 @@ def free_scout() -> tuple[mujoco.MjModel, mujoco.MjData]:
     height_m=st.floats(0.0, 0.5),
     spin=st.tuples(st.floats(-20, 20), st.floats(-20, 20), st.floats(-20, 20)),
 )
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=share(12))
 def test_left_alone_it_gains_no_energy(height_m: float, spin: tuple[float, float, float]) -> None:
     model, data = free_scout()
     data.joint("scout1/free").qpos[2] += height_m

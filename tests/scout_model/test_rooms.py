@@ -6,6 +6,7 @@ import cv2
 import mujoco
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -273,7 +274,7 @@ def rooms(draw: st.DrawFn) -> WorldDescription:
 
 
 @given(rooms())
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=share(15))
 def test_whatever_may_be_described_is_built_stepped_and_seen(description: WorldDescription) -> None:
     world = World(description)
     assert world.mjcf == World(description).mjcf

@@ -1,6 +1,7 @@
 """A robot that stands still costs nothing and stays the same, bit for bit."""
 
 import numpy as np
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -81,7 +82,7 @@ packets = st.one_of(
 
 
 @given(st.lists(st.tuples(st.integers(0, 40), st.integers(1, 4), packets), max_size=8))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=share(6))
 def test_the_same_packets_at_the_same_frames_give_the_same_state(heard: list[tuple[int, int, bytes]]) -> None:
     states = []
     for _ in range(2):

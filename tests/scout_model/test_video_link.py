@@ -8,6 +8,7 @@ from collections import Counter
 import msgspec
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -298,7 +299,7 @@ def test_an_effect_switched_off_leaves_the_others_as_they_were(effect: str, show
     assert shown_as <= set(all_on)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=share(30))
 @given(
     effect=st.sampled_from(NOISES),
     scale=st.floats(0, 10),

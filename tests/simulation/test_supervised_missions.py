@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from examples import share
 
 from backbone.errors import Refusal
 from backbone.wire import Envelope, Reader, write
@@ -42,7 +43,7 @@ def test_supervised_missions_in_which_nothing_goes_wrong_keep_the_laws(seed: int
     assert run_lawfully(seed, chaos=False).faults == ()
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(share(12)))
 def test_supervised_missions_are_whole_again_after_whatever_goes_wrong(seed: int) -> None:
     run_lawfully(seed)
 

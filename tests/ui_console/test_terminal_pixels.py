@@ -9,6 +9,7 @@ import unicodedata
 import cv2
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.terminal_theme import DIMMED_MONOKAI
@@ -28,7 +29,7 @@ from ui_console.terminal.pixels import (
 )
 
 
-@settings(max_examples=30)
+@settings(max_examples=share(30))
 @given(st.integers(0, 2**32 - 1), st.integers(1, 330), st.integers(1, 250))
 def test_a_picture_as_png_is_the_same_picture(seed: int, width: int, height: int) -> None:
     picture = np.random.default_rng(seed).integers(0, 256, (height, width)).astype(np.uint8)

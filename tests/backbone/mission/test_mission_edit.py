@@ -6,6 +6,7 @@ import re
 from pathlib import Path as FilePath
 
 import pytest
+from examples import share
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -65,7 +66,7 @@ VALUES = st.text(st.characters(codec="utf-8", exclude_categories=["Cs", "Cc"]), 
 )
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share(40), suppress_health_check=[HealthCheck.too_slow])
 @given(TEXTS, st.data())
 def test_any_sequence_of_changes_does_to_the_text_what_it_does_to_a_tree(text: bytes, data: st.DataObject) -> None:
     """What is read afterwards is what was meant, comments stand as they stood, the layout is never read."""
@@ -133,7 +134,7 @@ def rest(all_of: list[bytes], taken: list[bytes]) -> list[bytes]:
     return left
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=share(30))
 @given(TEXTS, st.data())
 def test_what_is_added_and_removed_again_leaves_no_trace(text: bytes, data: st.DataObject) -> None:
     root = outline(text)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from record_messages import MESSAGES, messages
@@ -137,7 +138,7 @@ def test_a_byte_order_mark_is_no_fault(tmp_path: Path) -> None:
 
 
 @given(st.text())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 def test_no_text_makes_the_reader_fail_in_another_way(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     file = tmp_path_factory.mktemp("any") / "m.xml"
     file.write_bytes(text.encode(errors="replace"))
@@ -146,7 +147,7 @@ def test_no_text_makes_the_reader_fail_in_another_way(tmp_path_factory: pytest.T
 
 
 @given(st.integers(0), st.integers(0, 60), st.text(max_size=12))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share(150))
 def test_a_piece_of_a_good_file_replaced_by_anything_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, where: int, length: int, instead: str
 ) -> None:

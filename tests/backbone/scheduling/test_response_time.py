@@ -57,6 +57,7 @@ def test_an_independent_analysis_admits_the_same_sets(streams, capacity):
     assert admissible(streams, capacity) == independently_admissible([CheckedStream(*one) for one in streams], capacity)
 
 
+@settings(max_examples=100)
 @given(small_sets())
 def test_what_the_exact_test_admits_the_sum_admits_too(streams):
     if admissible(streams, 1.0):

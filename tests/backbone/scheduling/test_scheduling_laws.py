@@ -37,25 +37,25 @@ def _only_a_hand_over_late(found: Violation) -> bool:
     return times is not None and float(times[1]) - float(times[2]) <= LONGEST_HAND_OVER_S
 
 
-@settings(max_examples=120, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing(seed):
     assert violations(play(*random_mission(Random(seed)))) == []
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing_when_processes_react_late(seed):
     assert violations(play(*random_mission(Random(seed), tolerance_s=0.05))) == []
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing_under_the_strict_policy(seed):
     assert violations(play(*random_mission(Random(seed), policy="strict"))) == []
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing_when_priorities_change(seed):
     rng = Random(seed)
@@ -66,19 +66,19 @@ def test_the_checker_finds_nothing_when_priorities_change(seed):
     assert violations(play(bench, happens)) == []
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing_on_a_slice_grid(seed):
     assert violations(play(*random_mission(Random(seed), grid_s=2.0))) == []
 
 
-@settings(max_examples=40, derandomize=True, deadline=None)
+@settings(max_examples=40, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing_when_who_waits_long_rises(seed):
     assert violations(play(*random_mission(Random(seed), aging_s=7.0))) == []
 
 
-@settings(max_examples=120, derandomize=True, deadline=None)
+@settings(max_examples=120, derandomize=True)
 @given(seeds)
 def test_the_checker_finds_nothing_under_equal_time(seed):
     assert violations(play(*random_mission(Random(seed), discipline="time"))) == []
@@ -93,7 +93,7 @@ def test_equal_time_ends_a_slice_and_starts_in_a_gap_only_where_turns_would(seed
 RIVALS = st.lists(st.tuples(st.sampled_from([1.0, 2.0, 2.5, 5.0]), st.integers(0, 12)), min_size=2, max_size=6)
 
 
-@settings(max_examples=60, derandomize=True, deadline=None)
+@settings(max_examples=60, derandomize=True)
 @given(RIVALS, st.sampled_from([0.0, 0.3]))
 def test_rivals_for_one_rc_get_equal_time_under_the_discipline_time(rivals, settle_s):
     bench = Bench(manager(discipline="time", grace_s=0.2), unit("v", connect_s=settle_s))
@@ -108,7 +108,7 @@ def test_rivals_for_one_rc_get_equal_time_under_the_discipline_time(rivals, sett
 SAFETY = {"FORM", "EXCL", "CAP", "RTA", "DOWN", "MINRUN", "PRIO", "DEMOTE", "GRACE", "SETTLE", "EPOCH"}
 
 
-@settings(max_examples=80, derandomize=True, deadline=None)
+@settings(max_examples=80, derandomize=True)
 @given(seeds)
 def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardware_safe(seed):
     """It may leave a gap or let a younger equal go first; nobody is cut short and nobody waits for a lower one."""
@@ -196,7 +196,7 @@ def test_the_checker_finds_nothing_in_a_hundred_thousand_missions():
     assert [one for _, found in results for one in found] == []
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=30, derandomize=True)
 @given(seeds, seeds)
 def test_one_group_changes_no_time_in_another(seed_a, seed_b):
     """Two missions on one RC manager run as each would alone."""

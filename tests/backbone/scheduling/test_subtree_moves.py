@@ -43,7 +43,7 @@ class PlainTree:
         return tuple((name, self.number[name]) for name in self.way(node))
 
 
-@settings(max_examples=200, derandomize=True, deadline=None)
+@settings(max_examples=200, derandomize=True)
 @given(seeds)
 def test_after_any_moves_everybody_stands_where_a_plain_tree_has_them(seed):
     """However often requests repeat the ways their owners were started with."""
@@ -203,7 +203,7 @@ def moves(rng: Random, bench: Bench, nodes: Iterable[str]) -> None:
         bench.at(rng.randint(0, 200) / 4, PriorityChanged(rng.choice(names), rng.randint(0, 3)))
 
 
-@settings(max_examples=80, derandomize=True, deadline=None)
+@settings(max_examples=80, derandomize=True)
 @given(seeds, st.sampled_from(["no_delay", "strict"]))
 def test_the_checker_finds_nothing_when_branches_move(seed, policy):
     rng = Random(seed)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from random import Random
 from typing import Any
@@ -62,9 +63,8 @@ def repair(then: Moment, request: RequestView) -> None:
             then.bench.tell(CapacityChanged(known.rc, known.capacity))
 
 
-def granted_without_blockers(seed: int, rules: dict[str, Any]) -> Why | None:
+def granted_without_blockers(seed: int, then: Moment) -> Why | None:
     """Ask why one waits, remove whom it names, let time pass for a hand-over; return the answer if it was of no use."""
-    then = moment(seed, rules)
     request = Random(seed).choice(then.waiting)
     why = then.bench.manager.why(request.arc, then.now_s)
     before = len(then.bench.runs(request.arc))
@@ -76,17 +76,14 @@ def granted_without_blockers(seed: int, rules: dict[str, Any]) -> Why | None:
     return None if len(then.bench.runs(request.arc)) > before else why
 
 
-def seeds_with_waiting(count: int, rules: dict[str, Any]) -> list[int]:
-    found: list[int] = []
-    seed = 0
-    while len(found) < count:
-        found += [seed] if moment(seed, rules).waiting else []
-        seed += 1
-    return found
+def moments_with_waiting(count: int, rules: dict[str, Any]) -> Iterator[tuple[int, Moment]]:
+    """Yield the first so many seeds whose missions have an ARC that waits, each with its moment."""
+    found = ((seed, then) for seed in itertools.count() if (then := moment(seed, rules)).waiting)
+    return itertools.islice(found, count)
 
 
 def untrue(count: int, rules: dict[str, Any]) -> list[tuple[int, Why]]:
-    answers = [(seed, granted_without_blockers(seed, rules)) for seed in seeds_with_waiting(count, rules)]
+    answers = [(seed, granted_without_blockers(seed, then)) for seed, then in moments_with_waiting(count, rules)]
     return [(seed, why) for seed, why in answers if why is not None]
 
 
@@ -97,7 +94,7 @@ def test_without_those_that_why_names_a_waiting_arc_is_granted_after_one_hand_ov
 
 def test_beside_others_a_slice_that_is_over_but_for_rounding_is_over() -> None:
     """Something happened at 14.25 s, when a slice ended at 14.250000000000002 s: nobody looked again."""
-    assert granted_without_blockers(252, {"exact_up_to": 0}) is None
+    assert granted_without_blockers(252, moment(252, {"exact_up_to": 0})) is None
 
 
 @pytest.mark.slow
@@ -113,9 +110,8 @@ def test_with_aging_why_is_nearly_always_enough() -> None:
     assert len(untrue(100, {"aging_s": 7.0})) <= 10
 
 
-def needless(seed: int) -> list[str]:
+def needless(seed: int, then: Moment) -> list[str]:
     """Return the names in ``why`` without whose removal the ARC would have been granted, too."""
-    then = moment(seed, {})
     request = Random(seed).choice(then.waiting)
     names = then.bench.manager.why(request.arc, then.now_s).blockers
     found = []
@@ -132,8 +128,8 @@ def needless(seed: int) -> list[str]:
 
 def test_few_names_are_needless() -> None:
     """One too many is named rather than one too few; and some waits are nearly over anyway."""
-    seeds = seeds_with_waiting(80, {})
-    assert sum(bool(needless(seed)) for seed in seeds) <= 0.25 * len(seeds)
+    count = 80
+    assert sum(bool(needless(seed, then)) for seed, then in moments_with_waiting(count, {})) <= 0.25 * count
 
 
 def of_the_schedule(then: Moment, request: RequestView) -> float:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+from examples import share
 from hypothesis import Phase, settings
 
 from backbone.bus.interface import Bus, Clock
@@ -22,8 +23,8 @@ from resource_pool.simulation.whole_mission import RunningMission, mission_in_on
 from ui_console.driving import Drive
 from ui_console.teleoperation import Teleoperation
 
-FEW_MOMENTS = settings(max_examples=2, phases=[Phase.generate], derandomize=True, deadline=None)
-MANY_MOMENTS = settings(max_examples=30, phases=[Phase.generate], derandomize=True, deadline=None)
+FEW_MOMENTS = settings(max_examples=2, phases=[Phase.generate], derandomize=True)
+MANY_MOMENTS = settings(max_examples=share(30), phases=[Phase.generate], derandomize=True)
 """How many sequences of take-overs are played; never shrunk, which would take an hour."""
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from behaviors_at_work import FEW_MOMENTS, MANY_MOMENTS, Person, at_work, driving, example, filmed_at, pose, wait_until
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -78,7 +79,7 @@ def go_on(search: DarkSearch, room: PlayedRoom, lasts_s: float) -> None:
 near_the_dark = st.builds(Position, st.floats(1.5, 4.5), st.floats(1.5, 4.5), st.floats(-math.pi, math.pi))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=share(12))
 @given(near_the_dark)
 def test_from_anywhere_near_it_ends_in_the_dark_and_looks_out(begin: Position) -> None:
     search, room = dark_search(), PlayedRoom(begin)
@@ -88,7 +89,7 @@ def test_from_anywhere_near_it_ends_in_the_dark_and_looks_out(begin: Position) -
     assert search.decide(room.seen(), room.now_s) == STILL
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share(20))
 @given(
     near_the_dark,
     st.lists(st.tuples(st.floats(0.0, 30.0), st.floats(0.0, 20.0), st.none() | near_the_dark), max_size=4),
@@ -137,7 +138,7 @@ def test_where_it_is_nowhere_dark_it_gives_up_after_its_looks() -> None:
     assert search.looks == 3
 
 
-@settings(max_examples=30)
+@settings(max_examples=share(30))
 @given(arrays(np.uint8, (60, 80)))
 def test_a_glimpse_stays_between_the_darkest_and_the_brightest_pixel(picture: np.ndarray) -> None:
     seen = glimpse(picture)
@@ -150,7 +151,7 @@ def test_what_is_no_picture_is_refused() -> None:
         glimpse(np.zeros((10, 10), np.uint8))
 
 
-@settings(max_examples=30)
+@settings(max_examples=share(30))
 @given(st.integers(-8, 8), st.integers(0, 2**32 - 1))
 def test_a_view_that_turned_a_few_degrees_is_the_same_and_another_place_is_not(shift: int, seed: int) -> None:
     rng = np.random.default_rng(seed)

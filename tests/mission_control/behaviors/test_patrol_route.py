@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -91,7 +92,7 @@ def test_head_for_never_asks_for_more_than_the_robot_can_do(position: Position, 
     assert abs(motion.turn_rad_s) <= MOST_RAD_S
 
 
-@settings(max_examples=60)
+@settings(max_examples=share(60))
 @given(positions, places)
 def test_head_for_brings_a_robot_there_and_to_rest(position: Position, place: Place) -> None:
     for _step in range(600):
@@ -136,7 +137,7 @@ def test_an_undisturbed_patrol_reaches_every_way_point_in_order_and_is_over() ->
     assert patrol.decide(position, now_s) == STILL
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=share(80))
 @given(st.lists(places, min_size=1, max_size=5), st.integers(1, 2), positions, take_overs)
 def test_after_any_take_overs_the_record_is_that_of_an_undisturbed_patrol(
     waypoints: list[Place], rounds: int, position: Position, disturbances: list[TakeOver]

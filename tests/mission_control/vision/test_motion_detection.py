@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ def look_at(pictures: list[Picture], detector: MotionDetector | None = None) -> 
     return [detector.look(picture) for picture in pictures]
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=share(6))
 @given(seed=st.integers(0, 2**32 - 1), sigma=st.floats(0.0, 25.0))
 def test_noise_alone_is_no_motion(seed: int, sigma: float) -> None:
     rng = np.random.default_rng(seed)
@@ -57,7 +58,7 @@ def test_a_scene_that_stands_still_is_no_motion() -> None:
     assert not any(look_at([room()] * 60))
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=share(6))
 @given(seed=st.integers(0, 1000), speed_px=st.integers(3, 12), sigma=st.floats(0.0, 10.0))
 def test_a_block_that_crosses_the_view_is_found_where_it_is(seed: int, speed_px: int, sigma: float) -> None:
     rng = np.random.default_rng(seed)
@@ -73,7 +74,7 @@ def test_a_block_that_crosses_the_view_is_found_where_it_is(seed: int, speed_px:
             assert 80 <= blob.y_px <= 150
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(seed=st.integers(0, 1000), share=st.floats(0.3, 1.0))
 def test_a_picture_torn_in_many_rows_is_rejected(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
@@ -88,7 +89,7 @@ def test_a_picture_torn_in_many_rows_is_rejected(seed: int, share: float) -> Non
             assert detector.look(room(seed)) is None
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(seed=st.integers(0, 1000))
 def test_single_torn_rows_are_no_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -145,7 +146,7 @@ def test_only_grey_pictures_are_looked_at() -> None:
         MotionDetector().look(np.zeros((4, 4, 3), np.uint8))
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share(20))
 @given(
     rows=st.sets(st.integers(0, 49), max_size=12),
     columns=st.integers(0, 40),

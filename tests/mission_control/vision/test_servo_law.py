@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from landmark_pictures import polar
@@ -111,7 +112,7 @@ def test_wheels_of_a_turn_in_place_run_against_each_other() -> None:
     assert right_rad_s > 0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share(25))
 @given(range_m=st.floats(0.7, 2.5), off_axis=st.floats(-45.0, 45.0), heading=st.floats(-180.0, 180.0))
 def test_from_anywhere_within_two_and_a_half_metres_and_45_degrees_it_arrives(
     range_m: float, off_axis: float, heading: float
@@ -147,7 +148,7 @@ def test_the_further_off_the_line_the_further_it_backs_off(off_axis: float) -> N
     assert STOP_M < back_off_to_m(at(0.45, off_axis)) <= back_off_to_m(at(0.45, off_axis + 1.0)) <= 1.4
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=share(15))
 @given(
     when=st.lists(st.integers(0, 900), min_size=1, max_size=3),
     turned_rad=st.floats(-2.0, 2.0),

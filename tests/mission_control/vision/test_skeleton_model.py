@@ -7,6 +7,7 @@ import math
 import cv2
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from landmark_pictures import noisy, polar, view
@@ -63,7 +64,7 @@ def test_the_skeleton_of_a_four_blob_target_has_17_pixels(range_m: float, off_ax
     assert len({tuple(pixel) for pixel in pixels.tolist()}) == 17
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share(25))
 @given(range_m=ranges_m, off_axis=off_axis_deg, bearing=st.floats(-6.0, 6.0))
 def test_discs_are_black_and_everything_else_of_the_skeleton_is_white(
     range_m: float, off_axis: float, bearing: float
@@ -112,7 +113,7 @@ def test_a_plain_picture_is_no_landmark(grey: int) -> None:
     assert landmark_match(wall, blobs_px) == 0.0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share(25))
 @given(gain=st.floats(0.3, 1.0), offset=st.floats(0.0, 60.0), sigma=st.floats(0.0, 40.0), seed=st.integers(0, 1000))
 def test_correlation_is_what_opencv_calls_it(gain: float, offset: float, sigma: float, seed: int) -> None:
     one = view(0.8)[90:150, 100:220]
@@ -146,7 +147,7 @@ def test_a_row_without_a_stem_below_its_middle_is_not_plausible() -> None:
         assert not plausible(broken)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share(20))
 @given(columns=st.integers(-4, 4), rows=st.integers(-4, 4))
 def test_discs_are_centred_from_anywhere_near_even_across_a_torn_row(columns: int, rows: int) -> None:
     frame = view(0.8).copy()

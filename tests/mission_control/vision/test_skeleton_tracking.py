@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from landmark_pictures import Picture, noisy, polar, shifted, view
@@ -56,7 +57,7 @@ def spoiled_to(frame: Picture, match: float) -> Picture:
     return spoiled
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=share(30))
 @given(
     columns=st.integers(-REACH_COLUMNS_PX, REACH_COLUMNS_PX),
     rows=st.integers(-REACH_ROWS_PX, REACH_ROWS_PX),
@@ -74,7 +75,7 @@ def test_a_target_that_moved_within_reach_is_found_where_it_went(
     assert found.match > 0.9
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=share(20))
 @given(columns=st.integers(-12, 12), rows=st.integers(-15, 15))
 def test_the_best_shift_moves_with_the_picture(columns: int, rows: int) -> None:
     frame = view(1.0, 0.2, -0.15)
@@ -124,7 +125,7 @@ def test_at_71_percent_tracking_goes_on_and_at_69_it_ends_in_acquisition(match: 
     assert seen[-1] is ends_in
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(seed=st.integers(0, 1000), sigma=st.floats(0.0, 15.0), start_deg=st.floats(-40.0, 40.0))
 def test_an_approaching_target_is_followed_from_picture_to_picture(seed: int, sigma: float, start_deg: float) -> None:
     rng = np.random.default_rng(seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from landmark_pictures import noisy, polar, shifted, view
@@ -16,7 +17,7 @@ from scout_model.video_link import Receiver
 from scout_model.world import World
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=share(40))
 @given(
     range_m=st.floats(0.45, 2.5),
     off_axis=st.floats(-45.0, 45.0),
@@ -37,7 +38,7 @@ def test_the_landmark_is_found_where_it_is(
         assert sighting.match >= 0.7
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=share(25))
 @given(columns=st.integers(-60, 60), rows=st.integers(-20, 20))
 def test_a_moved_picture_has_its_landmark_moved_as_far(columns: int, rows: int) -> None:
     frame = view(1.2, 0.2, -0.1)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from examples import share
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from landmark_pictures import polar
@@ -31,7 +32,6 @@ def off_by(found: TargetPose, pose: tuple[float, float, float]) -> tuple[float, 
     return math.hypot(found.ahead_m - pose[0], found.left_m - pose[1]), abs(found.heading_rad - pose[2])
 
 
-@settings(deadline=None)
 @given(range_m=ranges_m, off_axis=off_axis_deg, bearing=bearings_deg, pitch=pitches_deg)
 def test_discs_without_noise_say_the_pose(range_m: float, off_axis: float, bearing: float, pitch: float) -> None:
     pose = polar(range_m, off_axis, bearing)
@@ -42,7 +42,7 @@ def test_discs_without_noise_say_the_pose(range_m: float, off_axis: float, beari
     assert found[0].residual_px < 0.2
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=share(50))
 @given(range_m=ranges_m, off_axis=off_axis_deg, bearing=bearings_deg, seed=st.integers(0, 1000))
 def test_a_mirrored_picture_is_seen_from_the_other_side(
     range_m: float, off_axis: float, bearing: float, seed: int
@@ -56,7 +56,7 @@ def test_a_mirrored_picture_is_seen_from_the_other_side(
         assert there.heading_rad == pytest.approx(-here.heading_rad, abs=0.005)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=share(50))
 @given(range_m=st.floats(0.45, 1.0), off_axis=off_axis_deg, bearing=bearings_deg, seed=st.integers(0, 1000))
 def test_from_near_even_one_noisy_picture_says_the_pose(
     range_m: float, off_axis: float, bearing: float, seed: int
@@ -69,7 +69,7 @@ def test_from_near_even_one_noisy_picture_says_the_pose(
     assert abs(found[0].bearing_rad - math.radians(bearing)) < math.radians(1.0)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=share(50))
 @given(range_m=ranges_m, off_axis=off_axis_deg, bearing=bearings_deg)
 def test_range_angle_and_bearing_are_the_pose_in_other_words(range_m: float, off_axis: float, bearing: float) -> None:
     pose = TargetPose(*polar(range_m, off_axis, bearing), 0.0, 0.0, np.eye(4))
@@ -89,7 +89,7 @@ def test_a_way_and_the_same_way_back_end_where_they_began(
     assert off_by(back, (pose.ahead_m, pose.left_m, pose.heading_rad)) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=share(50))
 @given(range_m=ranges_m, off_axis=off_axis_deg, seed=st.integers(0, 1000))
 def test_what_was_known_before_makes_a_pose_surer(range_m: float, off_axis: float, seed: int) -> None:
     pose = polar(range_m, off_axis)
@@ -106,7 +106,7 @@ def test_who_looks_away_from_the_board_does_not_see_it() -> None:
         discs_in_picture(1.0, 0.0, math.pi)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=share(15))
 @given(
     range_m=st.floats(0.8, 2.3),
     off_axis=st.one_of(st.floats(-45.0, -15.0), st.floats(15.0, 45.0)),
@@ -125,7 +125,7 @@ def test_standing_still_for_a_second_tells_the_side_of_the_zero_angle_line(
     assert abs(found.off_axis_rad - math.radians(off_axis)) < math.radians(10.0)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=share(6))
 @given(off_axis=off_axis_deg, seed=st.integers(0, 1000), turn_rad_s=st.floats(-0.2, 0.2))
 def test_driving_up_to_the_board_the_pose_gets_sure(off_axis: float, seed: int, turn_rad_s: float) -> None:
     pose = TargetPose(*polar(1.5, off_axis), 0.0, 0.0, np.eye(4))

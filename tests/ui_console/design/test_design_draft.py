@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from examples import share
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -97,7 +98,7 @@ def commands(draft: Draft) -> st.SearchStrategy[Command]:
     )
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=share(30), suppress_health_check=list(HealthCheck))
 @given(START, st.data())
 def test_any_sequence_of_commands_can_be_read_loses_no_comment_and_is_undone_to_the_byte(
     draft: Draft, data: st.DataObject
@@ -136,7 +137,7 @@ def removed_by(draft: Draft, command: Command) -> bytes:
     return draft.text[node.begin : node.end]
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=share(25), suppress_health_check=list(HealthCheck))
 @given(START, st.data())
 def test_every_offer_can_be_taken_or_says_why_not_and_touches_what_it_added(draft: Draft, data: st.DataObject) -> None:
     node = data.draw(st.sampled_from(list(draft.mission)))
@@ -387,7 +388,7 @@ WORDS = st.sampled_from(
 PUT = st.sampled_from([b"strange", b"", b"x ", b"type=", b"wish", b"-1", b"text</a>"])
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=share(25), suppress_health_check=list(HealthCheck))
 @given(WORDS, PUT, st.integers(0, 12))
 def test_a_file_with_any_fault_can_be_looked_at_or_is_told_to_be_no_xml(word: bytes, put: bytes, which: int) -> None:
     parts = SHIPPED[0].read_bytes().split(word)

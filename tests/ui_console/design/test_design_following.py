@@ -6,6 +6,7 @@ from collections import Counter
 
 import pytest
 from design_tutorial import element, tutorial_draft
+from examples import share
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -32,7 +33,7 @@ def head(draft: Draft, node: Node) -> bytes:
     return draft.text[node.begin : node.content]
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=share(150), suppress_health_check=list(HealthCheck))
 @given(COMMANDS)
 def test_what_is_written_like_nothing_else_is_found_again_wherever_it_went(command: Command) -> None:
     try:

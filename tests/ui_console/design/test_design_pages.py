@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 from design_tutorial import FACTS, WATCH, element, tutorial_draft
+from examples import share
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -50,7 +51,7 @@ def done(draft: Draft, change: Change) -> Draft | Refusal:
 
 
 # ---------------------------------------------------------------------- laws
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=share(30), suppress_health_check=list(HealthCheck))
 @given(START, st.data())
 def test_whatever_pages_ask_for_can_be_read_and_shown_and_taken_back(draft: Draft, data: st.DataObject) -> None:
     begun = draft.text
@@ -69,7 +70,7 @@ def test_whatever_pages_ask_for_can_be_read_and_shown_and_taken_back(draft: Draf
     assert draft.text == begun
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 @given(st.data())
 def test_what_is_dropped_before_a_sibling_stands_directly_before_it(data: st.DataObject) -> None:
     draft = TUTORIAL
@@ -86,7 +87,7 @@ def test_what_is_dropped_before_a_sibling_stands_directly_before_it(data: st.Dat
     assert [after.text[child.begin : child.end] for child in got.children] == expected
 
 
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=share(40), suppress_health_check=list(HealthCheck))
 @given(START, st.data())
 def test_every_part_of_the_palette_goes_somewhere_or_asks_or_says_where_it_belongs(
     draft: Draft, data: st.DataObject

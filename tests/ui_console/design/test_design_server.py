@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec import DecodeError
@@ -349,7 +350,7 @@ async def test_a_designer_that_floods_makes_nobody_wait_and_is_cut_off_for_nonse
         await anna.wait(lambda: anna.view["people"] == ["anna"], "alone")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share(150))
 @given(
     st.binary(max_size=200)
     | st.recursive(st.none() | st.integers() | st.text(), st.lists).map(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -110,7 +111,7 @@ actions = st.lists(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=share(150))
 @given(actions)
 def test_pictures_underway_are_bounded_and_never_go_back_in_time(acts: list[tuple[str, str]]) -> None:
     outbox = watching(*ROBOTS)

@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import pytest
+from examples import share
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -62,7 +63,7 @@ messages = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 @given(st.lists(messages, max_size=12))
 def test_nobody_gets_in_without_the_token_whatever_is_said(said: list[str | bytes]) -> None:
     one = visitor()
@@ -73,7 +74,7 @@ def test_nobody_gets_in_without_the_token_whatever_is_said(said: list[str | byte
     assert one.welcome is None
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=share(60))
 @given(st.lists(messages, max_size=12))
 def test_whatever_a_visitor_says_means_something_typed_or_is_an_offence(said: list[str | bytes]) -> None:
     one = welcomed()
@@ -179,7 +180,7 @@ def test_words_become_intents() -> None:
     assert setting == SetParameter("watch-scout1", "pause_s", [1, "a"])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=share(50))
 @given(st.floats(1.2, 20.0), st.floats(0.0, 1e6))
 def test_who_floods_is_out_soon(times_too_many: float, begins_s: float) -> None:
     one = visitor(now_s=begins_s)
