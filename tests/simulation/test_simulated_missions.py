@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import sys
 import pytest
 from examples import share
 
+from resource_pool.simulation import campaign
 from resource_pool.simulation.campaign import simulate
 from resource_pool.simulation.mission_run import MissionRun, run_mission
 
@@ -18,8 +20,14 @@ print(*(run_mission(seed, chaos=True).digest for seed in range(4)))
 """
 
 
+@functools.cache
+def mission(seed: int, *, chaos: bool) -> MissionRun:
+    """Return a run of the mission, the same for all tests that only look at it."""
+    return run_mission(seed, chaos=chaos)
+
+
 def run_lawfully(seed: int, *, chaos: bool) -> MissionRun:
-    run = run_mission(seed, chaos=chaos)
+    run = mission(seed, chaos=chaos)
     assert run.broken is None, f"scout-backbone simulate --first {seed} --seeds 1{' --chaos' if chaos else ''}"
     return run
 
@@ -36,7 +44,7 @@ def test_missions_keep_the_laws_whatever_goes_wrong(seed: int) -> None:
 
 def test_missions_are_busy() -> None:
     """Laws are easily kept where nothing happens."""
-    runs = [run_mission(seed, chaos=True) for seed in range(10)]
+    runs = [mission(seed, chaos=True) for seed in range(10)]
     words = [happening.what for run in runs for happening in run.happenings]
     assert words.count("grant") > 40
     assert words.count("packet") > 500
@@ -53,29 +61,30 @@ def test_a_seed_means_one_run_to_the_byte_in_every_process() -> None:
             [sys.executable, "-c", DIGESTS], env=environment, capture_output=True, text=True, timeout=60, check=True
         )
         found.add(done.stdout)
-    here = " ".join(run_mission(seed, chaos=True).digest for seed in range(4)) + "\n"
+    here = " ".join(mission(seed, chaos=True).digest for seed in range(4)) + "\n"
     assert found == {here}
 
 
 def test_a_run_with_the_faults_it_had_is_the_same_run() -> None:
-    run = run_mission(0, chaos=True)
+    run = mission(0, chaos=True)
     again = run_mission(0, chaos=True, faults=run.faults)
     assert len(run.faults) > 10
     assert again.digest == run.digest
 
 
 def test_without_chaos_nothing_is_lost_and_nobody_is_killed() -> None:
-    words = {happening.what for happening in run_mission(3, chaos=False).happenings}
+    words = {happening.what for happening in mission(3, chaos=False).happenings}
     assert not words & {"killed", "cut off", "gives up", "fails"}
 
 
-def test_a_campaign_counts_what_it_saw() -> None:
+def test_a_campaign_counts_what_it_saw(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign, "BATCH", 2)
     told: list[str] = []
-    outcome = simulate(0, 12, chaos=True, tell=told.append, processes=1)
+    outcome = simulate(0, 3, chaos=True, tell=told.append, processes=1)
     assert outcome.finding is None
-    assert outcome.count.runs == 12
+    assert outcome.count.runs == 3
     assert outcome.count.faults > 0
-    assert told == ["10 of 12 missions", "12 of 12 missions"]
+    assert told == ["2 of 3 missions", "3 of 3 missions"]
     assert outcome.to_json()["broken"] is None
 
 
