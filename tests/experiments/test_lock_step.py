@@ -33,6 +33,7 @@ def test_another_seed_is_another_trial() -> None:
     assert run_trial(condition, 1, 2).digest != run_trial(condition, 2, 2).digest
 
 
+@pytest.mark.processes
 def test_other_processes_come_to_the_same() -> None:
     orders = [TrialOrder(Condition(noise=0.0), 1, number) for number in range(2)]
     assert run_all(run_order, orders, jobs=2) == run_all(run_order, orders, jobs=1)
@@ -111,6 +112,7 @@ GOALS = {
 """Of the adaptive policy, with 0 to 3 extra robots driven a quarter of the time, and 1 to 3 that always are."""
 
 
+@pytest.mark.processes
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_the_whole_table_meets_papers_goals_and_prediction() -> None:

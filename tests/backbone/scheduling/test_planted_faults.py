@@ -20,6 +20,7 @@ def test_a_planted_fault_has_its_place(fault: Planted) -> None:
     assert (TOP / ROOM / fault.file).read_text().count(fault.right) == 1
 
 
+@pytest.mark.processes
 @pytest.mark.slow
 @pytest.mark.processes
 @pytest.mark.timeout(600)
@@ -28,6 +29,7 @@ def test_what_is_not_planted_is_not_caught(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout[-2000:]
 
 
+@pytest.mark.processes
 @pytest.mark.slow
 @pytest.mark.processes
 @pytest.mark.timeout(600)

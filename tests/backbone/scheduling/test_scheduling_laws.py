@@ -196,6 +196,7 @@ def checked(first: int) -> tuple[int, list[str]]:
     return lines, found
 
 
+@pytest.mark.processes
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_the_checker_finds_nothing_in_a_hundred_thousand_missions():

@@ -167,6 +167,7 @@ def test_they_agree_on_the_shortest_trace_of_each_violation(code: str) -> None:
         assert difference([meta(), *lines, {"ev": "end", "t": end_s}]) == ""
 
 
+@pytest.mark.processes
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 def test_they_agree_on_ten_thousand_traces() -> None:

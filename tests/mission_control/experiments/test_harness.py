@@ -19,6 +19,7 @@ def picky(number: int) -> int:
     return number
 
 
+@pytest.mark.processes
 def test_results_come_in_the_order_of_the_orders_from_other_processes() -> None:
     found = run_all(squared, range(20), jobs=2)
     assert [value for value, _ in found] == [number * number for number in range(20)]
