@@ -76,12 +76,12 @@ export class Cards {
   enlarge(name) {
     if (name === this.large && this.stage.firstElementChild?.getAttribute("data-robot") === name) return;
     this.large = name;
-    const focus = /** @type {HTMLElement | null} */ (document.activeElement);
+    const focus = document.activeElement;
     for (const [one, { root }] of [...this.cards].sort(([one], [other]) => (one < other ? -1 : 1))) {
       root.classList.toggle("is-large", one === name);
       (one === name ? this.stage : this.thumbs).append(root);
     }
-    if (focus?.closest(".robot")) focus.focus({ preventScroll: true });
+    if (focus instanceof HTMLElement && focus.closest(".robot")) focus.focus({ preventScroll: true });
   }
 
   watch() {

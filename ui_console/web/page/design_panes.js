@@ -1,9 +1,6 @@
 // Panes of the designer: beside each other where there is room, one at a time where there is not.
 
-import { around, find, queryAll } from "./dom.js";
-
-/** @type {Record<string, number | undefined>} */
-const STEPS = { ArrowLeft: -1, ArrowRight: 1 };
+import { around, find, queryAll, stepped } from "./dom.js";
 
 /** Shows the panes that tabs choose; `rehearse(isShown)` is called when the first minute comes into sight or leaves. */
 export class Panes {
@@ -38,13 +35,9 @@ export class Panes {
    * @param {KeyboardEvent} event
    */
   step(list, event) {
-    const step = STEPS[event.key];
-    const tabs = queryAll(list, "[role=tab]", HTMLElement);
-    const active = document.activeElement;
-    const at = active instanceof HTMLElement ? tabs.indexOf(active) : -1;
-    if (!step || at < 0) return;
+    const next = stepped(event.key, queryAll(list, "[role=tab]", HTMLElement), document.activeElement);
+    if (!(next instanceof HTMLElement)) return;
     event.preventDefault();
-    const next = tabs[(at + step + tabs.length) % tabs.length];
     next.focus();
     this.press(next);
   }

@@ -1,6 +1,6 @@
 // What the designer's page says in passing: how the draft is, who else is here, and notices.
 
-import { find, make, makeButton } from "./dom.js";
+import { find, makeNotice } from "./dom.js";
 
 /** @import { DraftStatus } from "./design_messages.d.ts" */
 
@@ -50,11 +50,7 @@ export function showPeople(people, user) {
  * @param {"bad" | "good"} [kind]
  */
 export function notice(text, remedy, kind = "bad") {
-  const made = make("p", kind, remedy ? `${text} (${remedy})` : text);
-  const seen = makeButton("✕", () => made.remove());
-  seen.setAttribute("aria-label", "Seen");
-  made.append(seen);
   const root = find("notices");
-  root.append(made);
+  root.append(makeNotice(kind, remedy ? `${text} (${remedy})` : text));
   while (root.children.length > NOTICES) root.children[0].remove();
 }

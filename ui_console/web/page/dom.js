@@ -83,6 +83,37 @@ export function around(event, selector) {
 }
 
 /**
+ * Makes a text of this kind that goes away when a person has seen it.
+ *
+ * @param {string} kind
+ * @param {string} text
+ */
+export function makeNotice(kind, text) {
+  const made = make("p", kind, text);
+  const seen = makeButton("✕", () => made.remove());
+  seen.setAttribute("aria-label", "Seen");
+  made.append(seen);
+  return made;
+}
+
+/** @type {Record<string, number | undefined>} */
+const STEPS = { ArrowLeft: -1, ArrowRight: 1 };
+
+/**
+ * Returns the one to which an arrow goes, around the ends too; null: the key is no such arrow, or nothing is chosen.
+ *
+ * @template T
+ * @param {string} key
+ * @param {T[]} all
+ * @param {T} chosen
+ */
+export function stepped(key, all, chosen) {
+  const step = STEPS[key],
+    at = all.indexOf(chosen);
+  return step === undefined || at < 0 ? null : all[(at + step + all.length) % all.length];
+}
+
+/**
  * Draws what is in `root` anew; the focus stays on the element with the same `data-key`.
  *
  * @param {HTMLElement} root

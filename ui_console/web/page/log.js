@@ -1,7 +1,7 @@
 // The mission's log: the newest as it is told, or what a search found, all of which can be kept as a file.
 
-import { find, makeButton } from "./dom.js";
-import { paragraph, span, table } from "./table.js";
+import { find, make, makeButton } from "./dom.js";
+import { table } from "./table.js";
 import { seconds, set } from "./text.js";
 
 /** @import { FoundEvent, LogFound, LoggedEvent, LogRefused, SearchLog, View } from "./messages.d.ts" */
@@ -186,23 +186,29 @@ export class Log {
    */
   draw(newest) {
     const rows = this.found === null ? [...newest].reverse() : this.found.events.slice(0, this.shown);
-    if (rows.length === 0) return [paragraph(this.found === null ? "nothing yet" : "nothing of that kind happened")];
+    if (rows.length === 0)
+      return [make("p", "", this.found === null ? "nothing yet" : "nothing of that kind happened")];
     const drawn = table(HEADS, rows.map(cells));
     return this.found !== null && this.shown < this.found.total ? [drawn, this.moreButton(this.found)] : [drawn];
   }
 
   /** @param {Found} found */
   moreButton(found) {
-    const button = makeButton(`Show more of ${found.total}`, () => this.more(found));
-    button.dataset.key = "log:more";
-    return button;
+    return makeButton(`Show more of ${found.total}`, () => this.more(found), "log:more");
   }
 }
 
 /** @param {LoggedEvent & { time?: string }} row */
 function cells(row) {
   const time = row.time ? `${row.time.slice(11, 19)} ` : "";
-  return [`${time}${seconds(row.at_s)}`, span(row.level, row.level), row.subject, row.what, row.person, row.where];
+  return [
+    `${time}${seconds(row.at_s)}`,
+    make("span", row.level, row.level),
+    row.subject,
+    row.what,
+    row.person,
+    row.where,
+  ];
 }
 
 /**

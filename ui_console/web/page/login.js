@@ -1,5 +1,6 @@
 // Who is there: the token comes with the address or is asked for, and is kept for this tab only.
 
+import { find } from "./dom.js";
 import { set } from "./text.js";
 
 /** Calls `enter({token, user})` as soon as there is a token to try. */
@@ -8,15 +9,12 @@ export class Login {
   constructor({ form, enter }) {
     this.form = form;
     this.enter = enter;
+    this.token = find("login-token", HTMLInputElement);
+    this.user = find("login-user", HTMLInputElement);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.try(this.field("token").value.trim(), this.field("user").value.trim());
+      this.try(this.token.value.trim(), this.user.value.trim());
     });
-  }
-
-  /** @param {string} name */
-  field(name) {
-    return /** @type {HTMLInputElement} */ (this.form.elements.namedItem(name));
   }
 
   begin() {
@@ -35,9 +33,9 @@ export class Login {
   /** @param {string} why */
   ask(why) {
     sessionStorage.removeItem("token");
-    set(/** @type {Element} */ (this.form.querySelector("[role=alert]")), why);
+    set(find("login-why"), why);
     this.form.hidden = false;
-    this.field("token").focus();
+    this.token.focus();
   }
 
   /**

@@ -2,7 +2,7 @@
 
 import { Blindness } from "./blind.js";
 import { Cards } from "./cards.js";
-import { find } from "./dom.js";
+import { find, queryAll } from "./dom.js";
 import { Driving } from "./driving.js";
 import { Hand } from "./hand.js";
 import { Keys } from "./keys.js";
@@ -53,7 +53,7 @@ const blindness = new Blindness({
   title: find("blind-title"),
   why: find("blind-why"),
   areas: [find("alarm-bar"), find("stage"), find("side")],
-  stops: () => /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("button.emergency")),
+  stops: () => queryAll(document, "button.emergency", HTMLButtonElement),
 });
 new Keys({
   isHeld: () => hand.held !== "",

@@ -1,6 +1,6 @@
 // What a person is told in passing: newest alarm, refusals, and longer answers to read.
 
-import { find, make, makeButton } from "./dom.js";
+import { find, make, makeButton, makeNotice } from "./dom.js";
 import { set } from "./text.js";
 
 /** @import { AlarmView, HealthView } from "./messages.d.ts" */
@@ -51,10 +51,7 @@ export function showHealth(health) {
  * @param {string} text
  */
 export function notice(text) {
-  const line = make("p", "", text);
-  const seen = makeButton("✕", () => line.remove());
-  seen.setAttribute("aria-label", "Seen");
-  line.append(seen);
+  const line = makeNotice("", text);
   find("notices").append(line);
   setTimeout(() => line.remove(), SHOWN_MS);
 }
@@ -65,7 +62,6 @@ export function notice(text) {
  */
 export function read(title, lines) {
   find("reading-title").textContent = title;
-  const items = lines.map((line) => Object.assign(document.createElement("li"), { textContent: line }));
-  find("reading-lines").replaceChildren(...items);
+  find("reading-lines").replaceChildren(...lines.map((line) => make("li", "", line)));
   if (!find("reading", HTMLDialogElement).open) find("reading", HTMLDialogElement).showModal();
 }

@@ -1,5 +1,7 @@
 // The screen of one robot: its newest picture, and how old that is.
 
+import { make } from "./dom.js";
+
 /** @import { Picture } from "./types.d.ts" */
 
 const STALE_MS = 1000; // as in the console model: do not drive by it
@@ -10,15 +12,13 @@ export class Screen {
   /** @param {{ name: string, drawn: (number: number) => void }} given */
   constructor({ name, drawn }) {
     this.drawn = drawn;
-    this.root = document.createElement("div");
-    this.root.className = "screen";
-    this.canvas = document.createElement("canvas");
+    this.root = make("div", "screen");
+    this.canvas = make("canvas");
     this.canvas.width = 320;
     this.canvas.height = 240;
     this.canvas.setAttribute("role", "img");
     this.canvas.setAttribute("aria-label", `picture of ${name}`);
-    this.age = document.createElement("span");
-    this.age.className = "age";
+    this.age = make("span", "age");
     this.root.append(this.canvas, this.age);
     this.drawnAt = 0;
     this.latencyMs = 0;

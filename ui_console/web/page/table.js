@@ -1,5 +1,7 @@
 // Rows become a table.
 
+import { make } from "./dom.js";
+
 /**
  * Each cell knows its head, so that a narrow screen can show rows as lists; the roles say that it is a table still.
  *
@@ -7,12 +9,12 @@
  * @param {(string | HTMLElement)[][]} rows
  */
 export function table(heads, rows) {
-  const made = document.createElement("table");
+  const made = make("table");
   made.setAttribute("role", "table");
   const head = made.createTHead().insertRow();
   head.setAttribute("role", "row");
   for (const one of heads) {
-    const cell = document.createElement("th");
+    const cell = make("th");
     cell.scope = "col";
     cell.setAttribute("role", "columnheader");
     cell.append(one);
@@ -29,23 +31,5 @@ export function table(heads, rows) {
       cell.append(one);
     });
   }
-  return made;
-}
-
-/**
- * @param {string} className
- * @param {string} text
- */
-export function span(className, text) {
-  const made = document.createElement("span");
-  made.className = className;
-  made.textContent = text;
-  return made;
-}
-
-/** @param {string} text */
-export function paragraph(text) {
-  const made = document.createElement("p");
-  made.textContent = text;
   return made;
 }

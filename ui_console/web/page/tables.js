@@ -1,7 +1,7 @@
 // Tables of the mission. What is shown was decided by the console model; here it only becomes rows.
 
-import { keepingFocus } from "./dom.js";
-import { paragraph, span, table } from "./table.js";
+import { keepingFocus, make, makeButton, stepped } from "./dom.js";
+import { table } from "./table.js";
 import { seconds, set } from "./text.js";
 import { timeline } from "./timeline.js";
 
@@ -27,13 +27,10 @@ export class Tables {
     /** @type {Map<string, HTMLButtonElement>} */
     this.buttons = new Map();
     for (const name of NAMES) {
-      const button = document.createElement("button");
-      button.type = "button";
+      const button = makeButton(name, () => this.choose(name));
       button.id = `tab-${name}`;
-      button.textContent = name;
       button.setAttribute("role", "tab");
       button.setAttribute("aria-controls", panel.id);
-      button.addEventListener("click", () => this.choose(name));
       tabs.append(button);
       this.buttons.set(name, button);
     }
@@ -50,10 +47,9 @@ export class Tables {
    * @param {KeyboardEvent} event
    */
   step(event) {
-    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-    if (!step || event.defaultPrevented) return;
+    const next = stepped(event.key, NAMES, this.chosen);
+    if (next === null || event.defaultPrevented) return;
     event.preventDefault();
-    const next = NAMES[(NAMES.indexOf(this.chosen) + step + NAMES.length) % NAMES.length];
     this.choose(next);
     this.buttons.get(next)?.focus();
   }
@@ -73,9 +69,9 @@ export class Tables {
    */
   show(view, changed) {
     this.view = view;
-    const tab = /** @type {HTMLButtonElement} */ (this.buttons.get("alarms"));
+    const tab = this.buttons.get("alarms");
     const alarms = (view.alarms ?? []).filter((alarm) => !alarm.acknowledged_by).length;
-    set(tab, alarms ? `alarms (${alarms})` : "alarms");
+    if (tab) set(tab, alarms ? `alarms (${alarms})` : "alarms");
     const isFound = this.chosen === "log" && this.log.found !== null; // what was found does not change
     if (this.section in changed && !isFound) this.draw();
   }
@@ -111,7 +107,7 @@ export class Tables {
   }
 
   nothing() {
-    return [paragraph(NOTHING[this.chosen] ?? "nothing yet")];
+    return [make("p", "", NOTHING[this.chosen] ?? "nothing yet")];
   }
 
   draw() {
@@ -125,11 +121,11 @@ export class Tables {
 
   /** @param {AlarmView[]} rows */
   alarms(rows) {
-    const all = this.button("Seen all", "acknowledge:", () => this.act("acknowledge", ""));
+    const all = makeButton("Seen all", () => this.act("acknowledge", ""), "acknowledge:");
     return table(
       ["level", "what", "where", "since", "times", all],
       rows.map((row) => [
-        span(row.severity, row.is_active ? `${row.severity}, now` : row.severity),
+        make("span", row.severity, row.is_active ? `${row.severity}, now` : row.severity),
         told(row),
         [row.robot === row.subject ? "" : row.robot, row.where].filter(Boolean).join(", "),
         seconds(row.first_s),
@@ -141,13 +137,13 @@ export class Tables {
 
   /** @param {AlarmView} row */
   seenOrWhy(row) {
-    const both = document.createElement("span");
+    const both = make("span");
     both.append(
-      this.button("Why?", `why:${row.key}`, () => this.act("why", row.subject)),
+      makeButton("Why?", () => this.act("why", row.subject), `why:${row.key}`),
       " ",
       row.acknowledged_by
         ? `seen by ${row.acknowledged_by}`
-        : this.button("Seen", `acknowledge:${row.key}`, () => this.act("acknowledge", row.key)),
+        : makeButton("Seen", () => this.act("acknowledge", row.key), `acknowledge:${row.key}`),
     );
     return both;
   }
@@ -159,7 +155,7 @@ export class Tables {
       heads,
       rows.map((row) => [
         row.robot,
-        row.stop ? span("alarm", `STOPPED by ${row.stop.by_user}`) : "",
+          row.stop ? make("span", "alarm", `STOPPED by ${row.stop.by_user}`) : "",
         row.is_mine ? "you" : row.holder || "–",
         row.priority,
         seconds(row.since_s),
@@ -177,7 +173,7 @@ export class Tables {
       ["behavior", "state", "priority", "does", "because", "ask"],
       rows.map((row) => [
         "\u2003".repeat(row.depth) + row.name,
-        span(row.state, row.state),
+        make("span", row.state, row.state),
         row.priority === null ? "" : String(row.priority),
         row.feedback,
         row.because,
@@ -192,14 +188,14 @@ export class Tables {
       ["who", "state", "resources", "priority", "since", "until", "expected", "because", "ask"],
       rows.map((row) => [
         row.owner,
-        span(row.state, row.state),
+        make("span", row.state, row.state),
         row.rcs.join(" "),
         row.priority,
         seconds(row.since_s),
         seconds(row.until_s),
         seconds(row.expected_start_s),
         row.because,
-        this.button("Why?", `why:${row.arc}`, () => this.act("why", row.arc)),
+        makeButton("Why?", () => this.act("why", row.arc), `why:${row.arc}`),
       ]),
     );
   }
@@ -210,7 +206,7 @@ export class Tables {
       ["link", "state", "there and back", "more"],
       rows.map((row) => [
         row.name,
-        span(row.is_up ? "running" : "lost", row.is_up ? "up" : "DOWN"),
+        make("span", row.is_up ? "running" : "lost", row.is_up ? "up" : "DOWN"),
         row.latency_s < 0 ? "" : `${(1000 * row.latency_s).toFixed(0)} ms`,
         row.feedback,
       ]),
@@ -222,15 +218,16 @@ export class Tables {
     return table(
       ["component", "parameter", "value", "before", "changed by"],
       rows.map((row) => {
-        const input = document.createElement("input");
+        const input = make("input");
         input.value = row.value;
         input.dataset.key = `set:${row.component}.${row.name}`;
         input.setAttribute("aria-label", `${row.component} ${row.name}`);
         input.addEventListener("keydown", (event) => {
           if (event.key !== "Enter") return;
+          /** @type {unknown} */
           let value = input.value;
           try {
-            value = JSON.parse(value);
+            value = JSON.parse(input.value);
           } catch {
             /* it is text as it stands */
           }
@@ -255,30 +252,19 @@ export class Tables {
 
   /** @param {string} name */
   more(name) {
-    const both = document.createElement("span");
+    const both = make("span");
     both.append(
-      this.button("Why?", `why:${name}`, () => this.act("why", name)),
+      makeButton("Why?", () => this.act("why", name), `why:${name}`),
       " ",
-      this.button("Parameters", `parameters:${name}`, () => {
-        this.act("parameters", name);
-        this.choose("parameters");
-      }),
+      makeButton("Parameters", () => this.askParameters(name), `parameters:${name}`),
     );
     return both;
   }
 
-  /**
-   * @param {string} label
-   * @param {string} key
-   * @param {() => void} press
-   */
-  button(label, key, press) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = label;
-    button.dataset.key = key;
-    button.addEventListener("click", press);
-    return button;
+  /** @param {string} name */
+  askParameters(name) {
+    this.act("parameters", name);
+    this.choose("parameters");
   }
 }
 

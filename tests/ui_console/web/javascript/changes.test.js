@@ -44,3 +44,13 @@ test("before the draft is known nothing is said", () => {
   on.changes.add(() => ({ do: "undo" }));
   assert.deepEqual(on.said, []);
 });
+
+test("a change that was meant for an older draft says so when its turn comes", () => {
+  const on = stage();
+  on.changes.add(() => ({ do: "move", path: [2], parent: [0], before: null, revision: 1 }));
+  on.changes.add(() => ({ do: "remove", path: [2], revision: undefined }));
+  on.revision = 2;
+  on.changes.handled();
+  assert.deepEqual(on.said[0], { revision: 1, do: "move", path: [2], parent: [0], before: null });
+  assert.deepEqual(on.said[1], { revision: 2, do: "remove", path: [2] });
+});
