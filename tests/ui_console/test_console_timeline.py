@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule
-from ui_console.model.timeline import HISTORY_S, Timeline
-from ui_console.model.views import Certainty, SliceView
+from ui_console.model.timeline import HISTORY_S, Certainty, SliceView, Timeline
 
 
 def schedule(at_s: float, holder: tuple[str, int, float] | None, *, sharable: bool = False) -> Schedule:

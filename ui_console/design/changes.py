@@ -19,15 +19,7 @@ from ui_console.design.draft import Draft
 from ui_console.design.following import follower
 from ui_console.design.offers import Offer, offer_at
 from ui_console.design.properties import Property, properties
-from ui_console.design.protocol import (
-    Change,
-    MoveElement,
-    Redo,
-    RemoveElement,
-    SetProperty,
-    TakeOffer,
-    Undo,
-)
+from ui_console.design.protocol import Change, MoveElement, Redo, RemoveElement, SetProperty, TakeOffer, Undo
 from ui_console.design.views import offer_view, palette, places, problems_view, tree_view
 
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*\.xml")

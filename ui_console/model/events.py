@@ -12,15 +12,9 @@ from typing import Any
 
 import msgspec
 
-from backbone.component.messages import (
-    ComponentState,
-    MissionTime,
-    Parameters,
-    SetParameter,
-    Statistics,
-    StoryEvent,
-)
+from backbone.component.messages import ComponentState, MissionTime, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log import Log, PeopleKnown
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.operators import OperatorActed
@@ -129,6 +123,13 @@ class LinkTrouble(Event):
 
     detail: str
     command: str = ""
+
+
+def failed(at_s: float, error: Refusal | LinkError) -> CommandRefused | LinkTrouble:
+    """Return that something was refused, or not answered."""
+    if isinstance(error, Refusal):
+        return CommandRefused(at_s, code_of(error), error.detail, error.remedy)
+    return LinkTrouble(at_s, str(error))
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,18 +44,9 @@ from ui_console.model.health_board import HealthBoard
 from ui_console.model.link_board import LinkBoard
 from ui_console.model.needs import Needs
 from ui_console.model.robot_board import RobotBoard
-from ui_console.model.timeline import Timeline
+from ui_console.model.timeline import Timeline, TimelineView
 from ui_console.model.tree_board import TreeBoard
-from ui_console.model.views import (
-    LEAVING,
-    AlarmKind,
-    AlarmView,
-    HealthView,
-    NodeView,
-    ParameterView,
-    Severity,
-    TimelineView,
-)
+from ui_console.model.views import LEAVING, AlarmKind, AlarmView, HealthView, NodeView, ParameterView, Severity
 
 STARVING_S = 30.0  # chosen: several turns of a mission whose turns take seconds
 PAST_S, NEXT_S = 60.0, 30.0  # chosen: what a person remembers, and what the schedule foresees

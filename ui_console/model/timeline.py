@@ -12,16 +12,65 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import StrEnum
 
+import msgspec
 from msgspec.structs import replace
 
 from backbone.naming import component_of
 from backbone.people import is_console
 from backbone.scheduling.views import RcView, RequestView, Schedule
-from ui_console.model.views import Certainty, SliceView, TimelineRow, TimelineView
 
 HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds
 TURNS_KEPT = 400  # chosen: bounds the memory of a resource that changes hands twice a second
+
+
+class Certainty(StrEnum):
+    """Which part of the timeline a slice is in."""
+
+    PAST = "past"
+    NOW = "now"
+    NEXT = "next"  # predicted
+
+
+class SliceView(msgspec.Struct, frozen=True):
+    """Somebody's turn with a resource.
+
+    Attributes:
+        who: Decision process.
+        arc: Its ARC.
+        epoch: Of the grant; 0 for one that is predicted.
+        from_s: Begin.
+        to_s: End; of a running one the end of its slice, of a predicted one its shortest.
+        certainty: Past, now or next.
+        is_console: True if it is a console's.
+    """
+
+    who: str
+    arc: str
+    epoch: int
+    from_s: float
+    to_s: float
+    certainty: Certainty
+    is_console: bool
+
+
+class TimelineRow(msgspec.Struct, frozen=True):
+    """One resource over time; slices by their begin."""
+
+    rc: str
+    kind: str
+    is_sharable: bool
+    slices: list[SliceView]
+
+
+class TimelineView(msgspec.Struct, frozen=True):
+    """Who had which resource, who has it, who comes next."""
+
+    from_s: float
+    now_s: float
+    to_s: float
+    rows: list[TimelineRow]
 
 
 @dataclass(slots=True)

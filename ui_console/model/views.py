@@ -15,6 +15,7 @@ from backbone.component.messages import ComponentState, LifeState, StoryEvent
 from backbone.creator.messages import HostLoad
 from backbone.scheduling.views import RequestView
 from backbone.wire import plain
+from ui_console.model.timeline import TimelineView
 
 NONE_S = -1.0
 """In place of a time, an age or a rest: there is none."""
@@ -175,54 +176,6 @@ class NodeView(msgspec.Struct, frozen=True):
     feedback: str
     arc: str
     because: str
-
-
-class Certainty(StrEnum):
-    """Which part of the timeline a slice is in."""
-
-    PAST = "past"
-    NOW = "now"
-    NEXT = "next"  # predicted
-
-
-class SliceView(msgspec.Struct, frozen=True):
-    """Somebody's turn with a resource.
-
-    Attributes:
-        who: Decision process.
-        arc: Its ARC.
-        epoch: Of the grant; 0 for one that is predicted.
-        from_s: Begin.
-        to_s: End; of a running one the end of its slice, of a predicted one its shortest.
-        certainty: Past, now or next.
-        is_console: True if it is a console's.
-    """
-
-    who: str
-    arc: str
-    epoch: int
-    from_s: float
-    to_s: float
-    certainty: Certainty
-    is_console: bool
-
-
-class TimelineRow(msgspec.Struct, frozen=True):
-    """One resource over time; slices by their begin."""
-
-    rc: str
-    kind: str
-    is_sharable: bool
-    slices: list[SliceView]
-
-
-class TimelineView(msgspec.Struct, frozen=True):
-    """Who had which resource, who has it, who comes next."""
-
-    from_s: float
-    now_s: float
-    to_s: float
-    rows: list[TimelineRow]
 
 
 class AlarmView(msgspec.Struct, frozen=True):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from backbone.component.messages import LogLevel
-from backbone.errors import LinkError, NoResponder, Refusal, code_of
+from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.naming import component_of
 from backbone.operators import OperatorAction
 from backbone.people import is_console
@@ -28,12 +28,7 @@ from ui_console.model.consent import (
     Topic,
     require_console,
 )
-from ui_console.model.events import (
-    CommandRefused,
-    ConsentAsked,
-    ConsentHeard,
-    LinkTrouble,
-)
+from ui_console.model.events import ConsentAsked, ConsentHeard, failed
 from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.observer import Observer
 
@@ -85,13 +80,9 @@ class ConsentTalk:
         now_s = console.clock.now_s
         try:
             holders = await self._who_holds(claim)
-        except Refusal as refusal:
+        except (Refusal, LinkError) as error:
             self._unanswered = 0
-            console.show(CommandRefused(now_s(), code_of(refusal), refusal.detail, refusal.remedy))
-            return
-        except LinkError as error:
-            self._unanswered = 0
-            console.show(LinkTrouble(now_s(), str(error)))
+            console.show(failed(now_s(), error))
             return
         assert claim is not None  # noqa: S101  who waits for nothing was refused
         self._unanswered = len(holders)

@@ -6,11 +6,11 @@ import asyncio
 import time
 from typing import TYPE_CHECKING, Any
 
-from backbone.errors import LinkError, Refusal, code_of
+from backbone.errors import LinkError, Refusal
 from backbone.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
 from ui_console.model.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
-from ui_console.model.events import CommandApplied, CommandRefused, LetGoNeeded, LinkTrouble, MomentBegan
+from ui_console.model.events import CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed
 
 if TYPE_CHECKING:
     from resource_pool.arc_client import Applied, ArcClient
@@ -119,7 +119,7 @@ class Controls:
         except Refusal as refusal:
             if isinstance(refusal, EmergencyStopped):
                 self.require_let_go()
-            show(CommandRefused(now_s(), code_of(refusal), refusal.detail, refusal.remedy))
+            show(failed(now_s(), refusal))
             return False
         except LinkError as error:
             self.require_let_go()  # whoever is cut off for a moment does not see what the robot would do next

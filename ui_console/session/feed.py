@@ -45,7 +45,7 @@ from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
-from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said
+from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
 from ui_console.model.robot_board import ROBOT_KIND
 
 log = logging.getLogger(__name__)
@@ -185,14 +185,7 @@ class ConsoleFeed:
     # ------------------------------------------------------------------ within
     def _told(self) -> _Answered:
         """Have the console told of a refusal or a silence, which ends what stands in here."""
-        return _Answered(self._failed)
-
-    def _failed(self, error: Refusal | LinkError) -> None:
-        now_s = self._clock.now_s()
-        if isinstance(error, Refusal):
-            self._show(CommandRefused(now_s, error.code, error.detail, error.remedy))
-        else:
-            self._show(LinkTrouble(now_s, str(error)))
+        return _Answered(lambda error: self._show(failed(self._clock.now_s(), error)))
 
     async def _stop(self, robot: str, reason: str, user: str) -> bool:
         with self._told():

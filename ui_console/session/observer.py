@@ -88,6 +88,7 @@ class Observer(Component[P], Generic[P]):
     # ------------------------------------------------------------------ verbs that need no grant
     async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
         """Stop a robot, whoever holds it; return whether that is certain."""
+        self.require_let_go()
         self.acted(OperatorAction.STOP_ROBOT, robot, reason, user)
         return not await self.feed.stop_robots([robot], reason, user or self.user)
 
@@ -96,6 +97,7 @@ class Observer(Component[P], Generic[P]):
 
         Those that are known are stopped at once, before anybody is asked whether there are more.
         """
+        self.require_let_go()
         known, user = self.feed.robots, user or self.user
         names = ", ".join(sorted(known)) or "whatever there is"
         self.acted(OperatorAction.STOP_ALL, "robots", f"{names}{f', {reason}' if reason else ''}", user)
@@ -180,8 +182,8 @@ class Observer(Component[P], Generic[P]):
     def schedule_heard(self) -> None:
         """Take note that there is a new schedule. When: after it was shown."""
 
-    def link_lost(self) -> None:
-        """Take note that the hub does not answer. When: after it was shown, again and again while it is so."""
+    def require_let_go(self) -> None:
+        """Have what is held move nothing until it was let go. When: before a stop, and when the hub does not answer."""
 
     def _heard(self, event: FeedEvent) -> None:
         self.show(event)
@@ -189,4 +191,4 @@ class Observer(Component[P], Generic[P]):
             case Heard(body=Schedule()):
                 self.schedule_heard()
             case LinkHeard(is_up=False):
-                self.link_lost()
+                self.require_let_go()

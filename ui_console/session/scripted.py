@@ -7,7 +7,8 @@ import os
 import threading
 from collections.abc import Callable
 
-from backbone.errors import Refusal, code_of
+from backbone.endings import ExitCode
+from backbone.errors import Refusal
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import StopState, SwappedOut
@@ -16,7 +17,6 @@ from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopR
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.session.teleoperation import Teleoperation
 
-DONE, USAGE, NO_BACKBONE, REFUSED = 0, 2, 4, 5  # as the command line's (ARCHITECTURE.md, section 5)
 INSTANT_S = 1e-9  # chosen: far above the rounding of mission times
 READ_BYTES = 65536
 _FOR_SCREENS_ONLY = (events.Asked, events.MomentBegan, events.PictureSeen)
@@ -111,10 +111,10 @@ class ScriptDriver:
     def exit_code(self, console: Teleoperation) -> int:
         """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
         if self._wrong is not None:
-            return USAGE
+            return ExitCode.USAGE
         if console.refusal is not None or self._failed or self._player.held_back:
-            return REFUSED
-        return DONE if self._granted and console.given_back else NO_BACKBONE
+            return ExitCode.REFUSED
+        return ExitCode.DONE if self._granted and console.given_back else ExitCode.NO_BACKBONE
 
     async def _play(self, console: Teleoperation, granted_s: float) -> None:
         clock = console.clock
@@ -167,8 +167,7 @@ class ScriptDriver:
 
     def _tell_wrong(self, now_s: float) -> None:
         if self._wrong is not None:
-            wrong = self._wrong
-            self._write(events.event_json(events.CommandRefused(now_s, code_of(wrong), wrong.detail, wrong.remedy)))
+            self._write(events.event_json(events.failed(now_s, self._wrong)))
 
 
 def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:

@@ -12,7 +12,7 @@ import asyncio
 import logging
 import types
 from collections.abc import Awaitable, Callable
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -21,60 +21,34 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
-from backbone.rc_manager.messages import AskWhy
-from backbone.scheduling.views import Why
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
     Frame,
     NotMyArc,
-    PathNode,
     Resumed,
     StopState,
     Suspended,
     Suspending,
     arc_name,
-    claim_parameters,
 )
 from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, Drive, Halt, Jump
 from ui_console.model.lifting import AskLift
 from ui_console.model.robot_board import ROBOT_KIND
+from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.consent_talk import Claim, ConsentTalk
 from ui_console.session.controls import Controls
-from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.hand_over import AskHandOver, HandOver
 from ui_console.session.observer import Observer
 from ui_console.session.presence import Presence
 from ui_console.session.stop_ear import StopEar
+from ui_console.session.waiting import Waiting
 
 log = logging.getLogger(__name__)
-
-ANY_ROBOT = "any robot"
-ANY_CAMERA = {ROBOT_KIND: ["camera"]}
-
-
-class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Parameters of ``Teleoperation``.
-
-    Attributes:
-        robot: Robot to claim; empty: any free one with a camera.
-        kind: Component type of the ARC.
-        priority: Among the consoles and the mission; larger is higher.
-        minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
-        away_after_s: The robot is given back when its operator touched nothing for so long, so that it goes on with
-            useful work; seconds of the machine; 0: never.
-    """
-
-    robot: str = ""
-    kind: str = "capture"
-    priority: int = 100
-    minimum_runtime_s: float = 5.0
-    away_after_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
 
 
 class Teleoperation(Observer[TeleoperationParameters]):
@@ -126,8 +100,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
         self._controls = Controls(self)
         self._consent = ConsentTalk(self, self.give_back)
         self._hand_over = HandOver(self, self.give_back)
+        self._waiting = Waiting(self, self._hand_over, self._waits_for)
         self._ear = StopEar(self, self._heard_stop)
-        self._asking_why: asyncio.Task[None] | None = None
         self._presence = Presence(self)
         self._holding = ""
         self._next_robot = ""
@@ -157,7 +131,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self._is_asking:
             return
         wished, rested = self.parameters, self._arc
-        claim = (wished.kind, self._claim_parameters())
+        claim = (wished.kind, wished.claim(self.address))
         self._rests = self._rests and self._claimed == claim
         if not self._rests:
             self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
@@ -352,24 +326,13 @@ class Teleoperation(Observer[TeleoperationParameters]):
         await super().connect()
         self.bus.watch_link(lambda _is_up: self.require_let_go())
 
-    def link_lost(self) -> None:
-        """What is held moves nothing when the link is back."""
-        self.require_let_go()
-
-    async def stop_robot(self, robot: str, reason: str = "", user: str = "") -> bool:
-        """Stop a robot, whoever holds it; return whether that is certain."""
-        self.require_let_go()
-        return await super().stop_robot(robot, reason, user)
-
-    async def stop_all(self, reason: str = "", user: str = "") -> list[str]:
-        """Stop every robot of the mission, whoever holds it; return those of which it is not certain."""
-        self.require_let_go()
-        return await super().stop_all(reason, user)
-
     def schedule_heard(self) -> None:
         """Ask why this console waits, if it does."""
-        if self._keeping is not None and not self.is_held and self._asking_why is None:
-            self._asking_why = self.start_task(self._ask_why(), "why")
+        self._waiting.ask(arc_name(self.bus, self.parameters.kind))
+
+    def _waits_for(self) -> tuple[str, float] | None:
+        is_waiting = self._keeping is not None and not self.is_held
+        return (self.parameters.robot, self._asked_s) if is_waiting else None
 
     # ------------------------------------------------------------------ the ARC
     async def arc_resumed(self, notice: Resumed) -> None:
@@ -412,17 +375,6 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not self._watches and state.number > 0:  # 0: it never was stopped
             self.show(events.Heard(self.clock.now_s(), state))
 
-    def _claim_parameters(self) -> dict[str, Any]:
-        wished = self.parameters
-        return claim_parameters(
-            self.address,
-            path=[PathNode(self.name, wished.priority)],
-            minimum_runtime_s=wished.minimum_runtime_s,
-            wish={ROBOT_KIND: wished.robot} if wished.robot else {},
-            features={} if wished.robot else ANY_CAMERA,
-            console=True,
-        )
-
     async def _keep(self, arc: ArcClient, rested: ArcClient | None) -> None:
         """Keep the ARC as it was claimed; one that rested and cannot be used any more is ended first."""
         assert self._claimed is not None  # noqa: S101  made in take
@@ -436,36 +388,14 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self._controls.disconnect()
             self._arc, self._keeping, self._is_asking = None, None, False
             self.refusal = refusal
-            self._tell_refusal(refusal)
+            refused = events.CommandRefused(self.clock.now_s(), code_of(refusal), refusal.detail, refusal.remedy, True)
+            self.show(refused)
             self._decided.set()
-
-    def _tell_refusal(self, refusal: Refusal) -> None:
-        now_s, code = self.clock.now_s(), code_of(refusal)
-        self.show(events.CommandRefused(now_s, code, refusal.detail, refusal.remedy, ends_claim=True))
 
     def _saw(self, frame: Frame) -> None:
         if self._see is not None:
             self.show(events.PictureSeen(self.clock.now_s(), frame.captured_s, frame.robot))
             self._see(frame)
-
-    async def _ask_why(self) -> None:
-        try:
-            question = AskWhy(arc_name(self.bus, self.parameters.kind))
-            why = await self.bus.ask(RC_MANAGER, question, Why, within_s=REPLY_TIME_S)
-        except (Refusal, LinkError) as error:
-            log.info("why: %s", error)
-        else:
-            if not self.is_held:
-                self.show(events.Heard(self.clock.now_s(), why))
-                await self._settle_with_other_screens()
-        finally:
-            self._asking_why = None
-
-    async def _settle_with_other_screens(self) -> None:
-        try:
-            await self._hand_over.settle(self.parameters.robot, self._asked_s)
-        except LinkError as error:
-            log.info("other screens: %s", error)
 
     # ------------------------------------------------------------------ hands
     async def _go_away(self) -> None:

@@ -18,6 +18,7 @@ from backbone.naming import component_of
 from backbone.scheduling.views import RequestView
 from backbone.spoken import counted
 from ui_console.model import views
+from ui_console.model.timeline import Certainty, SliceView, TimelineView
 from ui_console.terminal.tables import PanelName
 
 NODE_MARKS = {
@@ -38,7 +39,7 @@ LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
 HELD_ELSEWHERE = "hold to lift"  # what a page needs; a terminal has a second key for it
 LONG_NUMBER = 8  # chosen: digits that people read at a glance
 _PAPER = Console(file=io.StringIO())  # Rich wants one to fold text, and asks it nothing
-SLICE_MARKS = {views.Certainty.PAST: "▄", views.Certainty.NOW: "█", views.Certainty.NEXT: "░"}
+SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
 SLICE_COLORS = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green", "bright_magenta")
 
 
@@ -140,7 +141,7 @@ def lift_lines(stop: views.StopView) -> list[str]:
     return [f"set by {'you' if stop.is_mine else stop.by_user}, {stop.age_s:.0f} s ago{also}", *reason, *takes]
 
 
-def _timeline_rows(timeline: views.TimelineView, columns: int) -> list[Row]:
+def _timeline_rows(timeline: TimelineView, columns: int) -> list[Row]:
     """Return one bar for each resource: filled who had it and has it, shaded who comes next; ``│`` is now."""
     people = sorted({one.who for row in timeline.rows for one in row.slices})
     colors = {who: SLICE_COLORS[number % len(SLICE_COLORS)] for number, who in enumerate(people)}
@@ -285,7 +286,7 @@ def _component(component: ComponentState) -> Text:
     )
 
 
-def _bar(slices: list[views.SliceView], timeline: views.TimelineView, columns: int, colors: dict[str, str]) -> Text:
+def _bar(slices: list[SliceView], timeline: TimelineView, columns: int, colors: dict[str, str]) -> Text:
     scale = columns / (timeline.to_s - timeline.from_s)
     cells: list[tuple[str, str]] = [(" ", "")] * columns
     for one in slices:  # past ones first, so that what is now is drawn over the rest of them

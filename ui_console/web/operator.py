@@ -17,14 +17,7 @@ from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import STICK_LASTS_S, Halt, drive_by_stick
-from ui_console.model.events import (
-    Attention,
-    CommandApplied,
-    CommandRefused,
-    ConsoleEvent,
-    LinkTrouble,
-    PictureSeen,
-)
+from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
 from ui_console.session.consent_answers import ConsentAnswers
@@ -295,19 +288,16 @@ class Operator:
             self._console = await self._hands.new_console(self, robot)
             self.model.name = self._console.name  # others of this person are other screens
         except LinkError as error:
-            self.show(LinkTrouble(self._hands.clock.now_s(), str(error)))
+            self.show(failed(self._hands.clock.now_s(), error))
             return
         self._life = asyncio.create_task(self._live(self._console), name=f"life of {self._console.address}")
         self._life.add_done_callback(self._bug_of)
 
     async def _live(self, console: Teleoperation) -> None:
-        now_s = self._hands.clock.now_s
         try:
             await console.run()
-        except LinkError as error:
-            self.show(LinkTrouble(now_s(), str(error)))
-        except Refusal as refusal:
-            self.show(CommandRefused(now_s(), refusal.code, refusal.detail, refusal.remedy))
+        except (Refusal, LinkError) as error:
+            self.show(failed(self._hands.clock.now_s(), error))
 
     def _done(self, same: bytes, task: asyncio.Task[None]) -> None:
         self._work.pop(same, None)

@@ -16,6 +16,7 @@ from msgspec import inspect
 from backbone.component.messages import ComponentState
 from backbone.scheduling.views import RequestView
 from ui_console.model import views
+from ui_console.model.timeline import TimelineView
 from ui_console.web.door import Beat, Hello
 from ui_console.web.protocol import Intent
 
@@ -67,7 +68,7 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     drawn: dict[str, float]
     tree: list[views.NodeView]
     requests: list[RequestView]
-    timeline: views.TimelineView
+    timeline: TimelineView
     hosts: list[views.HostView]
     health: views.HealthView | None
     parameters: list[views.ParameterView]

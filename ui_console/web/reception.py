@@ -17,17 +17,7 @@ from websockets.http11 import Request, Response
 
 from backbone.errors import Refusal
 from backbone.spoken import counted
-from ui_console.web.door import (
-    MAX_MESSAGE_BYTES,
-    Beat,
-    Doorkeeper,
-    Fault,
-    Hello,
-    IntentT,
-    Offence,
-    Visitor,
-    Welcome,
-)
+from ui_console.web.door import MAX_MESSAGE_BYTES, Beat, Doorkeeper, Fault, Hello, IntentT, Offence, Visitor, Welcome
 from ui_console.web.outbox import Outbox
 from ui_console.web.porch import CLOSE_WITHIN_S, OPEN_WITHIN_S, Porch
 from ui_console.web.site import SOCKET_PATH, Answer, Site, is_own_page

@@ -1,0 +1,44 @@
+"""What a console claims, by its parameters."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+
+from backbone.naming import component_of
+from resource_pool.arc_client import PathNode, claim_parameters
+from ui_console.model.robot_board import ROBOT_KIND
+
+ANY_ROBOT = "any robot"
+ANY_CAMERA = {ROBOT_KIND: ["camera"]}
+
+
+class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Parameters of ``Teleoperation``.
+
+    Attributes:
+        robot: Robot to claim; empty: any free one with a camera.
+        kind: Component type of the ARC.
+        priority: Among the consoles and the mission; larger is higher.
+        minimum_runtime_s: Shortest useful time, seconds; only matters beside equals.
+        away_after_s: The robot is given back when its operator touched nothing for so long, so that it goes on with
+            useful work; seconds of the machine; 0: never.
+    """
+
+    robot: str = ""
+    kind: str = "capture"
+    priority: int = 100
+    minimum_runtime_s: float = 5.0
+    away_after_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+
+    def claim(self, address: str) -> dict[str, Any]:
+        """Return what the ARC of the console at this address is started with."""
+        return claim_parameters(
+            address,
+            path=[PathNode(component_of(address), self.priority)],
+            minimum_runtime_s=self.minimum_runtime_s,
+            wish={ROBOT_KIND: self.robot} if self.robot else {},
+            features={} if self.robot else ANY_CAMERA,
+            console=True,
+        )
