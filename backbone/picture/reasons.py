@@ -142,16 +142,14 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
     """
     asked = Asked.of(text)
     name = asked.name
-    why, placement, resolved, picture, told, known = await asyncio.gather(
+    why, placement, resolved, picture = await asyncio.gather(
         _or_error(bus, RC_MANAGER, AskWhy(name), Why),
         _or_error(bus, PLACER, AskPlacement(name), Placement),
         _or_error(bus, NAMESERVER, Resolve(name), Resolved),
-        _look_or_none(bus, clock),
-        story_of(bus, text, clock) if asked.message else _nothing_told(),
-        _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown),
+        _seen(bus, clock),
     )
-    absent = picture.health.absent if picture is not None else ()
-    remarks = [*host_remarks(name, picture), *person_remarks(name, picture)] if picture is not None else []
+    told = await story_of(bus, text, clock) if asked.message else Told(())
+    remarks = [*host_remarks(name, picture), *person_remarks(name, picture)]
     if asked.message and not told.events:
         remarks.append(
             f"nobody tells that {asked.message} led to anything; each tells of its newest {STORY_LENGTH} events"
@@ -161,10 +159,10 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         why if isinstance(why, Why) else None,
         placement if isinstance(placement, Placement) else None,
         resolved.component if isinstance(resolved, Resolved) else None,
-        next((absence for absence in absent if absence.name == name), None),
+        next((absence for absence in picture.health.absent if absence.name == name), None),
         told.events,
         remarks,
-        _people(picture, known),
+        picture.people,
     )
     if not reasons.is_known:
         errors = (why, placement, resolved)
@@ -223,9 +221,8 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     """
     asked = Asked.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    picture, known, *stories = await asyncio.gather(
-        _look_or_none(bus, clock),
-        _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown),
+    picture, *stories = await asyncio.gather(
+        _seen(bus, clock),
         *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
     )
     events = [event for story in stories if isinstance(story, Story) for event in story.events]
@@ -236,31 +233,27 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     ]
     missing += [f"{address}: it did not say yet who it is" for address in listing.unknown]
     named = {component_of(missed.partition(": ")[0]) for missed in missing}
-    absent = picture.health.absent if picture is not None else ()
-    missing += [f"{each.name}: it is absent, {each.cause}" for each in absent if each.name not in named]
+    absent = [each for each in picture.health.absent if each.name not in named]
+    missing += [f"{each.name}: it is absent, {each.cause}" for each in absent]
     if not listing.complete:
         missing.append("the nameserver began a moment ago: components may be missing in its list")
-    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing, _people(picture, known)))
+    return printable_all(Told(sorted(events, key=lambda event: event.at_s), missing, picture.people))
 
 
-def _people(picture: MissionPicture | None, known: Any) -> People:
-    """Return who sits at the consoles there are, and who sat at those that have left as far as the launcher knows."""
-    people = picture.people if picture is not None else People()
+async def _seen(bus: Bus, clock: Clock) -> MissionPicture:
+    """Return how the mission is and who sat at its consoles, as far as nameserver and launcher answer."""
+    picture, known = await asyncio.gather(_looked(bus, clock), _or_error(bus, LAUNCHER, AskPeople(), PeopleKnown))
     if isinstance(known, PeopleKnown):
-        people.remember(known.consoles)
-    return people
+        picture.take(known)
+    return picture
 
 
-async def _nothing_told() -> Told:
-    return Told(())
-
-
-async def _look_or_none(bus: Bus, clock: Clock) -> MissionPicture | None:
-    """Return how the mission is; None if the nameserver does not answer, which the other questions tell of."""
+async def _looked(bus: Bus, clock: Clock) -> MissionPicture:
+    """Return how the mission is; nothing of it if the nameserver does not answer, which the other questions tell of."""
     try:
         return await look(bus, clock.now_s(), rate=clock.rate)
     except (Refusal, LinkError):
-        return None
+        return MissionPicture(bus.mission)
 
 
 def _question(address: str, asked: Asked) -> AskStory:

@@ -17,7 +17,7 @@ from backbone.component.companion import Companion
 from backbone.component.launch import Launch
 from backbone.naming import Subsystem
 from ui_console.model.driving import Drive
-from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
+from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted, said
 from ui_console.session.teleoperation import Teleoperation
 
 WAIT_S = 10.0
@@ -64,7 +64,7 @@ class Console:
         return found[0]
 
     def since(self, mark: int, kind: type[Any]) -> list[Any]:
-        return [event for event in self.events[mark:] if isinstance(event, kind)]
+        return [one for one in map(said, self.events[mark:]) if isinstance(one, kind)]
 
     async def take_and_drive(self, drive: Drive) -> float:
         """Return how long it took from the wish to the first command applied."""

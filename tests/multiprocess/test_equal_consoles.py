@@ -11,9 +11,10 @@ from running_mission import RunningMission, mission_up
 from backbone.component.messages import AskStory, Story
 from backbone.keys import Conversation
 from backbone.operators import OperatorActed, OperatorAction
+from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Sought
 from ui_console.model.driving import Drive
-from ui_console.model.events import ConsentHeard, GivenBack, Granted, Lost
+from ui_console.model.events import ConsentHeard, GivenBack, Granted
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -55,7 +56,7 @@ async def test_who_holds_a_robot_lets_an_equal_who_asks_have_it_before_the_slice
             granted = await ben.hears(mark, Granted)
             assert (await ben.hears(mark, ConsentHeard)).is_given
             assert (await anna.hears(anna_mark, GivenBack)).reason == "ben may have it"
-            assert not anna.since(anna_mark, Lost)
+            assert not anna.since(anna_mark, Suspended)
             assert await ben.component.do(Drive(-4.0, -4.0))
             print(f"granted {1e3 * (granted.at_s - decided_s):.0f} ms after the yes")
             assert granted.at_s - decided_s < SLICE_S, "long before the slice of 60 s is over"
@@ -80,7 +81,7 @@ async def test_equals_who_ask_for_nothing_but_the_robot_take_turns(mission: Runn
             dan.component.take()
             mark = len(cleo.events)
             await dan.hears(0, Granted)
-            lost = await cleo.hears(mark, Lost)
+            lost = await cleo.hears(mark, Suspended)
             assert lost.by == "dan-drive"
             again = await cleo.hears(mark, Granted)
             assert again.again

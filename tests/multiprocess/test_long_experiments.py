@@ -44,10 +44,11 @@ from backbone.rc_manager.messages import AskRc, AskSchedule, AskWhy, RcState
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope
+from resource_pool.arc_client import Suspended
 from resource_pool.messages import RadioPacket
 from scout_model import radio_link
 from ui_console.model.driving import Drive
-from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, Lost
+from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, said
 from ui_console.session.teleoperation import Teleoperation
 
 pytestmark = [pytest.mark.processes, pytest.mark.slow]
@@ -555,7 +556,7 @@ async def test_the_rc_manager_falls_a_hundred_times_in_a_busy_mission() -> None:
                     for _kill in range(KILLS):
                         await clock.sleep_s(pauses.uniform(*PAUSE_S))
                         await kill_once(bus, clock, seen, fallen)
-                    assert not [event for event in waiting if isinstance(event, Granted | Lost)], waiting
+                    assert not [event for event in waiting if isinstance(said(event), Granted | Suspended)], waiting
                 finally:
                     driven.over.set()
                     stop_waiting.set()

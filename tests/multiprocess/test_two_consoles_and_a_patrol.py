@@ -20,8 +20,8 @@ from backbone.component.messages import AskStatistics, ComponentState, Parameter
 from backbone.keys import Conversation
 from backbone.wire import Envelope
 from mission_control.messages import WaypointReached
+from resource_pool.arc_client import Suspended
 from ui_console.model.driving import Drive
-from ui_console.model.events import Lost
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
@@ -148,7 +148,7 @@ async def at_random(mission: RunningMission, cycles: int, seed: int) -> Measured
             if first is low and dice.random() < 0.5:
                 mark = len(low.events)
                 took.driven.append(await high.take_and_drive(drive))
-                assert (await low.hears(mark, Lost)).by == "console-high-drive"
+                assert (await low.hears(mark, Suspended)).by == "console-high-drive"
                 assert low.component is not None
                 assert not await low.component.do(Drive(6, 6)), "commands of who lost the robot are refused"
                 await high.give_back(for_good=dice.random() < FOR_GOOD)

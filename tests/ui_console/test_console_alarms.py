@@ -14,8 +14,9 @@ from backbone.nameserver.messages import Disappeared
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule
+from resource_pool.arc_client import Suspended
 from ui_console.model.alarms import ALARMS_KEPT, FADES_AFTER_S, AlarmBook, alarm_key, one_line_for_one_cause
-from ui_console.model.events import CommandRefused, ConsoleEvent, GivenBack, Granted, Heard, LinkTrouble, Lost
+from ui_console.model.events import CommandRefused, ConsoleEvent, GivenBack, Granted, Heard, LinkTrouble
 from ui_console.model.views import AlarmKind, AlarmView, Severity
 
 KIND = AlarmKind.LOST
@@ -235,7 +236,7 @@ def test_five_minutes_of_ordinary_use_are_few_alarms_and_in_the_end_none() -> No
             Heard(60.0, Disappeared("resource_pool/scout1")),
             Heard(60.0, gone),
             Heard(60.0, down),
-            Lost(60.0, "rc", "scout1", -1.0),
+            Heard(60.0, Suspended("arc", "rc", "scout1", -1.0)),
             CommandRefused(60.1, "arc.swapped_out", "holds nothing", "wait"),
             LinkTrouble(60.2, "nobody answers"),
         ],
@@ -247,7 +248,7 @@ def test_five_minutes_of_ordinary_use_are_few_alarms_and_in_the_end_none() -> No
         ],
         90.0: [Heard(90.0, ben)],
         150.0: [Heard(150.0, Disappeared(ben.address))],
-        200.0: [Lost(200.0, "self", "", -1.0), GivenBack(200.0, "released", True)],
+        200.0: [Heard(200.0, Suspended("arc", "self", "", -1.0)), GivenBack(200.0, "released", True)],
     }
     shown = model(*TEAM_EVENTS)
     shown.sees = False

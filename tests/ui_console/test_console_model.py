@@ -31,7 +31,7 @@ from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import StopState, Suspended
 from ui_console.model.console import SILENT_S, STALE_S, ConsoleModel
 from ui_console.model.events import (
     Asked,
@@ -44,7 +44,6 @@ from ui_console.model.events import (
     Heard,
     LinkHeard,
     LinkTrouble,
-    Lost,
     PictureSeen,
     event_json,
 )
@@ -153,7 +152,7 @@ def test_the_status_line_follows_a_take_over_from_wish_to_release() -> None:
     assert shown.status_line(11.0) == "you hold scout1, slice 4 s"
     shown.apply(Heard(11.0, STOP))
     assert shown.status_line(11.0) == "scout1 is STOPPED by anna: child in the room"
-    shown.apply(Lost(12.0, "higher", "console-2", -1.0))
+    shown.apply(Heard(12.0, Suspended("arc", "higher", "console-2", -1.0)))
     assert shown.status_line(12.0) == "waiting for scout1: console-2 has the higher priority"
     assert shown.own(12.0).taken_because == "console-2 has the higher priority"
     shown.apply(GivenBack(13.0, "released", True))
@@ -353,7 +352,7 @@ EVENTS: list[ConsoleEvent] = [
     *TEAM_EVENTS,
     ASK,
     GRANT,
-    Lost(12.0, "higher", "console-2", -1.0),
+    Heard(12.0, Suspended("arc", "higher", "console-2", -1.0)),
     GivenBack(13.0, "released", False),
     PictureSeen(11.0, 10.9, "scout1"),
     CommandApplied(11.0, "scout1", 7, "drive", {"left_rad_s": 4.0}, 0.01),
@@ -390,7 +389,11 @@ def test_whatever_is_heard_in_whatever_order_the_view_is_whole_and_consistent(
     ("event", "word", "fields"),
     [
         (GRANT, "granted", {"epochs": {"scout1": 7, "radio": 3}, "asked_s": 9.95, "at_s": 10.0}),
-        (Lost(1.0, "higher", "console-2", -1.0), "suspended", {"reason": "higher", "by": "console-2"}),
+        (
+            Heard(1.0, Suspended("arc", "higher", "console-2", -1.0)),
+            "suspended",
+            {"reason": "higher", "by": "console-2"},
+        ),
         (Granted(1.0, {}, {}, 2.0, 0.0, True), "resumed", {"until_s": 2.0}),
         (CommandApplied(1.0, "scout1", 7, "drive", {"left_rad_s": 4.0}), "applied", {"epoch": 7, "rc": "scout1"}),
         (CommandRefused(1.0, "a.b", "no", "ask later"), "refused", {"code": "a.b", "remedy": "ask later"}),

@@ -7,17 +7,9 @@ from console_scenes import ASK, GRANT, SCHEDULE, STOP, held_model, model
 from screen_text import screen_text
 from written_session import WrittenSession
 
-from resource_pool.arc_client import Stopper, StopState
+from resource_pool.arc_client import Stopper, StopState, Suspended
 from ui_console.model.consent import Consent, Settled, Sought, Topic
-from ui_console.model.events import (
-    GivenBack,
-    Granted,
-    Heard,
-    LetGoNeeded,
-    LinkHeard,
-    Lost,
-    MomentBegan,
-)
+from ui_console.model.events import GivenBack, Granted, Heard, LetGoNeeded, LinkHeard, MomentBegan
 from ui_console.model.profile import Profile
 from ui_console.model.views import AlarmKind, LostView
 from ui_console.session.feed import LINK_FRESH_S
@@ -46,7 +38,7 @@ def test_a_robot_given_back_on_purpose_is_not_lost() -> None:
 
 
 def test_a_robot_lost_with_its_link_is_said_to_be_lost_while_the_console_asks_for_it_again() -> None:
-    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, Lost(12.0, "lease", "", -1.0))
+    shown = model(Heard(8.0, SCHEDULE), ASK, GRANT, Heard(12.0, Suspended("arc", "lease", "", -1.0)))
     lost = shown.own(12.0).lost
     assert lost is not None
     assert (lost.robot, lost.at_s, lost.may_retake) == ("scout1", 12.0, False)
@@ -55,7 +47,7 @@ def test_a_robot_lost_with_its_link_is_said_to_be_lost_while_the_console_asks_fo
 
 
 def test_whose_turn_is_over_has_lost_nothing() -> None:
-    assert model(ASK, GRANT, Lost(12.0, "slice", "console-2", -1.0)).own(12.0).lost is None
+    assert model(ASK, GRANT, Heard(12.0, Suspended("arc", "slice", "console-2", -1.0))).own(12.0).lost is None
 
 
 # ---------------------------------------------------------------------- a link that is down

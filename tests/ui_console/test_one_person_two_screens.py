@@ -22,8 +22,9 @@ from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope, Message
+from resource_pool.arc_client import Suspended
 from ui_console.model.console import ConsoleModel
-from ui_console.model.events import Heard, Lost
+from ui_console.model.events import Heard
 from ui_console.session.hand_over import AskHandOver, Outcome, decide
 from ui_console.session.teleoperation import Teleoperation
 
@@ -206,7 +207,7 @@ def test_people_are_called_by_their_names_in_rows_timeline_and_reasons() -> None
     assert shown.team.person("console-9") == shown.team.person("console-9-capture") == "Ben B."
     shown.apply(ASK)
     shown.apply(GRANT)
-    shown.apply(Lost(12.0, "slice", "console-9-capture", -1.0))
+    shown.apply(Heard(12.0, Suspended("arc", "slice", "console-9-capture", -1.0)))
     assert shown.own(12.0).taken_because == "it is the turn of Ben B."
     [taken] = shown.alarm_views()
     assert taken.line == "scout1 was taken from anna: it is the turn of Ben B."
@@ -215,8 +216,8 @@ def test_people_are_called_by_their_names_in_rows_timeline_and_reasons() -> None
 def test_what_one_gave_away_is_no_alarm_and_nobody_else_hears_of_ones_own() -> None:
     one = model(Heard(8.0, SCHEDULE), ASK, GRANT)
     two = ConsoleModel("console-2", "ben", one.team)
-    one.apply(Lost(12.0, "self", "", -1.0))
+    one.apply(Heard(12.0, Suspended("arc", "self", "", -1.0)))
     assert one.alarm_views() == []
-    one.apply(Lost(13.0, "higher", "console-2-capture", -1.0))
+    one.apply(Heard(13.0, Suspended("arc", "higher", "console-2-capture", -1.0)))
     assert [alarm.subject for alarm in one.alarm_views()] == ["scout1"]
     assert two.alarm_views() == []

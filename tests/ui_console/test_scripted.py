@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, LinkTrouble, Lost
+from resource_pool.arc_client import Suspended
+from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, Heard, LinkTrouble
 from ui_console.model.script import read_script
 from ui_console.session.scripted import ScriptDriver
 
@@ -33,16 +34,16 @@ def test_a_silence_is_one_line_until_there_is_an_answer() -> None:
 
 
 def test_a_robot_that_was_lost_is_told_in_a_sentence() -> None:
-    [line] = heard(Lost(3.0, "lost", "console-1-drive", -1.0))
+    [line] = heard(Heard(3.0, Suspended("arc", "lost", "console-1-drive", -1.0)))
     assert line["event"] == "suspended"
     assert line["why"] == "what held it for this console has ended"
-    [line] = heard(Lost(3.0, "higher", "console-9", -1.0))
+    [line] = heard(Heard(3.0, Suspended("arc", "higher", "console-9", -1.0)))
     assert line["why"] == "console-9 has the higher priority"
 
 
 def test_after_a_loss_that_nobody_decided_a_script_moves_nothing_before_a_halt() -> None:
     for reason, is_held_back in (("lost", True), ("lease", True), ("slice", False), ("higher", False)):
         driver = ScriptDriver(lambda _line: None, read_script(DRIVE))
-        driver.show(Lost(3.0, reason, "console-9", -1.0))
+        driver.show(Heard(3.0, Suspended("arc", reason, "console-9", -1.0)))
         driver.show(GRANTED)
         assert driver.must_halt is is_held_back, reason

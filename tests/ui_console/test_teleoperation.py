@@ -19,11 +19,11 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.operators import OperatorActed, OperatorAction
 from backbone.placer.messages import NoHost
-from resource_pool.arc_client import NoSuchAction
+from resource_pool.arc_client import NoSuchAction, Suspended
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
 from ui_console.model.driving import drive_towards
-from ui_console.model.events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, Lost
+from ui_console.model.events import Asked, Attention, CommandApplied, ConsoleEvent, GivenBack, Granted, said
 from ui_console.model.script import read_script
 from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
@@ -124,8 +124,8 @@ def test_keys_pressed_while_somebody_else_has_the_robot_do_nothing_later_either(
             await arc.grant()
             await placer.clock.sleep_s(1.0)
             assert {epoch for _at_s, epoch, command in arc.commands if isinstance(command, ArcDrive)} <= {1}
-            words = [type(event) for event in events if isinstance(event, Granted | Lost)]
-            assert words == [Granted, Lost, Granted]
+            words = [type(said(event)) for event in events if isinstance(said(event), Granted | Suspended)]
+            assert words == [Granted, Suspended, Granted]
 
     placer_world(scene)
 
@@ -164,7 +164,7 @@ def test_a_console_that_keeps_its_arc_asks_again_without_a_new_one(placer_world:
                 await placer.wait(lambda: not arc.is_idle)
                 assert len([event for event in events if isinstance(event, GivenBack)]) == turn
             assert placer.started == [arc.name]
-            assert not [event for event in events if isinstance(event, Lost)]
+            assert not [event for event in events if isinstance(said(event), Suspended)]
         assert not placer.arcs, "nothing is left behind"
 
     placer_world(scene)

@@ -19,6 +19,7 @@ from written_session import WrittenSession, settle
 from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
 from backbone.mission_log import AskLog, Log
+from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Consent, Settled, Sought
 from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
 from ui_console.model.events import (
@@ -30,7 +31,6 @@ from ui_console.model.events import (
     Heard,
     LinkHeard,
     LinkTrouble,
-    Lost,
 )
 from ui_console.model.profile import Profile
 from ui_console.session.feed import LogAway
@@ -555,7 +555,7 @@ async def test_an_old_picture_says_so_across_the_picture() -> None:
 async def test_a_robot_that_was_taken_away_says_by_whom_across_the_picture() -> None:
     session = WrittenSession(shown=held_model())
     session.shown = np.full((30, 40), 200, np.uint8)
-    session.model.apply(Lost(11.9, "higher", "console-2", -1.0))
+    session.model.apply(Heard(11.9, Suspended("arc", "higher", "console-2", -1.0)))
     screen = ConsoleApp(session)
     async with screen.run_test(size=SIZE) as pilot:
         screen.redraw()

@@ -17,7 +17,7 @@ from backbone.component.messages import StoryEvent
 from backbone.naming import Subsystem, component_of
 from backbone.picture.words import UNDECIDED, WANTED, why_lost
 from backbone.scheduling.views import Why
-from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop
+from resource_pool.arc_client import EmergencyStopped, GivenBeforeStop, Suspended
 from ui_console.model import events, views
 from ui_console.model.alarms import AlarmBook
 from ui_console.model.consent import Settled, Sought, Topic
@@ -58,7 +58,7 @@ class ConsoleModel:
         self.robot = ""
         """Robot asked for or held; empty: any, or none."""
         self.held: events.Granted | None = None
-        self.lost: events.Lost | None = None
+        self.lost: Suspended | None = None
         self.asked: events.Asked | None = None
         self.why: Why | None = None
         self.applied: events.CommandApplied | None = None
@@ -84,6 +84,8 @@ class ConsoleModel:
         match event:
             case events.Heard(body=Why() as why):
                 self.why = why
+            case events.Heard(body=Suspended() as lost):
+                self._take_loss(lost, event.at_s)
             case events.Heard() | events.LinkHeard():
                 self.team.apply(event)
             case _:
@@ -285,14 +287,6 @@ class ConsoleModel:
                 alarms.mended((views.AlarmKind.TAKEN, views.AlarmKind.REFUSED, views.AlarmKind.NO_ANSWER))
                 self._went = None
                 self.robot = rcs.get(ROBOT_KIND, self.robot)
-            case events.Lost(at_s=at_s):
-                self.held, self.lost = None, event
-                if event.reason in UNDECIDED:
-                    self._went = views.LostView(self.robot, "the link to it was away for too long", at_s, False)
-                self._pictures.clear()
-                if event.reason != WANTED:
-                    line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(event)}"
-                    alarms.happened(views.AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
             case events.CommandApplied():
                 self.applied = event
                 alarms.mended((views.AlarmKind.NO_ANSWER,))
@@ -320,7 +314,16 @@ class ConsoleModel:
             case events.Attention(at_s=at_s, is_there=is_there):
                 self.team.alarms.attention(is_there, at_s)
 
-    def _why_lost(self, lost: events.Lost) -> str:
+    def _take_loss(self, lost: Suspended, at_s: float) -> None:
+        self.held, self.lost = None, lost
+        if lost.reason in UNDECIDED:
+            self._went = views.LostView(self.robot, "the link to it was away for too long", at_s, False)
+        self._pictures.clear()
+        if lost.reason != WANTED:
+            line = f"{self.robot or 'the robot'} was taken from {self.user}: {self._why_lost(lost)}"
+            self.alarms.happened(views.AlarmKind.TAKEN, self.robot, line, at_s, key=f"taken:{self.name}")
+
+    def _why_lost(self, lost: Suspended) -> str:
         return why_lost(lost.reason, self.team.person(lost.by))
 
     def _answer_line(self, heard: events.ConsentHeard) -> str:

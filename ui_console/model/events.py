@@ -23,7 +23,7 @@ from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import plain
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import StopState, Suspended
 from ui_console.model.consent import Settled, Sought, Topic
 
 
@@ -66,21 +66,6 @@ class Granted(Event):
     def after_s(self) -> float:
         """How long the grant took, from the wish on, mission seconds."""
         return self.at_s - self.asked_s
-
-
-@dataclass(frozen=True, slots=True)
-class Lost(Event):
-    """The RCs went to somebody else.
-
-    Attributes:
-        reason: Why.
-        by: Because of whom.
-        expected_start_s: Next expected slot; negative: unknown.
-    """
-
-    reason: str
-    by: str
-    expected_start_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +222,7 @@ Said = (
     | MissionHealth
     | Parameters
     | SetParameter
+    | Suspended
     | Why
 )
 """What components publish or answer, as it came over the bus."""
@@ -273,7 +259,6 @@ class LinkHeard(Event):
 OwnEvent = (
     Asked
     | Granted
-    | Lost
     | CommandApplied
     | CommandRefused
     | LinkTrouble
@@ -291,7 +276,7 @@ TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
 _WORDS: dict[type[Any], str] = {
-    Lost: "suspended",
+    Suspended: "suspended",
     CommandApplied: "applied",
     CommandRefused: "refused",
     LinkTrouble: "no_answer",
@@ -319,11 +304,16 @@ _WORDS: dict[type[Any], str] = {
 }
 
 
+def said(event: ConsoleEvent) -> ConsoleEvent | Said:
+    """Return the message that was heard; any other event as it is."""
+    return event.body if isinstance(event, Heard) else event
+
+
 def event_word(event: ConsoleEvent) -> str:
     """Return the word of an event in JSON output: ``granted``, ``suspended``, ``resumed`` and so on."""
     if isinstance(event, Granted):
         return "resumed" if event.again else "granted"
-    kind = type(event.body if isinstance(event, Heard) else event)
+    kind = type(said(event))
     return _WORDS.get(kind, kind.__name__.lower())
 
 
@@ -339,13 +329,13 @@ def event_json(event: ConsoleEvent) -> bytes:
     match event:
         case Heard(body=Disappeared(address=address)):
             fields = {"at_s": event.at_s, "address": address}
+        case Heard(body=Suspended(reason=reason, by=by)):
+            fields = {"at_s": event.at_s, **fields["body"], "why": why_lost(reason, by)}
         case Heard():
             where = {"where": event.source} if event.source else {}
             fields = {"at_s": event.at_s, "act" if word == "operator" else word: fields["body"], **where}
         case Granted():
             fields["after_s"] = event.after_s
-        case Lost():
-            fields["why"] = why_lost(event.reason, event.by)
     return msgspec.json.encode({"event": word, **fields})
 
 
@@ -355,5 +345,4 @@ FOR_SCRIPTS = (Schedule, StoryEvent, OperatorActed, StopState, Disappeared, Proc
 
 def for_scripts(event: ConsoleEvent) -> list[bytes]:
     """Return the event as one line of JSON if it is one for programs that watch, else none."""
-    said = event.body if isinstance(event, Heard) else event
-    return [event_json(event)] if isinstance(said, FOR_SCRIPTS) else []
+    return [event_json(event)] if isinstance(said(event), FOR_SCRIPTS) else []

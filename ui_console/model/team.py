@@ -37,7 +37,7 @@ from backbone.rc_manager.messages import Leases
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule, Why
 from backbone.spoken import value_text
-from resource_pool.arc_client import StopState
+from resource_pool.arc_client import StopState, Suspended
 from ui_console.model.alarms import AlarmBook, one_line_for_one_cause
 from ui_console.model.events import LinkHeard, Said, TeamEvent
 from ui_console.model.health_board import HealthBoard
@@ -128,7 +128,7 @@ class TeamModel:
                 self._take_parameters(said, source, at_s)
             case SetParameter():
                 self._take_change(said, source, at_s)
-            case Why():
+            case Why() | Suspended():
                 """Of one console, which keeps it."""
             case _:
                 assert_never(said)

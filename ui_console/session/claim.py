@@ -6,8 +6,9 @@ from typing import Annotated, Any
 
 import msgspec
 
+from backbone.bus.interface import Bus
 from backbone.naming import component_of
-from resource_pool.arc_client import PathNode, claim_parameters
+from resource_pool.arc_client import PathNode, arc_name, claim_parameters
 from ui_console.model.robot_board import ROBOT_KIND
 
 ANY_ROBOT = "any robot"
@@ -31,6 +32,10 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
     priority: int = 100
     minimum_runtime_s: float = 5.0
     away_after_s: Annotated[float, msgspec.Meta(ge=0)] = 0.0
+
+    def arc(self, bus: Bus) -> str:
+        """Return the name of the ARC of the console whose bus this is."""
+        return arc_name(bus, self.kind)
 
     def claim(self, address: str) -> dict[str, Any]:
         """Return what the ARC of the console at this address is started with."""

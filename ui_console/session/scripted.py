@@ -11,7 +11,7 @@ from backbone.endings import ExitCode
 from backbone.errors import Refusal
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
-from resource_pool.arc_client import StopState, SwappedOut
+from resource_pool.arc_client import StopState, Suspended, SwappedOut
 from ui_console.model import events
 from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
@@ -48,11 +48,11 @@ class ScriptDriver:
         """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
         if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
             return
-        if isinstance(event, events.Lost) and event.reason in UNDECIDED:
+        said = events.said(event)
+        if isinstance(said, Suspended) and said.reason in UNDECIDED:
             self._player.require_let_go()
-        stop = event.body if isinstance(event, events.Heard) else None
-        if isinstance(stop, StopState) and (stop.is_stopped or self._stopped):
-            self._stopped = stop.is_stopped
+        if isinstance(said, StopState) and (said.is_stopped or self._stopped):
+            self._stopped = said.is_stopped
             self._player.require_let_go()
         if isinstance(event, events.CommandRefused) and event.code not in (SwappedOut.code, StaleEpoch.code):
             self._failed = True
@@ -68,7 +68,7 @@ class ScriptDriver:
         if isinstance(event, events.LinkTrouble) and event.command:
             is_told, self._is_unanswered = self._is_unanswered, True
             return is_told
-        if isinstance(event, events.CommandApplied | events.Granted | events.Lost):
+        if isinstance(events.said(event), events.CommandApplied | events.Granted | Suspended):
             self._is_unanswered = False
         return False
 

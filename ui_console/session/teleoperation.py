@@ -22,17 +22,7 @@ from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.operators import OperatorAction
 from backbone.wire import Envelope, Message
-from resource_pool.arc_client import (
-    ArcClient,
-    ArcNotice,
-    Frame,
-    NotMyArc,
-    Resumed,
-    StopState,
-    Suspended,
-    Suspending,
-    arc_name,
-)
+from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
 from ui_console.model.driving import Command, Drive, Halt, Jump
@@ -134,7 +124,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         claim = (wished.kind, wished.claim(self.address))
         self._rests = self._rests and self._claimed == claim
         if not self._rests:
-            self._arc = ArcClient(self.bus, arc_name(self.bus, wished.kind), self)
+            self._arc = ArcClient(self.bus, wished.arc(self.bus), self)
         arc, self._claimed, self._is_asking = self._arc, claim, True
         assert arc is not None  # noqa: S101  what rests is there
         self._controls.connect(arc)
@@ -278,7 +268,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     def begin_ask_consent(self, why: str = "") -> None:
         """Ask whoever holds what this console waits for; what they say is shown. Nothing if they are being asked."""
         robot, is_waiting = self.parameters.robot, self._is_asking and not self.is_held
-        claim = Claim(arc_name(self.bus, self.parameters.kind), robot, robot or ANY_ROBOT, self._asked_s)
+        claim = Claim(self.parameters.arc(self.bus), robot, robot or ANY_ROBOT, self._asked_s)
         self._consent.begin_ask(claim if is_waiting else None, why)
 
     def _consent_at_once(self) -> Consent | None:
@@ -328,7 +318,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     def schedule_heard(self) -> None:
         """Ask why this console waits, if it does."""
-        self._waiting.ask(arc_name(self.bus, self.parameters.kind))
+        self._waiting.ask(self.parameters.arc(self.bus))
 
     def _waits_for(self) -> tuple[str, float] | None:
         is_waiting = self._keeping is not None and not self.is_held
@@ -346,12 +336,11 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if not self.is_held or self._arc is None or self._arc.epochs != notice.epochs:
             return  # it went again meanwhile
         again, self._grants = self._grants > 0, self._grants + 1
-        now_s = self.clock.now_s()
         self.report(f"drives {robot}")
         if not again:
             self.tell(robot, f"was taken over by {self.user}", LogLevel.NOTICE)
         self._holding = robot
-        self.show(events.Granted(now_s, notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
+        self.show(events.Granted(self.clock.now_s(), notice.rcs, notice.epochs, notice.until_s, self._asked_s, again))
         self._decided.set()
 
     async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
@@ -365,8 +354,8 @@ class Teleoperation(Observer[TeleoperationParameters]):
             because = f"{notice.reason} by {notice.by}" if notice.by else notice.reason
             self.answers.ended(False, f"it was lost: {because}")
             self._controls.tell_drive_ended(self._holding, because)
-            self.report(f"waits: {notice.reason} by {notice.by}")
-            self.show(events.Lost(self.clock.now_s(), notice.reason, notice.by, notice.expected_start_s))
+            self.report(f"waits: {because}")
+            self.show(events.Heard(self.clock.now_s(), notice))
 
     def _heard_stop(self, state: StopState) -> None:
         """The robot that is held was stopped or may move again: whoever drives it has to know that first."""

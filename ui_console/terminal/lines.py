@@ -37,7 +37,6 @@ BEYOND_S = 1.0  # chosen: a slice that ends now is not beyond it yet
 HANG = 2  # chosen: a line that goes on is set off from the next row
 LEAST_COLUMNS = 12  # chosen: below, no line is worth folding
 HELD_ELSEWHERE = "hold to lift"  # what a page needs; a terminal has a second key for it
-LONG_NUMBER = 8  # chosen: digits that people read at a glance
 _PAPER = Console(file=io.StringIO())  # Rich wants one to fold text, and asks it nothing
 SLICE_MARKS = {Certainty.PAST: "▄", Certainty.NOW: "█", Certainty.NEXT: "░"}
 SLICE_COLORS = ("cyan", "green", "magenta", "yellow", "blue", "bright_cyan", "bright_green", "bright_magenta")
@@ -259,21 +258,10 @@ def _host(host: views.HostView) -> Text:
 
 
 def _parameter(parameter: views.ParameterView) -> Text:
-    line = Text.assemble((f"{parameter.component}.{parameter.name}", "bold"), f" = {_said(parameter.value)}")
+    line = Text.assemble((f"{parameter.component}.{parameter.name}", "bold"), f" = {parameter.value}")
     if parameter.changed_by:
-        before = _said(parameter.before)
-        line.append(f"  was {before}, set by {parameter.changed_by} at {parameter.changed_s:.0f} s", "dim")
+        line.append(f"  was {parameter.before}, set by {parameter.changed_by} at {parameter.changed_s:.0f} s", "dim")
     return line
-
-
-def _said(value: str) -> str:
-    """Return a value of JSON, a number with more digits than people read as a shorter one."""
-    if len(value) <= LONG_NUMBER or "." not in value:
-        return value
-    try:
-        return f"{float(value):.6g}"
-    except ValueError:  # a text, or a list
-        return value
 
 
 def _component(component: ComponentState) -> Text:
