@@ -225,7 +225,6 @@ class WebHub:
             "tree": team.tree(),
             "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),
-            "hosts": plain(team.links.hosts(now_s)),
             "health": team.health(now_s),
             "parameters": team.parameters(),
             "components": plain(team.components()),

@@ -69,7 +69,6 @@ class View(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tree: list[views.NodeView]
     requests: list[RequestView]
     timeline: TimelineView
-    hosts: list[views.HostView]
     health: views.HealthView | None
     parameters: list[views.ParameterView]
     components: list[ComponentState]

@@ -90,20 +90,6 @@ export interface HealthView {
   lines: string[];
 }
 
-export interface HostLoad {
-  host: string;
-  tags: string[];
-  cpu: number;
-  memory: number;
-  cores: number;
-  components: number;
-}
-
-export interface HostView {
-  load: HostLoad;
-  age_s: number;
-}
-
 export type LifeState =
   | "connecting"
   | "draining"
@@ -333,7 +319,6 @@ export interface View {
   tree: NodeView[];
   requests: RequestView[];
   timeline: TimelineView;
-  hosts: HostView[];
   health: HealthView | null;
   parameters: ParameterView[];
   components: ComponentState[];

@@ -117,7 +117,7 @@ def test_every_key_the_console_knows_is_tried_here() -> None:
 
 
 def test_the_reference_names_every_key_and_who_has_it() -> None:
-    page = (Path(__file__).parents[2] / "docs/reference/console-keys.md").read_text()
+    page = (Path(__file__).parents[3] / "docs/reference/console-keys.md").read_text()
     profiles = {"attach": Profile.TERMINAL, "pendant": Profile.PENDANT, "monitor": Profile.MONITOR}
     listed: dict[str, set[str]] = {}
     for keys, who in re.findall(r"^\| ((?:`[^`]+` ?)+)\|[^|]*\| ([a-z, ]+) \|$", page, re.MULTILINE):
@@ -131,7 +131,7 @@ def test_the_reference_names_every_key_and_who_has_it() -> None:
 
 
 def test_the_how_to_names_only_keys_that_there_are() -> None:
-    page = (Path(__file__).parents[2] / "docs/how-to/operate-from-a-terminal.md").read_text().replace("```", "")
+    page = (Path(__file__).parents[3] / "docs/how-to/operate-from-a-terminal.md").read_text().replace("```", "")
     signs = {"plus": "+", "minus": "-", "slash": "/", "question_mark": "?"}
     signs |= {"left_square_bracket": "[", "right_square_bracket": "]"}
     known = {signs.get(binding.key, binding.key) for binding in Binding.make_bindings(KEYS_OF_THE_CONSOLE)}
