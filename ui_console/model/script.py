@@ -119,7 +119,7 @@ def read_script(text: str) -> list[Step]:
 
     Example:
         >>> read_script('{"at_s": 0, "halt": true}')
-        [Step(at_s=0.0, wish=Halt())]
+        [Step(at_s=0.0, wish=Halt(), at_once=False)]
     """
     reader = ScriptReader()
     return [step for line in text.splitlines() if (step := reader.read(line)) is not None]
