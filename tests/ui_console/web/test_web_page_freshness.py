@@ -83,7 +83,7 @@ async def test_a_server_that_does_not_hear_the_mission_has_its_pages_say_so(
     async with page_at(stage) as page:
         await take(page)
         silent_s = stage.clock.now_s()
-        monkeypatch.setattr(stage.hub.team, "link_down_s", lambda _now_s: silent_s)
+        monkeypatch.setattr(stage.hub.team.links, "down_s", lambda _now_s: silent_s)
         await page.get_by_text("A STOP PRESSED HERE MAY NOT ARRIVE").wait_for()
         assert "has not heard the mission" in await page.locator("#blind-why").inner_text()
         assert await card(page).locator("button.emergency").is_enabled(), "it may arrive all the same"
