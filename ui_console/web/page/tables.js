@@ -155,7 +155,7 @@ export class Tables {
       heads,
       rows.map((row) => [
         row.robot,
-          row.stop ? make("span", "alarm", `STOPPED by ${row.stop.by_user}`) : "",
+        row.stop ? make("span", "alarm", `STOPPED by ${row.stop.by_user}`) : "",
         row.is_mine ? "you" : row.holder || "–",
         row.priority,
         seconds(row.since_s),
