@@ -39,7 +39,7 @@ async def woken_in_order(durations_s: list[float]) -> list[tuple[float, int]]:
     return woken
 
 
-@pytest.mark.virtual_limit(1e6)
+@pytest.mark.virtual_limit(2e6)
 @given(durations)
 def test_sleepers_wake_in_order_of_time_and_never_early(durations_s: list[float]) -> None:
     woken = run_virtual(woken_in_order(durations_s))
@@ -49,7 +49,7 @@ def test_sleepers_wake_in_order_of_time_and_never_early(durations_s: list[float]
         assert at_s >= durations_s[number] - 1e-8
 
 
-@pytest.mark.virtual_limit(1e6)
+@pytest.mark.virtual_limit(2e6)
 @given(durations)
 def test_the_same_program_gives_the_same_run(durations_s: list[float]) -> None:
     assert run_virtual(woken_in_order(durations_s)) == run_virtual(woken_in_order(durations_s))
@@ -81,7 +81,7 @@ def test_a_run_of_many_tasks_repeats_itself_from_its_seed() -> None:
     assert run_virtual(market(7)) != run_virtual(market(8))
 
 
-@pytest.mark.virtual_limit(1e6)
+@pytest.mark.virtual_limit(2e6)
 def test_a_day_takes_no_time_and_is_exact() -> None:
     async def days() -> float:
         for _ in range(3):
@@ -216,7 +216,7 @@ def test_time_that_does_not_move_on_is_refused(rate: float) -> None:
         MissionClock(0.0, rate)
 
 
-@pytest.mark.virtual_limit(1e6)
+@pytest.mark.virtual_limit(2e6)
 @given(st.floats(1e-3, 1e6))
 def test_whoever_is_woken_a_rounding_early_works_and_waits_for_the_rest_gets_there(at_s: float) -> None:
     """While anything can run the loop takes timers within its resolution for due and lets no time pass."""
