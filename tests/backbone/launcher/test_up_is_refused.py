@@ -11,17 +11,17 @@ import pytest
 from typer.testing import CliRunner
 
 from backbone.authentication import SocketPathTooLong
-from backbone.bring_up import run_mission
 from backbone.bus.interface import Bus, Clock
-from backbone.cli import app
-from backbone.core_launches import UpOptions
+from backbone.command_line.cli import app
 from backbone.errors import Refusal
+from backbone.launcher.bring_up import run_mission
+from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.preconditions import PortTaken
 from backbone.mission.model import Host, MissionDescription
 from backbone.mission.reader import read_mission
-from backbone.preconditions import PortTaken
 from backbone.run_files import TraceUnwritable
 
-MISSION_XML = Path(__file__).parents[2] / "mission.xml"
+MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 FAR = Host(name="far", address="192.0.2.7")
 
 

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from backbone.verdict import VerdictPipe, await_verdict
+from backbone.launcher.verdict import VerdictPipe, await_verdict
 
 
 def test_the_verdict_is_the_last_that_is_read() -> None:

@@ -13,17 +13,17 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from backbone.cli import app
+from backbone.command_line.cli import app
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
-from backbone.dry_run import dry_run, placements, requests
-from backbone.dry_run_screen import bars, screen
+from backbone.dry_run.run import dry_run, placements, requests
+from backbone.dry_run.screen import bars, screen
 from backbone.mission.model import ArcWish, Behavior, CoreService, Host, MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
 from backbone.scheduling.requests import RcUse, Usage
 
-MISSION_XML = Path(__file__).parents[2] / "mission.xml"
+MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 
 
 def mission(

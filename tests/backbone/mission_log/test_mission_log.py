@@ -14,10 +14,10 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import ComponentState, LifeState, LogLevel, StoryEvent
 from backbone.keys import Conversation
-from backbone.log_lines import log_json, log_lines
-from backbone.mission_log import AskLog, Log, LogKeeper, MissionLog
+from backbone.mission_log.lines import log_json, log_lines
+from backbone.mission_log.log import AskLog, Log, LogKeeper, MissionLog
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.moments import Now
-from backbone.operators import OperatorActed, OperatorAction
 
 CONSOLE = "ui_console/console-7"
 NOW = Now(100.0, datetime(2026, 5, 4, 14, 10))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from backbone.cli import app
+from backbone.command_line.cli import app
+from backbone.launcher.other_hosts import OtherHosts, command_on, endpoint_for_others
 from backbone.mission.model import Host, MissionDescription
-from backbone.other_hosts import OtherHosts, command_on, endpoint_for_others
 from backbone.picture.health import HealthWord, health
 
 BASE, FAR, ATTIC = (

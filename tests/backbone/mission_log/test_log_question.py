@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
-from backbone.log_question import LONGEST_WORDS, LogQuestion, WrongSearch
-from backbone.mission_log import FOR_EVER_S, MOST_EVENTS, AskLog
+from backbone.mission_log.log import FOR_EVER_S, MOST_EVENTS, AskLog
+from backbone.mission_log.question import LONGEST_WORDS, LogQuestion, WrongSearch
 from backbone.moments import NoMoment, Now
 
 NOW = Now(1000.0, datetime(2026, 5, 4, 14, 10, 30), rate=2.0)

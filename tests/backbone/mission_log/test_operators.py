@@ -7,7 +7,7 @@ import pytest
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.keys import Conversation
-from backbone.operators import OperatorActed, OperatorAction, login_name, publish_action
+from backbone.mission_log.operators import OperatorActed, OperatorAction, login_name, publish_action
 
 
 @pytest.mark.parametrize("action", OperatorAction)

@@ -24,7 +24,6 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LogLevel
-from backbone.creator.kept_creator import KeepsCreator, KeptCreator, Offered
 from backbone.creator.messages import (
     ListProcesses,
     Processes,
@@ -32,7 +31,8 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.errors import HubUnreachable, LinkError, Refusal
-from backbone.mission_connection import clock_elsewhere, mission_clock
+from backbone.launcher.kept_creator import KeepsCreator, KeptCreator, Offered
+from backbone.launcher.mission_connection import clock_elsewhere, mission_clock
 from backbone.naming import Subsystem, legal
 from backbone.wire import Envelope, Message
 

@@ -12,7 +12,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from backbone.dry_run import Claimed, DryRun, Placed
+from backbone.dry_run.run import Claimed, DryRun, Placed
 from backbone.scheduling.rehearsal import Run, Timetable
 
 COLUMNS = 60  # chosen: one a second of the first minute; with names beside it fits a terminal of 100

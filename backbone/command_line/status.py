@@ -15,9 +15,9 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence
-from backbone.endings import ExitCode
 from backbone.errors import HubUnreachable, LinkError
-from backbone.mission_connection import connected
+from backbone.launcher.endings import ExitCode
+from backbone.launcher.mission_connection import connected
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import ComponentState, LifeState
-from backbone.people import CONSOLES_KEPT, People, screens_of
+from backbone.mission_log.people import CONSOLES_KEPT, People, screens_of
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule
 

@@ -12,13 +12,13 @@ from pathlib import Path
 import psutil
 
 from backbone import run_files
-from backbone.bring_up import end_mission
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.endings import ExitCode, say
 from backbone.errors import LinkError
-from backbone.operators import OperatorAction, publish_action
-from backbone.verdict import await_verdict
+from backbone.launcher.bring_up import end_mission
+from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.verdict import await_verdict
+from backbone.mission_log.operators import OperatorAction, publish_action
 
 ASKED_S, TERM_S, KILL_S = 20.0, 10.0, 5.0  # chosen: taking down forty components on a busy machine needs 5 s
 
@@ -29,7 +29,7 @@ def up_detached(mission: str, mission_file: Path, *, speed: float, trace: Path |
     Only the launcher's verdict decides, because its process still lives while it cleans up after a failure.
     """
     told, telling = os.pipe()
-    command = [sys.executable, "-m", "backbone.cli", "up", str(mission_file.absolute()), "--headless"]
+    command = [sys.executable, "-m", "backbone.command_line.cli", "up", str(mission_file.absolute()), "--headless"]
     command += ["--tell-fd", str(telling), "--speed", str(speed)]
     command += ["--trace", str(trace.absolute())] if trace else []
     command += ["--for", str(for_s)] if for_s is not None else []

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from trace_checker import check
 
-from backbone.dry_run import dry_run
+from backbone.dry_run.run import dry_run
 from backbone.mission.reader import read_mission
 
 MISSION_XML = Path(__file__).parents[3] / "mission.xml"

@@ -32,7 +32,6 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence, LogLevel, Stop, Stopping
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.component.process import run_with_heartbeat
-from backbone.core_launches import UpOptions, core_launches, launcher_launch, service_launch
 from backbone.creator.messages import (
     READY_WITHIN_S,
     EndedBy,
@@ -46,20 +45,21 @@ from backbone.creator.messages import (
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.errors import BackboneError, LinkError, Refusal
-from backbone.health_watch import HealthWatch
 from backbone.heaps import share_heaps
+from backbone.launcher.core_launches import UpOptions, core_launches, launcher_launch, service_launch
+from backbone.launcher.health_watch import HealthWatch
+from backbone.launcher.other_hosts import OtherHosts, endpoint_for_others
+from backbone.launcher.preconditions import prepare_endpoint, refuse_if_up
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
-from backbone.mission_log import AskLog, AskPeople, LogKeeper, PeopleKnown
+from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
+from backbone.mission_log.operators import OperatorAction, publish_action
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import LAUNCHER, Subsystem, address, component_of
-from backbone.operators import OperatorAction, publish_action
-from backbone.other_hosts import OtherHosts, endpoint_for_others
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.preconditions import prepare_endpoint, refuse_if_up
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)

@@ -97,7 +97,7 @@ def picture_for(ctx: typer.Context) -> Any:
     can_ask = (mission and ENDPOINT.fullmatch(endpoint)) if endpoint is not None else complete_mission()
     if not can_ask:
         return None
-    from backbone.completion import picture_now
+    from backbone.command_line.completion import picture_now
 
     secret_file = ctx.params.get("secret_file")
     return picture_now(mission, endpoint, Path(secret_file) if secret_file is not None else None)
@@ -108,7 +108,7 @@ def complete_name(ctx: typer.Context) -> list[str]:
     picture = picture_for(ctx)
     if picture is None:
         return []
-    from backbone.completion import names_of
+    from backbone.command_line.completion import names_of
 
     return names_of(picture)
 
@@ -118,7 +118,7 @@ def complete_resource(ctx: typer.Context) -> list[str]:
     picture = picture_for(ctx)
     if picture is None:
         return []
-    from backbone.completion import resources_of
+    from backbone.command_line.completion import resources_of
 
     return resources_of(picture)
 
@@ -128,7 +128,7 @@ def complete_person(ctx: typer.Context) -> list[str]:
     picture = picture_for(ctx)
     if picture is None:
         return []
-    from backbone.completion import people_of
+    from backbone.command_line.completion import people_of
 
     return people_of(picture)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from backbone.dependency_database.messages import Resource
+from backbone.launcher.start_by_hand import OtherType, complete
 from backbone.placer.messages import Start
-from backbone.start_by_hand import OtherType, complete
 
 SCOUT1 = Resource("scout1", "scout", host="base", parameters={"network_id": 1, "world": "world"}, process="hardware")
 

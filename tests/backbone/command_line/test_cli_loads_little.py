@@ -14,7 +14,7 @@ import pytest
 pytestmark = pytest.mark.processes
 
 HEAVY = {"asyncio", "cv2", "lxml", "mujoco", "numpy", "pydantic", "rich", "textual", "uvloop", "zenoh"}
-PROGRAMS = {"scout-backbone": "backbone.cli", "scout-console": "ui_console.cli"}
+PROGRAMS = {"scout-backbone": "backbone.command_line.cli", "scout-console": "ui_console.cli"}
 RUN = """
 import contextlib, importlib, sys
 program, module, *words = sys.argv[1:]

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from backbone.cli import app
-from backbone.cli_options import hub_endpoint
-from backbone.completion import names_of, people_of, resources_of
+from backbone.command_line.cli import app
+from backbone.command_line.completion import names_of, people_of, resources_of
+from backbone.command_line.options import hub_endpoint
 from backbone.component.messages import ComponentState, LifeState
-from backbone.endings import ExitCode, complaint_of
 from backbone.errors import HubUnreachable
+from backbone.launcher.endings import ExitCode, complaint_of
 from backbone.moments import NoMoment
 from backbone.picture.mission import MissionPicture
 from backbone.scheduling.requests import RequestState

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from backbone.component.messages import LogLevel
 from backbone.errors import Refusal
-from backbone.mission_log import FOR_EVER_S, MOST_EVENTS, AskLog
+from backbone.mission_log.log import FOR_EVER_S, MOST_EVENTS, AskLog
 from backbone.moments import Now, moment
 from backbone.ranges import LONGEST_MENTION
 

@@ -18,9 +18,9 @@ from backbone.bus.interface import Bus
 from backbone.component.messages import ComponentState, LogLevel, StoryEvent
 from backbone.component.story import is_about, speaks_of
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.people import People
 from backbone.naming import Subsystem
-from backbone.operators import OperatorActed
-from backbone.people import People
 from backbone.printable import printable_all
 from backbone.ranges import MANY, Count, Instant, Line, Mention
 from backbone.wire import Envelope, Message

@@ -12,9 +12,9 @@ from pathlib import Path
 from backbone.authentication import read_secret_file
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import BackboneError
-from backbone.mission_connection import connected
+from backbone.launcher.mission_connection import connected
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.people import is_console
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 

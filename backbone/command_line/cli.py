@@ -17,7 +17,7 @@ from typing import Annotated, Any
 
 import typer
 
-from backbone.cli_options import (
+from backbone.command_line.options import (
     AsJson,
     CommandTable,
     ComponentName,
@@ -34,8 +34,8 @@ from backbone.cli_options import (
     hub_endpoint,
 )
 from backbone.component.messages import LogLevel
-from backbone.endings import ExitCode, complaint_of, say, show
 from backbone.errors import BackboneError
+from backbone.launcher.endings import ExitCode, complaint_of, say, show
 from backbone.spoken import counted, value_text
 
 app = typer.Typer(
@@ -89,7 +89,7 @@ def connected(
     mission: str | None, endpoint: str | None, secret_file: Path | None
 ) -> AbstractAsyncContextManager[tuple[Any, Any]]:
     """Return a context manager for a bus to a mission that is up, and its clock."""
-    from backbone import mission_connection
+    from backbone.launcher import mission_connection
 
     if endpoint is not None and mission is None:
         raise typer.BadParameter("--connect needs --mission NAME")
@@ -162,8 +162,8 @@ def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> Exit
     """Print a dry run; return the exit code."""
     from rich.console import Console
 
-    from backbone.dry_run import FIRST_MINUTE_S, dry_run
-    from backbone.dry_run_screen import screen
+    from backbone.dry_run.run import FIRST_MINUTE_S, dry_run
+    from backbone.dry_run.screen import screen
     from backbone.scheduling.own_planner import WrongPlanner
 
     try:
@@ -210,12 +210,12 @@ def up(
     """Bring a mission up; it ends cleanly on Ctrl-C or 'scout-backbone down'."""
     description = read_or_exit(mission_file)
     if detach:
-        from backbone.detached import up_detached
+        from backbone.launcher.detached import up_detached
 
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
-    from backbone.core_launches import UpOptions
-    from backbone.mission_console import bring_up_on_console
-    from backbone.verdict import VerdictPipe
+    from backbone.command_line.mission_console import bring_up_on_console
+    from backbone.launcher.core_launches import UpOptions
+    from backbone.launcher.verdict import VerdictPipe
 
     options = UpOptions(speed=speed, trace=trace, for_s=for_s)
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
@@ -233,7 +233,7 @@ def status(
     """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
 
     async def work() -> int:
-        from backbone.status import Shown, show_status
+        from backbone.command_line.status import Shown, show_status
 
         if connect is not None and mission is None:
             raise typer.BadParameter("--connect needs --mission NAME")
@@ -276,7 +276,7 @@ def story(
     """Print the events about a component, request or resource, with their causes."""
 
     async def work() -> int:
-        from backbone.log_lines import story_json, story_lines
+        from backbone.mission_log.lines import story_json, story_lines
         from backbone.picture.reasons import story_of
 
         async with connected(mission, connect, secret_file) as (bus, clock):
@@ -321,9 +321,9 @@ def log(
     async def work() -> int:
         from datetime import datetime
 
-        from backbone.log_lines import log_json, log_lines
-        from backbone.log_question import LogQuestion
-        from backbone.mission_log import Log
+        from backbone.mission_log.lines import log_json, log_lines
+        from backbone.mission_log.log import Log
+        from backbone.mission_log.question import LogQuestion
         from backbone.moments import Now
         from backbone.naming import LAUNCHER
 
@@ -359,11 +359,11 @@ def start(
     parameters = dict(_parameter(given) for given in parameter or [])
 
     async def work() -> int:
+        from backbone.launcher.start_by_hand import completed
+        from backbone.mission_log.operators import OperatorAction, publish_action
         from backbone.naming import component_of
-        from backbone.operators import OperatorAction, publish_action
         from backbone.placer.messages import ADDRESS, Start, Started
         from backbone.placer.wishes import START_WITHIN_S
-        from backbone.start_by_hand import completed
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             order, remark = await completed(bus, Start(type_, name, parameters, host))
@@ -389,7 +389,7 @@ def stop(
     """Stop one component; it is not restarted."""
 
     async def work() -> int:
-        from backbone.operators import OperatorAction, publish_action
+        from backbone.mission_log.operators import OperatorAction, publish_action
         from backbone.placer.messages import ADDRESS, Ended, StopComponent
 
         async with connected(mission, connect, secret_file) as (bus, clock):
@@ -424,8 +424,8 @@ def set_(
         raise typer.BadParameter("--json shows attributes; leave the value out")
 
     async def work() -> int:
-        from backbone.attributes import attributes_of, change
-        from backbone.operators import OperatorAction, login_name, publish_action
+        from backbone.command_line.attributes import attributes_of, change
+        from backbone.mission_log.operators import OperatorAction, login_name, publish_action
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             if parameter is not None and value is not None:
@@ -450,7 +450,7 @@ def down(mission: MissionName = None) -> None:
     """Stop a mission of this machine in reverse order: ask, then SIGTERM, then SIGKILL; says which was needed."""
 
     async def work() -> int:
-        from backbone.detached import take_down
+        from backbone.launcher.detached import take_down
 
         return await take_down(mission)
 
@@ -468,8 +468,8 @@ def creator(
     """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
 
     async def work() -> int:
-        from backbone.creator.kept_creator import Offered
-        from backbone.creator.offer import Offering
+        from backbone.launcher.kept_creator import Offered
+        from backbone.launcher.offer import Offering
 
         offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
         is_file = secret_file is not None and str(secret_file) != "-"

@@ -10,16 +10,17 @@ from typing import IO, Any
 from rich.console import Console
 from rich.live import Live
 
-from backbone.bring_up import Outcome, run_mission
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import ComponentState, StoryEvent
-from backbone.core_launches import UpOptions
-from backbone.endings import ExitCode, complaint_of
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
+from backbone.launcher.bring_up import Outcome, run_mission
+from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.endings import ExitCode, complaint_of
+from backbone.launcher.verdict import VerdictPipe
 from backbone.mission.model import MissionDescription
+from backbone.mission_log.operators import OperatorActed
 from backbone.naming import LAUNCHER, Subsystem
-from backbone.operators import OperatorActed
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, Said, holders_line
@@ -30,7 +31,6 @@ from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
-from backbone.verdict import VerdictPipe
 from backbone.wire import Envelope
 
 EVENTS_KEPT = 12  # chosen: as many as the tallest picture shows

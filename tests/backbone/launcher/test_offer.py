@@ -15,7 +15,6 @@ from backbone.bus.interface import Bus, Clock, LinkListener, Subscription
 from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, AskState, ComponentState, Stop, Stopping
-from backbone.creator import offer as offers
 from backbone.creator.messages import (
     ListProcesses,
     Processes,
@@ -26,7 +25,8 @@ from backbone.creator.messages import (
     creator_name,
     offer_name,
 )
-from backbone.creator.offer import Ending, Offer
+from backbone.launcher import offer as offers
+from backbone.launcher.offer import Ending, Offer
 from backbone.naming import Subsystem
 
 CUT_OFF_S = 0.1

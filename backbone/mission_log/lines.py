@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from backbone.component.messages import LogLevel, StoryEvent
-from backbone.mission_log import Log
+from backbone.mission_log.log import Log
 from backbone.moments import Now
 
 _MARKS = {LogLevel.ALARM: "!!", LogLevel.WARNING: "!", LogLevel.NOTICE: "", LogLevel.INFO: ""}
