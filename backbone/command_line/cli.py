@@ -48,8 +48,9 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
-EXPERIMENTS = "mission_control.experiments.cli"
-SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
+# named, as a mission names its classes: imports run downwards only
+EXPERIMENTS = "mission_control.laboratory.experiments.cli"
+SIMULATION = "mission_control.laboratory.simulation.campaign"
 LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to compute
 LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer time is a typing error
 MOST_SEEDS = 1_000_000  # chosen: a day of work
