@@ -95,7 +95,7 @@ def test_a_planted_violation_is_found(
         ("mission_control/behaviors/planted.py", "from resource_pool import arc_client"),
         ("mission_control/laboratory/planted.py", "import resource_pool.rcs"),
         ("mission_control/vision/planted.py", "import cv2"),
-        ("backbone/placer/planted.py", "from backbone.nameserver.messages import Register"),
+        ("backbone/placer/planted.py", "from backbone.nameserver.messages import Resolve"),
         ("resource_pool/planted.py", "import scout_model.description, backbone.wire"),
         ("ui_console/planted.py", "import textual, typer, rich.table"),
     ],

@@ -33,7 +33,7 @@ from mission_control.laboratory.experiments.operator import Operator
 from mission_control.laboratory.experiments.prediction import departs_s
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
 from mission_control.messages import MotionSeen
-from resource_pool.messages import WorldState
+from resource_pool.drivers.world_messages import WorldState
 
 CLAIMS_FROM_FRAME = 15  # chosen: half a second in which the Scouts come to rest on the floor
 AFTERWARDS_S = 0.5  # chosen: longer than the delay of a picture

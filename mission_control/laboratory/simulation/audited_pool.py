@@ -19,10 +19,9 @@ from resource_pool.aggregate_resource_controller import AggregateResourceControl
 from resource_pool.arcs.capture import CaptureArc
 from resource_pool.arcs.drive import DriveArc
 from resource_pool.arcs.video_drive import VideoDriveArc
-from resource_pool.drivers.interface import DriverSite, Picture
+from resource_pool.drivers.interface import DriverSite, HardwareFault, Picture
 from resource_pool.gate import Gate
 from resource_pool.holds import Hold
-from resource_pool.messages import HardwareFault
 from resource_pool.rcs.command_radio import CommandRadio
 from resource_pool.rcs.framegrabber import Framegrabber, FramegrabberParameters
 from resource_pool.rcs.scout import Scout, ScoutParameters

@@ -11,11 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from random import Random
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     ChangeRuntime,
     Connect,

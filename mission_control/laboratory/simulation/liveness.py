@@ -15,11 +15,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from backbone.addresses import LAUNCHER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, LifeState
 from backbone.creator.messages import creator_name
 from backbone.keys import Conversation
-from backbone.naming import LAUNCHER
 from backbone.picture.health import SILENT_AFTER_S, HealthWord, MissionHealth
 from backbone.wire import Envelope
 from mission_control.laboratory.simulation.audit import Audit, Happening

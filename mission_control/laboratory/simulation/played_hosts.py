@@ -14,10 +14,10 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
+from backbone.component.messages import NameTaken
 from backbone.creator.messages import EndedBy
 from backbone.dependency_database.messages import Resource
 from backbone.errors import BackboneError
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, component_of
 from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent, StoppedMeanwhile
 from backbone.wire import Envelope, Message

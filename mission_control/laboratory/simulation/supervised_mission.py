@@ -11,6 +11,7 @@ import contextvars
 import tempfile
 from collections.abc import Callable, Sequence
 
+from backbone.addresses import LAUNCHER
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
@@ -19,7 +20,7 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.keys import Conversation
 from backbone.launcher.bring_up import CORE_POLICY, Launcher
 from backbone.launcher.core_launches import UpOptions
-from backbone.naming import LAUNCHER, Subsystem
+from backbone.naming import Subsystem
 from backbone.wire import Envelope
 from mission_control.laboratory.simulation.audit import Audit, current_audit
 from mission_control.laboratory.simulation.hostile_numbers import hostile_message, say_hostile

@@ -17,9 +17,9 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
+from backbone.addresses import PLACER
 from backbone.bus.local_bus import Answered, Listening, LocalNetwork, Watching
 from backbone.errors import NoResponder
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.wire import Envelope
 from mission_control.laboratory.simulation.faults import Fates, MessageFault
 

@@ -19,6 +19,7 @@ from typing import Any, Literal
 
 import msgspec
 
+from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalBus, LocalNetwork
@@ -34,7 +35,6 @@ from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem, address, component_of
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import (
     AskPlacement,
     Ended,
@@ -48,7 +48,6 @@ from backbone.placer.messages import (
     StopComponent,
     StoppedMeanwhile,
 )
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import TraceLine
 from backbone.rc_manager.service import RcManager
 from backbone.wire import Envelope, Message
