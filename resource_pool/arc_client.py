@@ -12,18 +12,18 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
 from backbone.placer.wishes import Wish
 from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message
+from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -32,25 +32,15 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
-    AskPose,
-    AskStop,
     Drive,
-    EmergencyStop,
-    EmergencyStopped,
     Frame,
-    GivenBeforeStop,
     Halt,
     Jump,
-    LiftStop,
     NoSuchAction,
     Noted,
-    OtherStop,
-    Pose,
     Release,
     Resumed,
     SliceEnds,
-    Stopper,
-    StopState,
     Suspended,
     Suspending,
     SwappedOut,
@@ -59,6 +49,16 @@ from resource_pool.messages import (
     WantRuntime,
 )
 from resource_pool.stop_knowledge import StopKnowledge
+from resource_pool.stop_messages import (
+    AskStop,
+    EmergencyStop,
+    EmergencyStopped,
+    GivenBeforeStop,
+    LiftStop,
+    OtherStop,
+    Stopper,
+    StopState,
+)
 
 __all__ = [
     "DEFAULT_DRIVE_USAGE",

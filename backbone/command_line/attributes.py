@@ -10,13 +10,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.messages import AskParameters, Parameters, SetParameter
 from backbone.errors import Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.naming import component_of
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskAttributes, Done, MoveNode, SetPriority
 from backbone.scheduling.requests import PathNode, RcUse, UnknownRequest, Usage
 from backbone.scheduling.views import Attributes, RequestAttributes

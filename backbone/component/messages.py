@@ -1,10 +1,11 @@
-"""Common messages: the questions that every component answers, and its status."""
+"""Common messages: the questions that every component answers, its status, and its registration."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from typing import Annotated, Any
 
+from backbone.errors import Refusal
 from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
@@ -89,6 +90,27 @@ class ComponentState(Message, frozen=True):
     absent: Annotated[list[Absence], MANY] = []
     stop: StandingStop | None = None
     user: Mention = ""
+
+
+class Register(Message, frozen=True):
+    """Register a name at the nameserver. The component shell asks this before its readiness.
+
+    Attributes:
+        component: The component; its state is CONNECTING.
+    """
+
+    component: ComponentState
+
+
+class Registered(Message, frozen=True):
+    """Answer to ``Register``: the component holds the name until its liveliness token falls."""
+
+
+class NameTaken(Refusal):
+    """A living component has this name."""
+
+    code = "nameserver.taken"
+    remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
 
 
 class AskTime(Message, frozen=True):

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, ComponentState
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, MissionHealth, health
 from backbone.picture.look import LOOK_TIME_S, look

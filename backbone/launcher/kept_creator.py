@@ -10,11 +10,11 @@ from typing import Protocol
 import msgspec
 
 from backbone import run_files
+from backbone.addresses import COMPONENT_DATABASE
 from backbone.authentication import keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
-from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPolicy, creator_name
 from backbone.creator.preload import arc_modules

@@ -27,10 +27,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, Spawn
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address, did_you_mean
 from backbone.placer.messages import NotPlaced, Placement
 from backbone.placer.placement import CandidateHost, Choice, obstacle, place

@@ -32,8 +32,6 @@ from backbone.ranges import (
 from backbone.scheduling.requests import Holder, Lease, PathNode, RcUse, SchedulingRequest
 from backbone.wire import Message
 
-ADDRESS = "backbone/rc_manager"
-
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
 EPOCHS_PER_S = 1000  # chosen: an RC that restarts begins above all it ever had, as no RC changes hands so often
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s

@@ -16,6 +16,7 @@ import msgspec
 import psutil
 import uvloop
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
@@ -36,7 +37,6 @@ from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.zygote import Zygote
 from backbone.keys import Conversation
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 
 CREATOR = "backbone/creator-lab"
 KINDS = ("Quiet", "Parent", "Stubborn", "Late", "Broken", "Stumbling", "Leaver", "Missing")

@@ -19,7 +19,7 @@ from running_mission import MARK, RunningMission, mission_up
 from three_hosts import NAME, mission_on_three_hosts
 
 from backbone.bus.interface import Bus
-from resource_pool.messages import AskStop, EmergencyStop, StopState
+from resource_pool.stop_messages import AskStop, EmergencyStop, StopState
 
 pytestmark = [
     pytest.mark.processes,

@@ -27,7 +27,8 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
-from resource_pool.messages import Applied, AskPose, CommandScout, Drive, Pose
+from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.messages import Applied, CommandScout, Drive
 from ui_console.model.driving import Drive as DriveKey
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.session.teleoperation import Teleoperation

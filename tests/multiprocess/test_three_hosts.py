@@ -14,12 +14,12 @@ import pytest
 from namespaces import hosts_on_a_switch
 from three_hosts import NAME, Copies, ThreeHosts, machines, mission_on_three_hosts
 
+from backbone.addresses import LAUNCHER
 from backbone.authentication import secret_of, socket_endpoint
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, ComponentState
 from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S
-from backbone.naming import LAUNCHER
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(400)]
 

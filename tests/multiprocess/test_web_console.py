@@ -22,11 +22,11 @@ from web_browser import Cable, Finger, assert_no_sideways_scroll
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
-from resource_pool.messages import AskPose, Pose
+from resource_pool.drivers.world_messages import AskPose, Pose
 
 pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
 
