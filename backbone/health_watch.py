@@ -22,8 +22,6 @@ class HealthWatch:
     """Examines the mission every ``LOOK_EVERY_S`` and publishes its health under the launcher's address.
 
     Args:
-        bus: Bus of the launcher.
-        clock: The mission's clock.
         changed: Called when ``absences`` changes.
         own: Returns the absences that the launcher reports as an owner.
     """

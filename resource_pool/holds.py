@@ -19,9 +19,7 @@ class Hold:
     """One ARC's connection to the RC.
 
     Attributes:
-        arc: The ARC.
         epoch: Epoch of the connection.
-        since_s: Mission time of the connection.
         lease_until_s: Mission time at which it ends unless renewed.
         use: The ARC's use of the RC.
         companions: The other RCs of the set with their epochs.
@@ -42,7 +40,6 @@ class HoldTable:
 
     Args:
         rc: Name of the RC, for refusals.
-        sharable: True if several ARCs may hold it.
         last_epoch: Epochs up to this one are stale.
     """
 

@@ -28,7 +28,6 @@ class Sent:
     """A packet as it leaves a radio.
 
     Attributes:
-        radio: Name of the radio.
         number: Of the packet among those of its radio, 0 or more.
         network_id: Robot it is for.
         payload: As ``scout_model.radio_link`` encodes it.
@@ -48,7 +47,6 @@ class RadioAir:
     """Packets between the base's antenna and the robots.
 
     Args:
-        seed: Of the world.
         air: Delays and losses of packets.
     """
 

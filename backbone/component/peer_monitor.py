@@ -17,8 +17,6 @@ class PeerMonitor:
     """Watches the liveliness token of one peer.
 
     Args:
-        bus: Bus of the component that depends on the peer.
-        address: Address of the peer.
         gone_after_s: Seconds of the machine, with the own link up, after which an absent peer counts as gone.
     """
 

@@ -86,7 +86,6 @@ class JumpCourse:
     """The state of a jump over an obstacle.
 
     Args:
-        obstacle: The obstacle.
         attempts: Number of jumps after which it gives up.
         speed_m_s: Speed on straight ways.
         onward_m: Distance to drive beyond the obstacle.
@@ -136,7 +135,6 @@ class JumpCourse:
         """Return the next motion or action.
 
         Args:
-            position: Present position of the robot.
             now_s: Mission time; it never decreases.
         """
         if self.is_final or self.airborne_s(now_s) > 0:

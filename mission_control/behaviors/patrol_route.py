@@ -38,7 +38,6 @@ class Visit:
     Attributes:
         number: Counts from 1 over all rounds.
         waypoint: Number of the way point, from 0.
-        at_s: Mission time.
     """
 
     number: int
@@ -108,7 +107,6 @@ class PatrolRoute:
         """Return the next motion; record a way point that is reached.
 
         Args:
-            position: Present position of the robot.
             now_s: Mission time; it never decreases.
         """
         passed_s = 0.0 if self._decided_s is None else min(now_s - self._decided_s, LONGEST_STEP_S)

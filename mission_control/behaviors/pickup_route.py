@@ -66,7 +66,6 @@ class PickupRoute:
         """Return the next motion; called only in the stages ``UNKNOWN`` and ``TRAVEL``.
 
         Args:
-            position: Present position of the robot.
             now_s: Mission time; it never decreases.
         """
         distance_m = self._near.distance_m(position)

@@ -40,7 +40,6 @@ class VisualServo:
     """Brings a robot to its place before the landmark.
 
     Args:
-        camera: Of the robot.
         stop_m: Distance of the place from the board, along the zero-angle line.
         latency_s: From a frame's capture until its command turns the wheels.
 

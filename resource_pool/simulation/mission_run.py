@@ -45,9 +45,6 @@ class MissionRun:
     """The result of one mission.
 
     Attributes:
-        shape: The mission.
-        faults: Injected faults, in order.
-        happenings: All events, in order.
         digest: Fingerprint of all events.
         broken: The first broken law; None if all hold.
     """
@@ -64,7 +61,6 @@ def run_mission(seed: int, *, chaos: bool, faults: Sequence[Fault] | None = None
 
     Args:
         seed: Seed of the mission, its moods and its faults.
-        chaos: True: inject faults.
         faults: Only these faults, instead of the seed's.
     """
     shape = draw_shape(seed)

@@ -34,10 +34,6 @@ class PlayedRole:
 
     Attributes:
         component: Its class, or a factory.
-        subsystem: Its subsystem.
-        name: Its name.
-        kind: Its component type.
-        parameters: Its parameters.
         is_restarted: True if its creator restarts it when it falls.
     """
 

@@ -26,7 +26,6 @@ class OwnerShape:
     """One decision process and the ARC it claims.
 
     Attributes:
-        name: Its name.
         kind: Kind of its ARC.
         path: Names and priorities from the mission's root, or of the console alone.
         console: True for consoles.
@@ -60,8 +59,6 @@ class MissionShape:
     """One mission.
 
     Attributes:
-        seed: Its seed.
-        resources: The hardware.
         asleep: RCs that start only when an ARC claims them.
         owners: The decision processes.
         priority: Priority of the mission among the consoles.

@@ -53,8 +53,6 @@ def run_supervised(
     """Run the supervised mission of this seed to its end and judge it; the same arguments give the same bytes.
 
     Args:
-        seed: Seed of the mission and its faults.
-        chaos: True: inject faults.
         faults: Only these faults, instead of the seed's.
         shape: This mission, instead of the seed's.
     """

@@ -52,7 +52,6 @@ class SupervisedShape:
     """One supervised mission.
 
     Attributes:
-        seed: Its seed.
         pool: Hardware, owners and times.
         hosts: The first has the core services.
         places: RC → host of its hardware.

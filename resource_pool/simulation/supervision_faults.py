@@ -26,9 +26,7 @@ class Pause:
     """A process that is stopped as by SIGSTOP and continued.
 
     Attributes:
-        at_s: Mission time of its begin.
         target: A component in the process.
-        lasts_s: Its duration.
     """
 
     at_s: float
@@ -49,7 +47,6 @@ class End:
     """A process that ends.
 
     Attributes:
-        at_s: Mission time of its begin.
         target: A component in the process.
         how: As by SIGKILL, or in good order as by SIGTERM.
         again_after_s: Time from the fork of its successor to the successor's end in the same way; negative: none.
@@ -76,9 +73,7 @@ class Cut:
     """A link that is cut and heals.
 
     Attributes:
-        at_s: Mission time of its begin.
         target: Component whose process is cut off, or host, whose processes cannot reach the hub.
-        lasts_s: Its duration.
     """
 
     at_s: float
@@ -99,9 +94,6 @@ class Starve:
     """A machine whose processes get a processor only for moments.
 
     Attributes:
-        at_s: Mission time of its begin.
-        target: The host.
-        lasts_s: Its duration.
         gap_s: Time between two moments.
     """
 
@@ -124,8 +116,6 @@ class Hostile:
     """A message with impossible numbers, in the name of a component that may send such a message.
 
     Attributes:
-        at_s: Mission time of its begin.
-        target: Its receiver.
         number: Its number in ``hostile_numbers``.
     """
 

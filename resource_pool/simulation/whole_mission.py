@@ -71,7 +71,6 @@ class RunningMission:
     """A mission that is up, in this process.
 
     Attributes:
-        description: The mission.
         network: Its network; ``network.join(source, clock)`` gives one more bus.
         bus: A bus like the launcher's.
         clock: The mission's clock, which shows the event loop's time.
