@@ -56,7 +56,8 @@ class RadioAir:
         self._order = itertools.count()
         self._delivered: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
-        self._for_no_robot = 0
+        self.for_no_robot = 0
+        """Number of packets to ids without a robot."""
 
     @property
     def delivered(self) -> Mapping[int, int]:
@@ -68,11 +69,6 @@ class RadioAir:
         """Network id → packets that will never arrive."""
         return MappingProxyType(self._lost)
 
-    @property
-    def for_no_robot(self) -> int:
-        """Number of packets to ids without a robot."""
-        return self._for_no_robot
-
     def send(self, sent: Sent, away_m: float | None) -> None:
         """Put a packet on the air.
 
@@ -81,7 +77,7 @@ class RadioAir:
             away_m: Distance of its robot from the antenna, above 0; None: no robot has the id.
         """
         if away_m is None:
-            self._for_no_robot += 1
+            self.for_no_robot += 1
         elif self._is_lost(sent, away_m):
             self._lost[sent.network_id] += 1
         else:
