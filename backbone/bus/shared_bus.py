@@ -25,8 +25,6 @@ class SharedSession:
     """One session to the hub and the members that use it. Open it inside a running event loop.
 
     Args:
-        mission: Name of the mission.
-        endpoint: Endpoint of the hub.
         secret: Secret of the mission; empty: the hub asks for none.
 
     Raises:

@@ -99,7 +99,6 @@ class Rehearsal:
 
         Args:
             manager: Who decides; a copy that is not used otherwise.
-            now_s: Mission time.
             under_way: Outcomes of the context switches that have begun, and when they come.
             release_s: RC → its release time.
             wake_s: When the manager asked to be woken.
@@ -178,7 +177,6 @@ class Run:
     """One time an ARC had its RCs.
 
     Attributes:
-        arc: The ARC.
         uses: RC → share of its time, 0 to 1; an exclusive use is 1.
         connect_s: When its RCs began to settle.
         grant_s: When it was granted; None: that never happened.

@@ -5,7 +5,7 @@ export interface AskAnswer {
   path: number[];
 }
 
-export interface AskedView {
+export interface Asked {
   name: string;
   doc: string;
   proposed: string;
@@ -57,7 +57,7 @@ export interface ElementView {
   line: number;
   doc: string;
   type_doc: string[];
-  properties: PropertyView[];
+  properties: Property[];
   offers: OfferView[];
 }
 
@@ -74,7 +74,7 @@ export interface NoticeAnswer {
 export interface OfferView {
   label: string;
   doc: string;
-  asks: AskedView[];
+  asks: Asked[];
 }
 
 export interface PaletteRow {
@@ -95,7 +95,7 @@ export interface ProblemRow {
   path: number[];
 }
 
-export interface PropertyView {
+export interface Property {
   name: string;
   value: string | null;
   default: string | null;
