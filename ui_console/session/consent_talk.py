@@ -23,7 +23,7 @@ from ui_console.model.consent import (
     MAX_WHY,
     AskConsent,
     Consent,
-    NobodyToAsk,
+    NoOperatorToAsk,
     Settled,
     Topic,
     require_console,
@@ -97,12 +97,12 @@ class ConsentTalk:
         """Return the addresses of the consoles that hold the robot, or else stand directly in the way.
 
         Raises:
-            NobodyToAsk: There is none, or nothing is waited for.
+            NoOperatorToAsk: There is none, or nothing is waited for.
             LinkError: The RC manager did not answer.
         """
         console = self._console
         if claim is None:
-            raise NobodyToAsk(f"{console.user} does not wait for a robot", remedy="Take the robot first.")
+            raise NoOperatorToAsk(f"{console.user} does not wait for a robot", remedy="Take the robot first.")
         schedule = await console.bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=REPLY_TIME_S)
         owners = {request.arc: request.owner for request in schedule.requests}
         arcs = {arc for one in schedule.requests if one.arc == claim.arc for arc in one.blockers}
@@ -111,7 +111,7 @@ class ConsentTalk:
         consoles = sorted(at for at in blockers if is_console(at) and at != console.address)
         if not consoles:
             names = ", ".join(sorted(map(component_of, blockers))) or "nobody"
-            raise NobodyToAsk(f"no operator stands in the way of {console.user}, but {names}")
+            raise NoOperatorToAsk(f"no operator stands in the way of {console.user}, but {names}")
         return consoles
 
     async def _ask_one(self, holder: str, question: AskConsent) -> None:
