@@ -1,10 +1,10 @@
-"""Who comes in, and what is heard of them: bytes and a time in, a typed intent or a typed offence out.
+"""Authentication and decoding of clients: bytes and a time in, a typed intent or a typed violation out.
 
 Rules of this file: no socket, no bus, no clock; times are seconds of the machine, which never run backwards.
 
-* Nothing but the token is understood before the token was right, and it must come within ``LOGIN_WITHIN_S``.
-* An offence that is fatal is the last thing heard of a visitor: whatever comes after it means nothing.
-* Who says more than ``RATE_HZ`` for longer than ``BURST`` messages floods; nobody's message makes another's wait.
+* A client without the right token can send its token only, and must do so within ``LOGIN_WITHIN_S``.
+* After a fatal violation every further message of the client is ignored.
+* A client that exceeds ``RATE_HZ`` by more than ``BURST`` messages floods; no client's messages delay another's.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from typing import Annotated, Generic, TypeVar
 
 import msgspec
 
-MAX_MESSAGE_BYTES = 4096  # chosen: ten times what a parameter's value is
+MAX_MESSAGE_BYTES = 4096  # chosen: ten times a parameter's value
 LOGIN_WITHIN_S = 5.0  # chosen: a page sends the token as soon as it is connected
 RATE_HZ = 200.0  # chosen: 20 drives a second, and 30 drawn pictures a second of each of four robots, leave a third
-BURST = 200.0  # chosen: what a page that was held up for a second says at once
-FAULTS_FORGIVEN = 5  # chosen: an old page in a browser's memory is told to reload, not thrown out
-TOKEN_BYTES = 24  # chosen: 192 bits; nobody guesses them
+BURST = 200.0  # chosen: the messages of a page after a pause of a second
+FAULTS_FORGIVEN = 5  # chosen: an old page in a browser's cache has to reload, and keeps its connection meanwhile
+TOKEN_BYTES = 24  # chosen: 192 bits cannot be guessed
 
 MAX_USER = 63  # as long as a component's name
 ShortText = Annotated[str, msgspec.Meta(max_length=MAX_USER)]
 IntentT = TypeVar("IntentT")
-"""What a page of this kind may ask for."""
+"""The intents of one kind of page."""
 
 
 class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="hello"):
-    """The first message: who is there.
+    """The first message: token and identity.
 
     Attributes:
-        token: As printed where the server was started.
-        user: Who it is, for the record; a token that was made for somebody has that name instead.
-        priority: Asked for; the token's own is the most.
-        page: Tells a page that comes back from others; a connection that it had before is over.
+        token: As the server printed it at its start.
+        user: Name of the person, for the record; a token made for one operator has that operator's name instead.
+        priority: The wish; the token's own priority is the most.
+        page: Identifies a page that comes back; an earlier connection of the same page ends.
     """
 
     token: Annotated[str, msgspec.Meta(max_length=256)]
@@ -48,32 +48,32 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class Beat(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="beat"):
-    """Say this number back: the page learns how old what it shows can be, and that it is heard."""
+    """Ask for this number back: it shows the page the age of its content, and that the server receives it."""
 
     number: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
 
 class Fault(StrEnum):
-    """What a visitor did wrong."""
+    """Kinds of violations."""
 
     TOKEN = "token"  # noqa: S105  the word for it, not one
     LATE = "late"  # no token in time
     OVERSIZED = "oversized"
     MALFORMED = "malformed"
     FLOOD = "flood"
-    SLOW = "slow"  # does not read what it is sent
-    CROWD = "crowd"  # too many visitors
+    SLOW = "slow"  # does not read its messages
+    CROWD = "crowd"  # too many clients
     ORIGIN = "origin"  # a page of another site
 
 
 @dataclass(frozen=True, slots=True)
 class Offence:
-    """A message that is not obeyed.
+    """A message, or a silence, that breaks the protocol.
 
     Attributes:
-        fault: Of which kind.
-        line: What happened, for people; without the visitor's own words.
-        remedy: What to do about it.
+        fault: Its kind.
+        line: The event, for people; without the client's own words.
+        remedy: An action against it.
         is_fatal: True: the connection has to end.
     """
 
@@ -88,9 +88,9 @@ class Welcome:
     """The token was right.
 
     Attributes:
-        user: Who it is.
-        priority: Of the robots this visitor takes over.
-        page: As said in ``Hello``.
+        user: Name of the person.
+        priority: Priority of this client's claims.
+        page: As in ``Hello``.
     """
 
     user: str
@@ -100,11 +100,11 @@ class Welcome:
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """What a token is good for.
+    """The rights of a token.
 
     Attributes:
-        user: Whom it is for; empty: whoever has it says a name.
-        priority: The most that may be asked for.
+        user: Its operator; empty: ``Hello`` states a name.
+        priority: The highest priority of a claim.
     """
 
     user: str
@@ -118,7 +118,7 @@ class Doorkeeper:
         self._passes = {token.encode(): granted for token, granted in passes.items()}
 
     def open_with(self, token: str) -> Pass | None:
-        """Return what the token is good for; takes as long for a wrong one as for a right one of its length."""
+        """Return the rights of the token, None for a wrong one; both take the same time for a token of that length."""
         found = None
         for known, granted in self._passes.items():
             if hmac.compare_digest(known, token.encode("utf-8", "surrogatepass")):
@@ -127,7 +127,7 @@ class Doorkeeper:
 
 
 def new_token() -> str:
-    """Return a token nobody can guess."""
+    """Return a token that cannot be guessed."""
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
@@ -162,8 +162,8 @@ class Visitor(Generic[IntentT]):
 
     Args:
         doorkeeper: Knows the tokens.
-        understand: Decodes a message; raises ``msgspec.DecodeError`` if it means nothing.
-        now_s: When it connected.
+        understand: Decodes a message; raises ``msgspec.DecodeError`` for an invalid one.
+        now_s: Time of the connection.
     """
 
     def __init__(
@@ -180,15 +180,15 @@ class Visitor(Generic[IntentT]):
 
     @property
     def must_log_in_by_s(self) -> float | None:
-        """When the token must have come; None: it has."""
+        """Deadline of the token; None: it has come."""
         return None if self.welcome is not None else self._came_s + LOGIN_WITHIN_S
 
     def heard(self, data: str | bytes, now_s: float) -> Welcome | Beat | IntentT | Offence | None:
-        """Return what a message means; None: nothing any more.
+        """Return the decoded message; None after a fatal violation.
 
         Args:
             data: One message as it came.
-            now_s: When.
+            now_s: Time of its arrival.
         """
         if self.is_out:
             return None
@@ -207,15 +207,15 @@ class Visitor(Generic[IntentT]):
         return said
 
     def oversized(self) -> Offence:
-        """Return what to make of a message that was too long to be read."""
+        """Return the violation of a message that was too long to be read."""
         return self._out(Fault.OVERSIZED, f"sent a message of more than {MAX_MESSAGE_BYTES} bytes", "Reload the page.")
 
     def late(self) -> Offence:
-        """Return what to make of a visitor without a token at ``must_log_in_by_s``."""
+        """Return the violation of a client without a token at ``must_log_in_by_s``."""
         return self._out(Fault.LATE, f"showed no token within {LOGIN_WITHIN_S:.0f} s", "Load the page again.")
 
     def slow(self, behind_s: float) -> Offence:
-        """Return what to make of a visitor that reads nothing."""
+        """Return the violation of a client that reads nothing."""
         line = f"has read nothing for {behind_s:.0f} s"
         return self._out(Fault.SLOW, line, "Come closer to the access point, or show fewer pictures.")
 
@@ -223,7 +223,7 @@ class Visitor(Generic[IntentT]):
         granted = self._doorkeeper.open_with(hello.token)
         if granted is None:
             return self._out(Fault.TOKEN, "showed a wrong token", "Open the address that serve printed.")
-        user = granted.user or " ".join(hello.user.split()) or "somebody"
+        user = granted.user or " ".join(hello.user.split()) or "unnamed"
         wished = granted.priority if hello.priority is None else hello.priority
         self.welcome = Welcome(user, min(max(wished, 0), granted.priority), hello.page)
         return self.welcome

@@ -1,4 +1,4 @@
-"""One person at a browser: what they want is done, what they must know waits in their outbox."""
+"""One person at a browser: intents are carried out, views and answers wait in the outbox."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ui_console.web.outbox import Outbox
 
 log = logging.getLogger(__name__)
 
-MOST_ASKED = 8  # chosen: a person asks one thing at a time; the mission's services need not bear more
+MOST_ASKED = 8  # chosen: a person asks one thing at a time, and the mission's services are spared more
 LATENCY_STEP = (
     0.2  # chosen: weight of the newest picture in the latency shown: it follows within a second and is readable
 )
@@ -40,7 +40,7 @@ AtWork = Asked | protocol.StopRobot | protocol.StopAll | protocol.LiftStop | pro
 
 
 class Hands(Protocol):
-    """What an operator needs of the server."""
+    """Services of the server for an operator."""
 
     observer: Observer[Any]
     team: TeamModel
@@ -50,10 +50,10 @@ class Hands(Protocol):
         """Return a console of this operator that claims the robot as soon as it runs."""
 
     def watching_changed(self) -> None:
-        """Somebody wants other pictures."""
+        """Note that an operator wants other pictures."""
 
     def attention_changed(self) -> None:
-        """Somebody came or went."""
+        """Note that an operator came or went."""
 
 
 class Operator:
@@ -61,7 +61,7 @@ class Operator:
 
     Args:
         hands: The server's.
-        welcome: Who it is.
+        welcome: Identity and priority.
     """
 
     def __init__(self, hands: Hands, welcome: Welcome) -> None:
@@ -72,7 +72,7 @@ class Operator:
         self.is_there = True
         self.model = ConsoleModel(welcome.user, welcome.user, hands.team)
         self.answers = ConsentAnswers(welcome.user, hands.clock, self.show, hands.observer.acted)
-        """What this person is asked by others."""
+        """The questions of others to this person."""
         self._hands = hands
         self._console: Teleoperation | None = None
         self._life: asyncio.Task[None] | None = None
@@ -81,9 +81,9 @@ class Operator:
         self._latency_s: dict[str, float] = {}
         self._work: dict[bytes, asyncio.Task[None]] = {}
 
-    # ------------------------------------------------------------------ what the browser says
+    # ------------------------------------------------------------------ messages of the browser
     def obey(self, intent: protocol.Intent) -> None:
-        """Do what the browser asks; what takes time goes on beside."""
+        """Carry out the browser's intent; a slow one goes on in a task of its own."""
         match intent:
             case protocol.Steer(moment, forward, right, speed_rad_s):
                 drive = drive_by_stick(forward, right, speed_rad_s)
@@ -95,7 +95,7 @@ class Operator:
             case protocol.Drawn(robot, number):
                 self._drawn(robot, number)
             case protocol.Watch(robots):
-                self.outbox.watch(frozenset(robots))  # also those not heard of yet: a page may be older than the server
+                self.outbox.watch(frozenset(robots))  # also unknown ones: a page may be older than the server
                 self._hands.watching_changed()
             case protocol.Acknowledge(key):
                 self._acknowledge(key)
@@ -141,9 +141,9 @@ class Operator:
         self._hands.watching_changed()
         self._hands.attention_changed()
 
-    # ------------------------------------------------------------------ what the browser is told
+    # ------------------------------------------------------------------ messages to the browser
     def show(self, event: ConsoleEvent) -> None:
-        """Take in what happened to this operator's robot."""
+        """Take in an event of this operator's robot."""
         if isinstance(event, Attention):
             self.is_there = event.is_there
             self._hands.attention_changed()
@@ -153,14 +153,14 @@ class Operator:
             self.refresh(self._hands.clock.now_s())
 
     def saw(self, robot: str, number: int, captured_s: float, packet: bytes) -> None:
-        """A picture of a robot came that may be watched here."""
+        """Take in a picture of a robot that this operator may watch."""
         if robot in self.outbox.watched:
             self.model.apply(PictureSeen(self._hands.clock.now_s(), captured_s, robot))
             self.outbox.put_picture(robot, number, captured_s, packet)
             self.news.set()
 
     def refresh(self, now_s: float) -> None:
-        """Have sent what changed of this operator's own part of the view, and of the alarms."""
+        """Send the changes of this operator's own part of the view, and of the alarms."""
         model, put = self.model, self.outbox.put_section
         model.sees = model.robot in self.outbox.watched
         model.look(now_s)
@@ -172,7 +172,7 @@ class Operator:
         self.news.set()
 
     def schedule_heard(self) -> None:
-        """There is a new schedule: ask why this operator waits, who does."""
+        """React to a new schedule: ask why this operator waits, if so."""
         self._with_robot(Teleoperation.schedule_heard)
 
     # ------------------------------------------------------------------ within
@@ -181,7 +181,7 @@ class Operator:
             act(self._console)
 
     def _by_press(self, moment: int, act: Callable[[Teleoperation], None]) -> None:
-        """Do what moves the robot unless the press is from an earlier moment, however late the page's word came."""
+        """Move the robot unless the press is from an earlier moment, also if the page's message was late."""
         if moment == self.model.moment:
             self._with_robot(act)
 
@@ -233,7 +233,7 @@ class Operator:
                 await self._stop(robot)
             case protocol.StopAll():
                 self._with_robot(Teleoperation.require_let_go)
-                self._tell_unsure(await observer.stop_all("", user))
+                self._report_unsure(await observer.stop_all("", user))
             case protocol.LiftStop(robot, number):
                 await observer.lift_stop(robot, number, user, self.show)
             case protocol.AskWhy(name):
@@ -250,7 +250,7 @@ class Operator:
         self.refresh(self._hands.clock.now_s())
 
     async def _search(self, wanted: protocol.SearchLog) -> None:
-        """Find something in the mission's log; the page fetches the rest of it part by part."""
+        """Search the mission's log; the page fetches the rest of the result part by part."""
         clock = self._hands.clock
         now = Now(clock.now_s(), datetime.now(), clock.rate)
         question = LogQuestion(wanted.text, wanted.robot, wanted.person, wanted.level, wanted.since, wanted.until)
@@ -264,7 +264,7 @@ class Operator:
         self._hand_out(wanted.number, 0)
 
     def _hand_out(self, number: int, first: int) -> None:
-        """Send some of what was found, unless the page means an earlier search."""
+        """Send a part of the result, unless the page means an earlier search."""
         if self._found is not None and self._found.number == number:
             self._answer({"log": self._found.part(first)})
 
@@ -273,9 +273,9 @@ class Operator:
         self._with_robot(Teleoperation.require_let_go)
         is_known = robot in self._hands.team.robots.names()
         is_stopped = is_known and await self._hands.observer.stop_robot(robot, "", self.welcome.user)
-        self._tell_unsure([] if is_stopped else [robot])
+        self._report_unsure([] if is_stopped else [robot])
 
-    def _tell_unsure(self, robots: list[str]) -> None:
+    def _report_unsure(self, robots: list[str]) -> None:
         if robots:
             self._answer({"refused": f"not certain to have stopped: {', '.join(robots)}"})
 
@@ -304,7 +304,7 @@ class Operator:
         self._bug_of(task)
 
     def _bug_of(self, task: asyncio.Task[None]) -> None:
-        """A bug of an operator's part is a bug of the server."""
+        """Raise a bug of an operator's task as a bug of the server."""
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._hands.observer.fail(bug)
 

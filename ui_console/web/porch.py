@@ -1,7 +1,7 @@
-"""The place before the door: connections are known here from their first moment, long before they say anything.
+"""Connections before authentication, from their first moment on.
 
-What lies between (encryption, the request, the token) has a deadline as a whole; who is still here then, or whose
-place a newcomer takes, is cut off. ``Strangers`` decides whose.
+Encryption, request and token have one deadline together. A connection that misses it, or is displaced by a new one, is
+cut off. ``Strangers`` decides which one is displaced.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from ui_console.web.door import LOGIN_WITHIN_S, Fault, Offence
 from ui_console.web.strangers import Strangers
 
 OPEN_WITHIN_S = 5.0  # chosen: a request is a few lines
-STRANGER_WITHIN_S = 2 * OPEN_WITHIN_S + LOGIN_WITHIN_S + 1.0  # encryption, request, token, and a moment to be told
-CLOSE_WITHIN_S = 1.0  # chosen: who does not say goodbye is cut off
+STRANGER_WITHIN_S = 2 * OPEN_WITHIN_S + LOGIN_WITHIN_S + 1.0  # encryption, request, token, and a moment to refuse
+CLOSE_WITHIN_S = 1.0  # chosen: a client that does not complete the closing handshake is cut off
 TOLD_EVERY_S = 10.0  # chosen: a crowd is one piece of news
 
 
 class Porch:
-    """Has the connections of those who have shown no token yet.
+    """The connections without a token so far.
 
     Args:
-        encryption: What they must speak; None: plain HTTP.
-        offended: Told of an address whose strangers were cut off for newcomers.
+        encryption: TLS context; None: plain HTTP.
+        offended: Called with each address whose connections were cut off for new ones.
     """
 
     def __init__(self, encryption: SSLContext | None, offended: Callable[[str, Offence], None]) -> None:
@@ -39,24 +39,24 @@ class Porch:
         self._displaced, self._told_s = 0, -TOLD_EVERY_S
 
     def gate(self, *given: Any, **options: Any) -> Gate:
-        """Return what a new connection talks to; takes what a ``ServerConnection`` takes."""
+        """Return the asyncio protocol of a new connection; takes the arguments of a ``ServerConnection``."""
         connection = ServerConnection(*given, **options)
         gate = self._gates[connection] = Gate(self, connection)
         return gate
 
     def came(self, gate: Gate, address: str) -> None:
-        """Have room for a new connection."""
+        """Make room for a new connection."""
         displaced = self._strangers.came(gate, address)
         if displaced is not None:
             displaced.abort()
-            self._tell_displaced(displaced.address)
+            self._report_displaced(displaced.address)
 
     def asked(self, connection: ServerConnection) -> None:
         """Note that a connection has made a request."""
         self._strangers.asked(self._gates[connection])
 
     def admit(self, connection: ServerConnection) -> None:
-        """Let a connection in: it is no stranger any more, and no newcomer takes its place."""
+        """Admit a connection: no new connection displaces it any more."""
         gate = self._gates[connection]
         gate.be_known()
         self._strangers.gone(gate)
@@ -67,12 +67,12 @@ class Porch:
         self._gates.pop(gate.connection, None)
 
     def close(self) -> None:
-        """Cut off all strangers."""
+        """Cut off all connections without a token."""
         for gate in list(self._gates.values()):
             if not gate.is_known:
                 gate.abort()
 
-    def _tell_displaced(self, address: str) -> None:
+    def _report_displaced(self, address: str) -> None:
         self._displaced += 1
         now_s = asyncio.get_running_loop().time()
         if now_s >= self._told_s + TOLD_EVERY_S:
@@ -82,15 +82,15 @@ class Porch:
 
 
 class Gate(asyncio.Protocol):
-    """One connection: decrypts it if it is to be encrypted, and hands all on.
+    """asyncio's protocol of one connection: decrypts it if it is encrypted, and passes all data on.
 
-    It has the plain transport from the beginning, so that also who never ends the handshake can be cut off; a server
-    that asyncio encrypts learns of a connection only after it.
+    It has the plain transport from the beginning, so that a client that never ends the handshake can be cut off; if
+    asyncio encrypts, the server gets a connection only after the handshake.
 
     Attributes:
-        connection: Whom it hands on to.
-        address: Where the other side is.
-        is_known: True once the right token was shown.
+        connection: Receives the data.
+        address: Address of the client.
+        is_known: True once the client has sent the right token.
     """
 
     def __init__(self, porch: Porch, connection: ServerConnection) -> None:
@@ -101,7 +101,7 @@ class Gate(asyncio.Protocol):
         self._deadline: asyncio.TimerHandle | None = None
 
     def be_known(self) -> None:
-        """Let it stay for as long as it likes."""
+        """Remove its deadline."""
         self.is_known = True
         if self._deadline is not None:
             self._deadline.cancel()
@@ -112,7 +112,7 @@ class Gate(asyncio.Protocol):
             self._transport.abort()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Find room."""
+        """Begin the deadline, and make room."""
         loop = asyncio.get_running_loop()
         self._transport = cast(asyncio.Transport, transport)
         self.address = str((transport.get_extra_info("peername") or ("",))[0])
@@ -122,7 +122,7 @@ class Gate(asyncio.Protocol):
                 loop,
                 self.connection,
                 self._porch.encryption,
-                cast(Any, None),  # nobody waits for the handshake
+                cast(Any, None),  # no future: no caller awaits the handshake
                 server_side=True,
                 ssl_handshake_timeout=int(OPEN_WITHIN_S),
                 ssl_shutdown_timeout=int(CLOSE_WITHIN_S),
@@ -131,7 +131,7 @@ class Gate(asyncio.Protocol):
         self._next.connection_made(self._transport)
 
     def data_received(self, data: bytes) -> None:
-        """Hand on."""
+        """Pass on."""
         if not isinstance(self._next, SSLProtocol):
             self._next.data_received(data)
             return
@@ -144,19 +144,19 @@ class Gate(asyncio.Protocol):
             rest = rest[size:]
 
     def eof_received(self) -> bool | None:
-        """Hand on."""
+        """Pass on."""
         return self._next.eof_received()
 
     def pause_writing(self) -> None:
-        """Hand on."""
+        """Pass on."""
         self._next.pause_writing()
 
     def resume_writing(self) -> None:
-        """Hand on."""
+        """Pass on."""
         self._next.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Leave."""
+        """End the deadline, and pass on."""
         if self._deadline is not None:
             self._deadline.cancel()
         self._porch.left(self)

@@ -1,6 +1,6 @@
-"""What a page of the console may say.
+"""Messages of a page of the console.
 
-A message is a JSON object whose ``do`` says which of these it is; anything else in it makes it meaningless.
+A message is a JSON object whose ``do`` names one of these; an unknown field makes it invalid.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Share = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
 
 
 class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="drive"):
-    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be said again meanwhile.
+    """A stick, key or pad is held; counts for ``driving.STICK_LASTS_S`` and has to be repeated meanwhile.
 
     Attributes:
         moment: ``OwnView.moment`` as the page showed it when the press began; at a later one the press moves nothing.
@@ -35,7 +35,7 @@ class Steer(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class StopWheels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop"):
-    """It was let go."""
+    """The control was let go."""
 
 
 class JumpOnce(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="jump"):
@@ -55,7 +55,7 @@ class TakeOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fiel
 
 
 class MayI(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="may_i"):
-    """Ask the operator who holds what this one waits for."""
+    """Ask the operator who holds the robot this one waits for."""
 
     why: Annotated[str, msgspec.Meta(max_length=MAX_WHY)] = ""
 
@@ -67,7 +67,7 @@ class Decide(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
 
 
 class DismissLost(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="dismiss_lost"):
-    """It was seen that a robot was lost."""
+    """The operator has seen that a robot was lost."""
 
 
 class LetGo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
@@ -85,7 +85,7 @@ class StopAll(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 
 class LiftStop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="lift"):
-    """Let a robot move again: the stop of this number, which was seen on the page."""
+    """Lift the stop of this number, as shown on the page."""
 
     robot: ShortText
     number: Numbered
@@ -105,20 +105,20 @@ class Drawn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
 
 
 class AskWhy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
-    """Say why something is as it is."""
+    """Explain the state of a component or request."""
 
     name: ShortText
 
 
 class SearchLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log"):
-    """Find this in the mission's log; empty fields match all.
+    """Search the mission's log; empty fields match all.
 
     Attributes:
-        number: Comes back with what was found.
-        text: Words that stand in the event.
-        robot: Only what is about this name.
-        person: Only what this person did, or what speaks of them.
-        level: Only what matters at least so much.
+        number: Comes back with the result.
+        text: Words of the event.
+        robot: Only events about this name.
+        person: Only events of this person, or with this name.
+        level: Only events of at least this level.
         since: Not before this moment, as people type it.
         until: Not after it.
     """
@@ -133,7 +133,7 @@ class SearchLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_fie
 
 
 class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="more_log"):
-    """Hand out the next part of what was found.
+    """Send the next part of the result.
 
     Attributes:
         number: Of the search.
@@ -145,19 +145,19 @@ class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 
 class Acknowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="acknowledge"):
-    """An alarm was seen; with an empty key all."""
+    """Acknowledge an alarm; with an empty key all."""
 
     key: Annotated[str, msgspec.Meta(max_length=256)] = ""
 
 
 class AskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="parameters"):
-    """Have a component tell its parameters."""
+    """Ask a component for its parameters."""
 
     name: ShortText
 
 
 class SetParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="set"):
-    """Have a component run with another value."""
+    """Set a parameter of a component."""
 
     name: ShortText
     parameter: ShortText
@@ -196,9 +196,9 @@ _intents: msgspec.json.Decoder[Hello | Beat | Intent] = msgspec.json.Decoder(Hel
 
 
 def understand(data: bytes | str) -> Hello | Beat | Intent:
-    """Return what a message means.
+    """Return the decoded message.
 
     Raises:
-        msgspec.DecodeError: Nothing.
+        msgspec.DecodeError: The message is not valid.
     """
     return _intents.decode(data)

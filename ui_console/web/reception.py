@@ -1,4 +1,4 @@
-"""Sockets of a page: connections in, messages to and fro; what they mean is decided elsewhere."""
+"""Server of a page: files over HTTP, messages over WebSockets; the application behind it gives them meaning."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ui_console.web.site import SOCKET_PATH, Answer, Site, is_own_page
 PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
 READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
 MOST_OPERATORS = 32  # chosen: more browsers than a team has people
-MOST_UNREAD = 8  # messages read ahead of what is obeyed
+MOST_UNREAD = 8  # messages read ahead of the one carried out
 SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
 FATAL_CODES = {
     Fault.OVERSIZED: CloseCode.MESSAGE_TOO_BIG,
@@ -33,12 +33,12 @@ FATAL_CODES = {
     Fault.SLOW: CloseCode.TRY_AGAIN_LATER,
     Fault.CROWD: CloseCode.TRY_AGAIN_LATER,
 }
-MOST_REASON = 120  # of the 123 bytes that a close frame has for it
+MOST_REASON = 120  # of the 123 bytes for it in a close frame
 KEEPALIVE_REASON = "keepalive ping timeout"
 
 
 class CannotListen(Refusal):
-    """The address cannot be had."""
+    """The address is not free, or not one of this machine."""
 
     code = "web.address"
     remedy = "Choose another address with --host, or another port with --port."
@@ -58,36 +58,36 @@ HeardT_contra = TypeVar("HeardT_contra", contravariant=True)
 
 
 class House(Protocol[GuestT, HeardT_contra]):
-    """What is behind the door."""
+    """The application behind a page: the consoles, or the designer."""
 
     @property
     def guests(self) -> Sized:
-        """Who is there."""
+        """The connected clients."""
 
     def enter(self, welcome: Welcome) -> GuestT:
-        """Return a new guest."""
+        """Return a new client."""
 
     async def obey(self, guest: GuestT, intent: HeardT_contra) -> None:
-        """Do what a guest asks; nothing more is heard of that guest until it is done."""
+        """Carry out a client's intent; the server reads no further message of that client until this returns."""
 
     def refused(self, guest: GuestT) -> None:
-        """A guest did what ends its visit; what it set going ends now."""
+        """Stop the actions of a client whose violation ends its connection."""
 
     async def leave(self, guest: GuestT, reason: str) -> None:
-        """Let a guest go."""
+        """Remove a client."""
 
     def offended(self, who: str, offence: Offence) -> None:
-        """Have the guests know of a visitor that did what it must not."""
+        """Show the clients a violation."""
 
 
 class Reception(Generic[GuestT, IntentT]):
     """Serves a page and its socket.
 
     Args:
-        house: Whom the guests come to.
+        house: The application.
         doorkeeper: Knows the tokens.
         site: The page.
-        understand: Decodes what the page says.
+        understand: Decodes the page's messages.
     """
 
     def __init__(
@@ -102,15 +102,15 @@ class Reception(Generic[GuestT, IntentT]):
 
     @asynccontextmanager
     async def open(self, host: str, port: int, encryption: SSLContext | None = None) -> AsyncIterator[Server]:
-        """Let browsers come, until left or the server is closed.
+        """Accept browsers, until left or the server is closed.
 
         Args:
             host: Address to listen at.
             port: Port; 0: any that is free.
-            encryption: See ``encryption_with``; None: it speaks plain HTTP.
+            encryption: See ``encryption_with``; None: plain HTTP.
 
         Raises:
-            CannotListen: The address cannot be had.
+            CannotListen: The address is not free, or not one of this machine.
         """
         porch = Porch(encryption, self._house.offended)
         async with await self._listen(host, port, porch) as server:
@@ -199,7 +199,7 @@ class Reception(Generic[GuestT, IntentT]):
             writing.result()
 
     def _end_earlier(self, connection: ServerConnection, welcome: Welcome) -> None:
-        """Cut off what the same page left behind when its link broke: it is not there, and may hold a robot."""
+        """Cut off an earlier connection of the same page, whose link broke: it may still hold a robot."""
         if not welcome.page:
             return
         earlier = self._pages.get((welcome.user, welcome.page))
@@ -208,7 +208,7 @@ class Reception(Generic[GuestT, IntentT]):
             earlier.transport.abort()
 
     async def _read(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> str:
-        """Obey the browser until the connection ends; return why it did."""
+        """Carry out the browser's messages until the connection ends; return the reason of its end."""
         while True:
             try:
                 data = await connection.recv()
@@ -241,7 +241,7 @@ class Reception(Generic[GuestT, IntentT]):
         return offence.line
 
     async def _write(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> None:
-        """Send what is newest whenever the browser takes it; one that takes nothing is cut off."""
+        """Send the newest content whenever the browser reads; cut off a browser that reads nothing."""
         outbox, news = guest.outbox, guest.news
         try:
             while True:
@@ -266,7 +266,7 @@ class Reception(Generic[GuestT, IntentT]):
 
 
 def port_of(server: Server) -> int:
-    """Return the port at which browsers can come."""
+    """Return the port that the server listens at."""
     port: int = next(iter(server.sockets)).getsockname()[1]
     return port
 
@@ -286,7 +286,7 @@ def _was_oversized(closed: ConnectionClosed) -> bool:
 
 def _who(connection: ServerConnection) -> str:
     peer = connection.remote_address
-    return str(peer[0]) if peer else "somebody"
+    return str(peer[0]) if peer else "an unknown address"
 
 
 def _now_s() -> float:

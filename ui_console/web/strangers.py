@@ -1,11 +1,11 @@
-"""Who is at the door without a token: each newcomer finds room, at the cost of who has been silent for longest.
+"""Clients without a token: a new one always gets a place, and may displace the one that was silent for longest.
 
-Rules of this file: no socket, no clock; whoever is displaced is returned, not cut off.
+Rules of this file: no socket, no clock; a displaced client is returned, not cut off.
 
-* Strangers take no operator's place, and there are never more of them than ``MOST_STRANGERS``.
+* Pending clients take no operator's place, and there are never more of them than ``MOST_STRANGERS``.
 * One address, or one network of IPv6, has at most ``MOST_OF_AN_ADDRESS``: beyond that it displaces its own only.
-* If all places are taken, the address with the most strangers gives one up, so few make no room for many.
-* Of an address the first to go is who has asked for nothing yet, the oldest first.
+* If all places are taken, the address with the most pending clients loses one, so few make no room for many.
+* Of an address the oldest client without a request goes first.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from typing import Generic, TypeVar
 
 MOST_OF_AN_ADDRESS = 64  # chosen: a page opens six connections at a time; a team behind one address ten pages
 MOST_STRANGERS = 128  # chosen: far below the 1024 descriptors a process usually has
-IPV6_NETWORK_BITS = 64  # what one household or host is given to choose its addresses from
+IPV6_NETWORK_BITS = 64  # a provider assigns so large a network to one household or host
 
 StrangerT = TypeVar("StrangerT")
 
 
 class Strangers(Generic[StrangerT]):
-    """Those at the door, in the order in which they came."""
+    """The clients without a token, in the order of their connections."""
 
     def __init__(self) -> None:
         self._places: dict[StrangerT, str] = {}
@@ -32,11 +32,11 @@ class Strangers(Generic[StrangerT]):
         return len(self._places)
 
     def came(self, who: StrangerT, address: str) -> StrangerT | None:
-        """Note a newcomer; return whom to cut off for it, who is forgotten; None: there is room.
+        """Add a client; return the client it displaces, which is removed; None: there is room.
 
         Args:
-            who: The newcomer.
-            address: Where it is; empty: unknown.
+            who: The new client.
+            address: Its address; empty: unknown.
         """
         place = place_of(address)
         counts = Counter(self._places.values())
@@ -52,11 +52,11 @@ class Strangers(Generic[StrangerT]):
         return displaced
 
     def asked(self, who: StrangerT) -> None:
-        """Note that a stranger has asked for something that can be understood."""
+        """Note that a client has sent a valid request."""
         self._silent.pop(who, None)
 
     def gone(self, who: StrangerT) -> None:
-        """Forget a stranger: it has left, or is none any more."""
+        """Remove a client: it has left, or was authenticated."""
         self._places.pop(who, None)
         self._silent.pop(who, None)
 
@@ -66,7 +66,7 @@ class Strangers(Generic[StrangerT]):
 
 
 def place_of(address: str) -> str:
-    """Return what counts as one address.
+    """Return the network that counts as one address.
 
     Example:
         >>> place_of("192.0.2.7"), place_of("2001:db8::1:7"), place_of("fe80::1%eth0"), place_of("")

@@ -109,8 +109,8 @@ def test_nobody_gets_more_priority_than_the_token_is_good_for(asked: int | None,
 def test_a_token_made_for_somebody_has_that_name() -> None:
     assert visitor(Pass("anna", 5)).heard(hello(user="eve"), 0.0) == Welcome("anna", 5)
     assert visitor().heard(hello(user="  a\n b "), 0.0) == Welcome("a b", 100)
-    assert visitor().heard(hello(), 0.0) == Welcome("somebody", 100)
-    assert visitor().heard(hello(page="7f-01"), 0.0) == Welcome("somebody", 100, "7f-01")
+    assert visitor().heard(hello(), 0.0) == Welcome("unnamed", 100)
+    assert visitor().heard(hello(page="7f-01"), 0.0) == Welcome("unnamed", 100, "7f-01")
 
 
 def test_who_shows_no_token_in_time_is_late() -> None:
