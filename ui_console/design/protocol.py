@@ -10,7 +10,7 @@ from typing import Annotated
 
 import msgspec
 
-from ui_console.web.door import Beat, Hello
+from ui_console.web.login import BeatRequest, Hello
 
 MOST_TEXT = 1024  # chosen: longer than any value a mission needs; a message is 4096 bytes at most
 MOST_ANSWERS = 16  # chosen: twice what any element asks for
@@ -146,10 +146,12 @@ DesignIntent = (
     | LookUp
     | ReadText
 )
-_intents: msgspec.json.Decoder[Hello | Beat | DesignIntent] = msgspec.json.Decoder(Hello | Beat | DesignIntent)
+_intents: msgspec.json.Decoder[Hello | BeatRequest | DesignIntent] = msgspec.json.Decoder(
+    Hello | BeatRequest | DesignIntent
+)
 
 
-def understand_designer(data: bytes | str) -> Hello | Beat | DesignIntent:
+def understand_designer(data: bytes | str) -> Hello | BeatRequest | DesignIntent:
     """Return what a message means.
 
     Raises:

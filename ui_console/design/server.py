@@ -12,9 +12,9 @@ from ui_console.design.file import NotSaved
 from ui_console.design.keeping import DraftFile
 from ui_console.design.protocol import DesignIntent, understand_designer
 from ui_console.design.room import Designer, DesignRoom
-from ui_console.web.door import Doorkeeper
-from ui_console.web.reception import Reception, port_of
-from ui_console.web.site import DESIGN_FILES, Site
+from ui_console.web.login import Authenticator
+from ui_console.web.page_files import DESIGN_FILES, PageFiles
+from ui_console.web.page_server import PageServer, port_of
 
 
 def begin(source: str) -> tuple[Draft, DraftFile]:
@@ -40,13 +40,13 @@ class DesignServer:
 
     Args:
         room: The draft and its designers.
-        doorkeeper: Knows the tokens.
+        authenticator: Knows the tokens.
     """
 
-    def __init__(self, room: DesignRoom, doorkeeper: Doorkeeper) -> None:
+    def __init__(self, room: DesignRoom, authenticator: Authenticator) -> None:
         self._room = room
-        self._reception: Reception[Designer, DesignIntent] = Reception(
-            room, doorkeeper, Site(DESIGN_FILES), understand_designer
+        self._page_server: PageServer[Designer, DesignIntent] = PageServer(
+            room, authenticator, PageFiles(DESIGN_FILES), understand_designer
         )
 
     async def run(
@@ -73,7 +73,7 @@ class DesignServer:
         room = self._room
         await room.prepare()
         try:
-            async with self._reception.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
+            async with self._page_server.open(host, port, encryption) as server, asyncio.TaskGroup() as beside:
                 keeping = beside.create_task(room.keep_on(), name="design: keep_on")
                 ready(port_of(server))
                 await end.wait()

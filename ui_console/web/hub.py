@@ -32,7 +32,7 @@ from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.observer import Observer
 from ui_console.session.teleoperation import Teleoperation
-from ui_console.web.door import Fault, Offence, Welcome
+from ui_console.web.login import ProtocolViolation, ViolationKind, Welcome
 from ui_console.web.operator import Operator
 from ui_console.web.outbox import Outbox
 from ui_console.web.pictures import jpeg, packet
@@ -69,7 +69,7 @@ class WebHub:
         self.observer: Observer[NoParameters] = Observer(
             launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
         )
-        self.guests: dict[Operator, None] = {}
+        self.clients: dict[Operator, None] = {}
         self._model = ConsoleModel(launch.name, launch.name, self.team, sees=False, alarms=self.team.alarms)
         self._launch, self._bus, self._join = launch, bus, join
         self._kind, self._away_after_s = kind, away_after_s
@@ -78,7 +78,7 @@ class WebHub:
         self._numbers: dict[str, int] = {}
         self._consoles = itertools.count(1)
         self._has_operators = asyncio.Event()
-        self._told_s: dict[Fault, float] = {}
+        self._told_s: dict[ViolationKind, float] = {}
         self.pictures_packed = 0
         """Number of pictures encoded as JPEG."""
 
@@ -86,7 +86,7 @@ class WebHub:
     def enter(self, welcome: Welcome) -> Operator:
         """Return a new operator, whose page gets the whole view."""
         operator = Operator(self, welcome)
-        self.guests[operator] = None
+        self.clients[operator] = None
         welcomed = {"user": welcome.user, "priority": welcome.priority, "mission": self._launch.mission}
         operator.outbox.put_section("welcome", msgspec.json.encode(welcomed))
         self._send_tables([operator.outbox])
@@ -96,35 +96,35 @@ class WebHub:
         self.attention_changed()
         return operator
 
-    async def leave(self, guest: Operator, reason: str) -> None:
+    async def leave(self, client: Operator, reason: str) -> None:
         """Remove an operator: the wheels stop, the robot is given back."""
-        self.guests.pop(guest, None)
-        if not self.guests:
+        self.clients.pop(client, None)
+        if not self.clients:
             self._has_operators.clear()
-        await guest.leave(reason)
-        self._say(OperatorAction.DETACH, guest.welcome.user, reason)
+        await client.leave(reason)
+        self._say(OperatorAction.DETACH, client.welcome.user, reason)
 
-    async def obey(self, guest: Operator, intent: Intent) -> None:
+    async def obey(self, client: Operator, intent: Intent) -> None:
         """Carry out an operator's intent; a slow one goes on in a task of its own."""
-        guest.obey(intent)
+        client.obey(intent)
 
-    def refused(self, guest: Operator) -> None:
+    def refused(self, client: Operator) -> None:
         """Stop the wheels of an operator whose connection is being closed."""
-        guest.stop()
+        client.stop()
 
-    def offended(self, who: str, offence: Offence) -> None:
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
         """Show the operators a client's violation.
 
         Args:
             who: For people: an operator's name, or an address.
-            offence: The violation.
+            violation: The violation.
         """
         now_s = self.clock.now_s()
-        line = f"{who} {offence.line}"
-        key = f"{AlarmKind.VISITOR}:{offence.fault}:{who}"
-        self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, offence.remedy, key)
-        if now_s >= self._told_s.get(offence.fault, -TOLD_EVERY_S) + TOLD_EVERY_S:
-            self._told_s[offence.fault] = now_s
+        line = f"{who} {violation.line}"
+        key = f"{AlarmKind.VISITOR}:{violation.kind}:{who}"
+        self.team.alarms.happened(AlarmKind.VISITOR, "web", line, now_s, violation.remedy, key)
+        if now_s >= self._told_s.get(violation.kind, -TOLD_EVERY_S) + TOLD_EVERY_S:
+            self._told_s[violation.kind] = now_s
             log.warning("%s", line)
             if self.observer.state is LifeState.READY:
                 self.observer.publish_event("web", line, LogLevel.WARNING)
@@ -135,12 +135,12 @@ class WebHub:
             await self._has_operators.wait()
             now_s = self.clock.now_s()
             if turn % TEAM_EVERY == 0:
-                self._send_tables([operator.outbox for operator in self.guests])
-            for operator in self.guests:
+                self._send_tables([operator.outbox for operator in self.clients])
+            for operator in self.clients:
                 operator.refresh(now_s)
             await self.clock.sleep_s(OWN_EVERY_S * self.clock.rate)
 
-    # ------------------------------------------------------------------ services for operators; see Hands
+    # ------------------------------------------------------------------ services for operators; see OperatorServices
     async def new_console(self, operator: Operator, robot: str) -> Teleoperation:
         """Return a console of this operator that claims the robot as soon as it runs."""
         number, welcome = next(self._consoles), operator.welcome
@@ -171,7 +171,7 @@ class WebHub:
 
     def watching_changed(self) -> None:
         """Subscribe to pictures that an operator watches and that a grant delivers, and to no others."""
-        watched = {robot for operator in self.guests for robot in operator.outbox.watched}
+        watched = {robot for operator in self.clients for robot in operator.outbox.watched}
         wanted = {robot: arc for robot, arc in self._arcs.items() if robot in watched}
         for robot, (arc, stream) in list(self._streams.items()):
             if wanted.get(robot) != arc:
@@ -182,12 +182,12 @@ class WebHub:
 
     def attention_changed(self) -> None:
         """Note whether any operator looks after the mission."""
-        self.team.alarms.attention(any(one.is_there for one in self.guests), self.clock.now_s())
+        self.team.alarms.attention(any(one.is_there for one in self.clients), self.clock.now_s())
 
     # ------------------------------------------------------------------ within
     def _answers_of(self, user: str) -> ConsentAnswers | None:
         """Return the questions at the page this person looks at, else at another open page of this person."""
-        pages = [one for one in self.guests if one.welcome.user == user]
+        pages = [one for one in self.clients if one.welcome.user == user]
         return next((page.answers for page in sorted(pages, key=lambda page: not page.is_there)), None)
 
     def _heard(self, event: ConsoleEvent) -> None:
@@ -196,7 +196,7 @@ class WebHub:
             rcs = event.body.rcs
             self._arcs = {rc.rc: rc.holders[0].arc for rc in rcs if rc.kind == ROBOT_KIND and rc.holders}
             self.watching_changed()
-            for operator in self.guests:
+            for operator in self.clients:
                 operator.schedule_heard()
 
     def _listen(self, robot: str, arc: str) -> Subscription:
@@ -209,7 +209,7 @@ class WebHub:
         return self._bus.subscribe(at, Conversation.FRAMES, Frame, arrived, latest=True)
 
     def _show_picture(self, frame: Frame) -> None:
-        watchers = [operator for operator in self.guests if frame.robot in operator.outbox.watched]
+        watchers = [operator for operator in self.clients if frame.robot in operator.outbox.watched]
         if not watchers:
             return
         number = self._numbers[frame.robot] = self._numbers.get(frame.robot, 0) + 1

@@ -12,7 +12,7 @@ import msgspec
 from backbone.log_question import LONGEST_WORDS
 from backbone.ranges import EXACT
 from ui_console.model.consent import MAX_WHY
-from ui_console.web.door import Beat, Hello, ShortText
+from ui_console.web.login import BeatRequest, Hello, ShortText
 
 MOST_WATCHED = 16  # chosen: more pictures than a wall screen shows
 MOST_RAD_S = 15.0  # a Scout's most; robots clip to what they can
@@ -70,21 +70,21 @@ class DismissLost(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
     """The operator has seen that a robot was lost."""
 
 
-class LetGo(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
+class ReleaseRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="release"):
     """Give the robot back."""
 
 
-class StopRobot(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_robot"):
+class StopRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_robot"):
     """Emergency stop of one robot; needs no grant."""
 
     robot: ShortText
 
 
-class StopAll(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_all"):
+class StopAllRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="stop_all"):
     """Emergency stop of all robots."""
 
 
-class LiftStop(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="lift"):
+class LiftRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="lift"):
     """Lift the stop of this number, as shown on the page."""
 
     robot: ShortText
@@ -104,7 +104,7 @@ class Drawn(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     number: Annotated[int, msgspec.Meta(ge=0, le=2**32 - 1)]
 
 
-class AskWhy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
+class WhyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="why"):
     """Explain the state of a component or request."""
 
     name: ShortText
@@ -150,13 +150,13 @@ class Acknowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_f
     key: Annotated[str, msgspec.Meta(max_length=256)] = ""
 
 
-class AskParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="parameters"):
+class ParametersRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="parameters"):
     """Ask a component for its parameters."""
 
     name: ShortText
 
 
-class SetParameter(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="set"):
+class SetRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="set"):
     """Set a parameter of a component."""
 
     name: ShortText
@@ -175,27 +175,27 @@ Intent = (
     | StopWheels
     | JumpOnce
     | TakeOver
-    | LetGo
+    | ReleaseRequest
     | MayI
     | Decide
     | DismissLost
-    | StopRobot
-    | StopAll
-    | LiftStop
+    | StopRequest
+    | StopAllRequest
+    | LiftRequest
     | Watch
     | Drawn
-    | AskWhy
+    | WhyRequest
     | SearchLog
     | MoreLog
     | Acknowledge
-    | AskParameters
-    | SetParameter
+    | ParametersRequest
+    | SetRequest
     | Here
 )
-_intents: msgspec.json.Decoder[Hello | Beat | Intent] = msgspec.json.Decoder(Hello | Beat | Intent)
+_intents: msgspec.json.Decoder[Hello | BeatRequest | Intent] = msgspec.json.Decoder(Hello | BeatRequest | Intent)
 
 
-def understand(data: bytes | str) -> Hello | Beat | Intent:
+def understand(data: bytes | str) -> Hello | BeatRequest | Intent:
     """Return the decoded message.
 
     Raises:

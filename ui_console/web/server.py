@@ -6,12 +6,12 @@ import asyncio
 from collections.abc import Callable
 from ssl import SSLContext
 
-from ui_console.web.door import Doorkeeper
 from ui_console.web.hub import WebHub
+from ui_console.web.login import Authenticator
 from ui_console.web.operator import Operator
+from ui_console.web.page_files import PageFiles
+from ui_console.web.page_server import PageServer, port_of
 from ui_console.web.protocol import Intent, understand
-from ui_console.web.reception import Reception, port_of
-from ui_console.web.site import Site
 
 
 class WebServer:
@@ -19,12 +19,12 @@ class WebServer:
 
     Args:
         hub: Shared by the operators.
-        doorkeeper: Knows the tokens.
+        authenticator: Knows the tokens.
     """
 
-    def __init__(self, hub: WebHub, doorkeeper: Doorkeeper) -> None:
+    def __init__(self, hub: WebHub, authenticator: Authenticator) -> None:
         self._hub = hub
-        self._reception: Reception[Operator, Intent] = Reception(hub, doorkeeper, Site(), understand)
+        self._page_server: PageServer[Operator, Intent] = PageServer(hub, authenticator, PageFiles(), understand)
 
     async def run(
         self, host: str, port: int, ready: Callable[[int], None], encryption: SSLContext | None = None
@@ -42,7 +42,7 @@ class WebServer:
             BaseException: The bug that ended the component.
         """
         observer = self._hub.observer
-        async with self._reception.open(host, port, encryption) as server:
+        async with self._page_server.open(host, port, encryption) as server:
             life = asyncio.create_task(observer.run(), name=f"life of {observer.address}")
             refreshing = asyncio.create_task(self._hub.refresh_all(), name="web: refresh all")
             refreshing.add_done_callback(

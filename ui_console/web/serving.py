@@ -14,10 +14,10 @@ from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.endings import ExitCode, say
 from ui_console.session.joining import Where, end_server_on_signals, join, write_line
-from ui_console.web.door import Doorkeeper, Pass
 from ui_console.web.encryption import encryption_with
 from ui_console.web.hub import WebHub
-from ui_console.web.reception import CannotListen
+from ui_console.web.login import Authenticator, TokenRights
+from ui_console.web.page_server import CannotListen
 from ui_console.web.server import WebServer
 from ui_console.web.token_file import TokenFile, TokensNotKept, kept_or_new
 
@@ -26,7 +26,7 @@ ANYWHERE = ("0.0.0.0", "::", "")  # noqa: S104  only compared with what the oper
 
 
 @dataclass(frozen=True)
-class Site:
+class ServerOptions:
     """Address and encryption of a served page.
 
     Attributes:
@@ -52,21 +52,21 @@ class Site:
         """
         return encryption_with(self.certificate, self.key) if self.certificate else None
 
-    def passes_with(self, tokens: TokenFile | None, passes: Mapping[str, Pass]) -> Mapping[str, Pass]:
+    def rights_with(self, tokens: TokenFile | None, rights: Mapping[str, TokenRights]) -> Mapping[str, TokenRights]:
         """Return the valid tokens: the tokens of the server before, if they are kept and wanted, else the new ones."""
-        return passes if tokens is None or self.has_new_tokens else kept_or_new(passes, tokens.read())
+        return rights if tokens is None or self.has_new_tokens else kept_or_new(rights, tokens.read())
 
-    def opened(self, port: int, tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:
+    def opened(self, port: int, tokens: TokenFile | None, rights: Mapping[str, TokenRights]) -> None:
         """Keep the tokens for the next server, and print the page's address for each.
 
         Args:
             port: The server listens there.
             tokens: The file that keeps the tokens; None: none does.
-            passes: Token → its rights.
+            rights: Token → its rights.
         """
-        _keep(tokens, passes)
+        _keep(tokens, rights)
         scheme = "https" if self.certificate else "http"
-        for token, granted in passes.items():
+        for token, granted in rights.items():
             who = f"{granted.user}: " if granted.user else ""
             write_line(f"{who}{scheme}://{_shown(self.host)}:{port}/#token={token}".encode())
         if self.host not in LOOPBACK and not self.certificate:
@@ -89,24 +89,24 @@ class Claims:
     away_after_s: float
 
 
-async def serve_console(where: Where, passes: Mapping[str, Pass], site: Site, claims: Claims) -> int:
+async def serve_console(where: Where, rights: Mapping[str, TokenRights], options: ServerOptions, claims: Claims) -> int:
     """Serve the console until a signal ends it; return the command's exit code.
 
     Args:
         where: The mission.
-        passes: Token → its rights.
-        site: Address and encryption.
+        rights: Token → its rights.
+        options: Address and encryption.
         claims: Claims of the operators.
 
     Raises:
         CannotListen: The address is not free, or not one of this machine.
         NoCertificate: The certificate or its key is missing or not valid.
     """
-    encryption = site.encryption
+    encryption = options.encryption
     joining = await join(where)
     launch = msgspec.structs.replace(joining.launch, name=f"web-{os.getpid()}")
-    tokens = _tokens_of_mission(where, launch.mission, joining.secret, site.port)
-    passes = site.passes_with(tokens, passes)
+    tokens = _tokens_of_mission(where, launch.mission, joining.secret, options.port)
+    rights = options.rights_with(tokens, rights)
 
     async def one_more(launch: Launch) -> Bus:
         return await joining.open_bus(launch)
@@ -114,9 +114,9 @@ async def serve_console(where: Where, passes: Mapping[str, Pass], site: Site, cl
     bus = await one_more(launch)
     hub = WebHub(launch, bus, joining.clock, one_more, kind=claims.kind, away_after_s=claims.away_after_s)
     interrupted = end_server_on_signals(hub.observer.end)
-    server = WebServer(hub, Doorkeeper(passes))
+    server = WebServer(hub, Authenticator(rights))
     try:
-        await server.run(site.host, site.port, lambda port: site.opened(port, tokens, passes), encryption)
+        await server.run(options.host, options.port, lambda port: options.opened(port, tokens, rights), encryption)
     except CannotListen:
         await bus.close()
         raise
@@ -132,11 +132,11 @@ def _tokens_of_mission(where: Where, mission: str, secret: str, port: int) -> To
     return TokenFile.of_mission_elsewhere(mission, where.connect, secret, port)
 
 
-def _keep(tokens: TokenFile | None, passes: Mapping[str, Pass]) -> None:
+def _keep(tokens: TokenFile | None, rights: Mapping[str, TokenRights]) -> None:
     """Keep the tokens for the next server, so that open pages come back; a failure is printed, and serving goes on."""
     try:
         if tokens is not None:
-            tokens.keep(passes)
+            tokens.keep(rights)
     except TokensNotKept as refusal:
         say(str(refusal))
 

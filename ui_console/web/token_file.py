@@ -23,7 +23,7 @@ import msgspec
 from backbone import run_files
 from backbone.atomic_file import replace_file
 from backbone.errors import Refusal
-from ui_console.web.door import Pass
+from ui_console.web.login import TokenRights
 
 MODE = 0o600
 DIGITS = 16  # chosen: 64 bits; no two missions of one user have the same
@@ -63,7 +63,7 @@ class TokenFile:
         """Return the tokens of the designer of a mission file."""
         return cls(run_files.kept_directory(), port, _digest(str(Path(source).resolve())))
 
-    def read(self) -> dict[str, Pass]:
+    def read(self) -> dict[str, TokenRights]:
         """Return the tokens of the server before; none if there was none, or another user could have read them."""
         try:
             descriptor = os.open(self.path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
@@ -74,11 +74,11 @@ class TokenFile:
             if found.st_uid != os.getuid() or stat.S_IMODE(found.st_mode) != MODE:
                 return {}
             try:
-                return msgspec.json.decode(file.read(), type=dict[str, Pass])
+                return msgspec.json.decode(file.read(), type=dict[str, TokenRights])
             except msgspec.DecodeError:
                 return {}
 
-    def keep(self, passes: Mapping[str, Pass]) -> None:
+    def keep(self, rights: Mapping[str, TokenRights]) -> None:
         """Keep these tokens, and no others, for the next server at this port.
 
         Raises:
@@ -87,7 +87,7 @@ class TokenFile:
         try:
             self.path.touch(mode=MODE)  # what replaces it has its mode
             self.path.chmod(MODE)
-            replace_file(self.path, msgspec.json.encode(dict(passes)), is_lasting=False)
+            replace_file(self.path, msgspec.json.encode(dict(rights)), is_lasting=False)
         except OSError as error:
             raise TokensNotKept(f"{self.path}: {error.strerror or error}", path=str(self.path)) from error
 
@@ -97,14 +97,14 @@ def _digest(*of: str) -> str:
     return f"{hashlib.sha256(json.dumps(of).encode()).hexdigest()[:DIGITS]}-"
 
 
-def kept_or_new(new: Mapping[str, Pass], before: Mapping[str, Pass]) -> dict[str, Pass]:
+def kept_or_new(new: Mapping[str, TokenRights], before: Mapping[str, TokenRights]) -> dict[str, TokenRights]:
     """Return the valid tokens: each operator's token of before, if there was one, else the new one.
 
     The new server defines the rights of a token. An operator who is not among the new ones has no token any more.
 
     Example:
-        >>> kept_or_new({"b": Pass("anna", 50)}, {"a": Pass("anna", 100), "c": Pass("ben", 1)})
-        {'a': Pass(user='anna', priority=50)}
+        >>> kept_or_new({"b": TokenRights("anna", 50)}, {"a": TokenRights("anna", 100), "c": TokenRights("ben", 1)})
+        {'a': TokenRights(user='anna', priority=50)}
     """
     tokens = {granted.user: token for token, granted in before.items()}
     return {tokens.get(granted.user, token): granted for token, granted in new.items()}

@@ -142,7 +142,7 @@ export interface TurnView {
   who: string;
 }
 
-export interface Beat {
+export interface BeatRequest {
   do: "beat";
   number: number;
 }
@@ -240,7 +240,7 @@ export type Heard = { view: Partial<DesignView>; answer?: undefined } | { answer
 
 export type Said =
   | Hello
-  | Beat
+  | BeatRequest
   | Select
   | TakeOffer
   | SetProperty

@@ -17,10 +17,20 @@ from websockets.http11 import Request, Response
 
 from backbone.errors import Refusal
 from backbone.spoken import counted
-from ui_console.web.door import MAX_MESSAGE_BYTES, Beat, Doorkeeper, Fault, Hello, IntentT, Offence, Visitor, Welcome
+from ui_console.web.login import (
+    MAX_MESSAGE_BYTES,
+    Authenticator,
+    BeatRequest,
+    ClientSession,
+    Hello,
+    IntentT,
+    ProtocolViolation,
+    ViolationKind,
+    Welcome,
+)
 from ui_console.web.outbox import Outbox
-from ui_console.web.porch import CLOSE_WITHIN_S, OPEN_WITHIN_S, Porch
-from ui_console.web.site import SOCKET_PATH, Answer, Site, is_own_page
+from ui_console.web.page_files import SOCKET_PATH, Answer, PageFiles, is_own_page
+from ui_console.web.pending_connections import CLOSE_WITHIN_S, OPEN_WITHIN_S, PendingConnections
 
 PING_EVERY_S = 2.0  # chosen: a tablet that went out of reach gives its robot back within 6 s
 READ_WITHIN_S = 4.0  # chosen: a page held up for longer is of no use to drive by
@@ -28,10 +38,10 @@ MOST_OPERATORS = 32  # chosen: more browsers than a team has people
 MOST_UNREAD = 8  # messages read ahead of the one carried out
 SEND_AHEAD_BYTES = 32768  # a picture and a half on top of what the system keeps
 FATAL_CODES = {
-    Fault.OVERSIZED: CloseCode.MESSAGE_TOO_BIG,
-    Fault.MALFORMED: CloseCode.INVALID_DATA,
-    Fault.SLOW: CloseCode.TRY_AGAIN_LATER,
-    Fault.CROWD: CloseCode.TRY_AGAIN_LATER,
+    ViolationKind.OVERSIZED: CloseCode.MESSAGE_TOO_BIG,
+    ViolationKind.MALFORMED: CloseCode.INVALID_DATA,
+    ViolationKind.SLOW: CloseCode.TRY_AGAIN_LATER,
+    ViolationKind.CROWD: CloseCode.TRY_AGAIN_LATER,
 }
 MOST_REASON = 120  # of the 123 bytes for it in a close frame
 KEEPALIVE_REASON = "keepalive ping timeout"
@@ -44,7 +54,7 @@ class CannotListen(Refusal):
     remedy = "Choose another address with --host, or another port with --port."
 
 
-class Guest(Protocol):
+class Client(Protocol):
     """A person at a page, from the right token to the end of the connection."""
 
     welcome: Welcome
@@ -53,51 +63,56 @@ class Guest(Protocol):
     """Set when there is something to send."""
 
 
-GuestT = TypeVar("GuestT", bound=Guest)
+ClientT = TypeVar("ClientT", bound=Client)
 HeardT_contra = TypeVar("HeardT_contra", contravariant=True)
 
 
-class House(Protocol[GuestT, HeardT_contra]):
+class Application(Protocol[ClientT, HeardT_contra]):
     """The application behind a page: the consoles, or the designer."""
 
     @property
-    def guests(self) -> Sized:
+    def clients(self) -> Sized:
         """The connected clients."""
 
-    def enter(self, welcome: Welcome) -> GuestT:
+    def enter(self, welcome: Welcome) -> ClientT:
         """Return a new client."""
 
-    async def obey(self, guest: GuestT, intent: HeardT_contra) -> None:
+    async def obey(self, client: ClientT, intent: HeardT_contra) -> None:
         """Carry out a client's intent; the server reads no further message of that client until this returns."""
 
-    def refused(self, guest: GuestT) -> None:
+    def refused(self, client: ClientT) -> None:
         """Stop the actions of a client whose violation ends its connection."""
 
-    async def leave(self, guest: GuestT, reason: str) -> None:
+    async def leave(self, client: ClientT, reason: str) -> None:
         """Remove a client."""
 
-    def offended(self, who: str, offence: Offence) -> None:
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
         """Show the clients a violation."""
 
 
-class Reception(Generic[GuestT, IntentT]):
+class PageServer(Generic[ClientT, IntentT]):
     """Serves a page and its socket.
 
     Args:
-        house: The application.
-        doorkeeper: Knows the tokens.
-        site: The page.
+        application: The application.
+        authenticator: Knows the tokens.
+        files: The page.
         understand: Decodes the page's messages.
     """
 
     def __init__(
         self,
-        house: House[GuestT, IntentT],
-        doorkeeper: Doorkeeper,
-        site: Site,
-        understand: Callable[[bytes | str], Hello | Beat | IntentT],
+        application: Application[ClientT, IntentT],
+        authenticator: Authenticator,
+        files: PageFiles,
+        understand: Callable[[bytes | str], Hello | BeatRequest | IntentT],
     ) -> None:
-        self._house, self._doorkeeper, self._site, self._understand = house, doorkeeper, site, understand
+        self._application, self._authenticator, self._files, self._understand = (
+            application,
+            authenticator,
+            files,
+            understand,
+        )
         self._pages: dict[tuple[str, str], ServerConnection] = {}
 
     @asynccontextmanager
@@ -112,22 +127,22 @@ class Reception(Generic[GuestT, IntentT]):
         Raises:
             CannotListen: The address is not free, or not one of this machine.
         """
-        porch = Porch(encryption, self._house.offended)
-        async with await self._listen(host, port, porch) as server:
+        pending = PendingConnections(encryption, self._application.report_violation)
+        async with await self._listen(host, port, pending) as server:
             try:
                 yield server
             finally:
                 server.close()
-                porch.close()
+                pending.close()
 
-    async def _listen(self, host: str, port: int, porch: Porch) -> Server:
+    async def _listen(self, host: str, port: int, pending: PendingConnections) -> Server:
         try:
             return await serve(
-                partial(self._meet, porch),
+                partial(self._meet, pending),
                 host,
                 port,
-                process_request=partial(self._answer, porch),
-                create_connection=cast(Any, porch.gate),
+                process_request=partial(self._answer, pending),
+                create_connection=cast(Any, pending.new_protocol),
                 compression=None,
                 server_header=None,
                 open_timeout=OPEN_WITHIN_S,
@@ -141,57 +156,61 @@ class Reception(Generic[GuestT, IntentT]):
         except OSError as error:
             raise CannotListen(f"cannot listen at {host}:{port}: {error.strerror or error}") from error
 
-    def _answer(self, porch: Porch, connection: ServerConnection, request: Request) -> Response | None:
+    def _answer(self, pending: PendingConnections, connection: ServerConnection, request: Request) -> Response | None:
         """Return the file asked for; None: it is the page's socket."""
-        porch.asked(connection)
+        pending.asked(connection)
         if request.path.partition("?")[0] != SOCKET_PATH:
-            return _response(self._site.answer(request.path, request.headers.get("If-None-Match", "")))
+            return _response(self._files.answer(request.path, request.headers.get("If-None-Match", "")))
         if not is_own_page(request.headers.get("Origin", ""), request.headers.get("Host", "")):
             remedy = "Close that page; only this server's own may connect."
-            self._house.offended(_who(connection), Offence(Fault.ORIGIN, "shows a page of another site", remedy))
+            self._application.report_violation(
+                _who(connection), ProtocolViolation(ViolationKind.ORIGIN, "shows a page of another site", remedy)
+            )
             return connection.respond(403, "A page of another site may not connect.\n")
         return None
 
-    async def _meet(self, porch: Porch, connection: ServerConnection) -> None:
+    async def _meet(self, pending: PendingConnections, connection: ServerConnection) -> None:
         """Serve one connection to its end."""
-        visitor = Visitor(self._doorkeeper, self._understand, _now_s())
-        welcome = await self._wait_welcome(connection, visitor)
+        session = ClientSession(self._authenticator, self._understand, _now_s())
+        welcome = await self._wait_welcome(connection, session)
         if welcome is None:
             return
-        if len(self._house.guests) >= MOST_OPERATORS:
-            line = f"found {counted(len(self._house.guests), 'guest')} there, which is the most"
-            await self._refuse(connection, welcome.user, Offence(Fault.CROWD, line, "Close some pages."))
+        if len(self._application.clients) >= MOST_OPERATORS:
+            line = f"found {counted(len(self._application.clients), 'client')} there, which is the most"
+            await self._refuse(
+                connection, welcome.user, ProtocolViolation(ViolationKind.CROWD, line, "Close some pages.")
+            )
             return
-        porch.admit(connection)
-        await self._serve(connection, visitor, welcome)
+        pending.admit(connection)
+        await self._serve(connection, session, welcome)
 
-    async def _wait_welcome(self, connection: ServerConnection, visitor: Visitor[IntentT]) -> Welcome | None:
+    async def _wait_welcome(self, connection: ServerConnection, session: ClientSession[IntentT]) -> Welcome | None:
         try:
-            async with asyncio.timeout_at(visitor.must_log_in_by_s):
-                said = visitor.heard(await connection.recv(), _now_s())
+            async with asyncio.timeout_at(session.must_log_in_by_s):
+                said = session.heard(await connection.recv(), _now_s())
         except TimeoutError:
-            said = visitor.late()
+            said = session.late()
         except ConnectionClosed as closed:
             if _was_oversized(closed):
-                self._house.offended(_who(connection), visitor.oversized())
+                self._application.report_violation(_who(connection), session.oversized())
             return None
         if isinstance(said, Welcome):
             return said
-        if isinstance(said, Offence):
+        if isinstance(said, ProtocolViolation):
             await self._refuse(connection, _who(connection), said)
         return None
 
-    async def _serve(self, connection: ServerConnection, visitor: Visitor[IntentT], welcome: Welcome) -> None:
+    async def _serve(self, connection: ServerConnection, session: ClientSession[IntentT], welcome: Welcome) -> None:
         self._end_earlier(connection, welcome)
-        guest = self._house.enter(welcome)
+        client = self._application.enter(welcome)
         who = f"{welcome.user} at {_who(connection)}"
-        writing = asyncio.create_task(self._write(connection, visitor, guest, who), name=f"web: to {who}")
+        writing = asyncio.create_task(self._write(connection, session, client, who), name=f"web: to {who}")
         reason = "the browser has gone away"
         try:
-            reason = await self._read(connection, visitor, guest, who)
+            reason = await self._read(connection, session, client, who)
         finally:
             writing.cancel()
-            await self._house.leave(guest, reason)
+            await self._application.leave(client, reason)
             await asyncio.wait({writing})
             if self._pages.get((welcome.user, welcome.page)) is connection:
                 del self._pages[welcome.user, welcome.page]
@@ -207,42 +226,46 @@ class Reception(Generic[GuestT, IntentT]):
         if earlier is not None:
             earlier.transport.abort()
 
-    async def _read(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> str:
+    async def _read(
+        self, connection: ServerConnection, session: ClientSession[IntentT], client: ClientT, who: str
+    ) -> str:
         """Carry out the browser's messages until the connection ends; return the reason of its end."""
         while True:
             try:
                 data = await connection.recv()
             except ConnectionClosed as closed:
-                return self._farewell(visitor, closed, who)
-            said = visitor.heard(data, _now_s())
+                return self._farewell(session, closed, who)
+            said = session.heard(data, _now_s())
             match said:
-                case Offence():
+                case ProtocolViolation():
                     if said.is_fatal:
-                        self._house.refused(guest)
+                        self._application.refused(client)
                     await self._refuse(connection, who, said)
                     if said.is_fatal:
                         return said.line
-                case Beat(number):
-                    guest.outbox.put_section("beat", str(number).encode())
-                    guest.news.set()
+                case BeatRequest(number):
+                    client.outbox.put_section("beat", str(number).encode())
+                    client.news.set()
                 case Welcome() | None:
                     continue
                 case _:
-                    await self._house.obey(guest, said)
+                    await self._application.obey(client, said)
 
-    def _farewell(self, visitor: Visitor[IntentT], closed: ConnectionClosed, who: str) -> str:
+    def _farewell(self, session: ClientSession[IntentT], closed: ConnectionClosed, who: str) -> str:
         if _was_oversized(closed):
-            offence = visitor.oversized()
+            violation = session.oversized()
         elif closed.sent is not None and closed.sent.reason == KEEPALIVE_REASON:
-            offence = visitor.slow(READ_WITHIN_S)
+            violation = session.slow(READ_WITHIN_S)
         else:
             return "the browser has gone away"
-        self._house.offended(who, offence)
-        return offence.line
+        self._application.report_violation(who, violation)
+        return violation.line
 
-    async def _write(self, connection: ServerConnection, visitor: Visitor[IntentT], guest: GuestT, who: str) -> None:
+    async def _write(
+        self, connection: ServerConnection, session: ClientSession[IntentT], client: ClientT, who: str
+    ) -> None:
         """Send the newest content whenever the browser reads; cut off a browser that reads nothing."""
-        outbox, news = guest.outbox, guest.news
+        outbox, news = client.outbox, client.news
         try:
             while True:
                 news.clear()
@@ -253,16 +276,16 @@ class Reception(Generic[GuestT, IntentT]):
                 async with asyncio.timeout(READ_WITHIN_S):
                     await connection.send(message)
         except TimeoutError:
-            self._house.offended(who, visitor.slow(READ_WITHIN_S))
+            self._application.report_violation(who, session.slow(READ_WITHIN_S))
             connection.transport.abort()
         except ConnectionClosed:
             return
 
-    async def _refuse(self, connection: ServerConnection, who: str, offence: Offence) -> None:
-        self._house.offended(who, offence)
-        if offence.is_fatal:
-            code = FATAL_CODES.get(offence.fault, CloseCode.POLICY_VIOLATION)
-            await connection.close(code, f"This page {offence.line}. {offence.remedy}"[:MOST_REASON])
+    async def _refuse(self, connection: ServerConnection, who: str, violation: ProtocolViolation) -> None:
+        self._application.report_violation(who, violation)
+        if violation.is_fatal:
+            code = FATAL_CODES.get(violation.kind, CloseCode.POLICY_VIOLATION)
+            await connection.close(code, f"This page {violation.line}. {violation.remedy}"[:MOST_REASON])
 
 
 def port_of(server: Server) -> int:

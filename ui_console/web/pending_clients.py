@@ -2,7 +2,7 @@
 
 Rules of this file: no socket, no clock; a displaced client is returned, not cut off.
 
-* Pending clients take no operator's place, and there are never more of them than ``MOST_STRANGERS``.
+* Pending clients take no operator's place, and there are never more of them than ``MOST_PENDING``.
 * One address, or one network of IPv6, has at most ``MOST_OF_AN_ADDRESS``: beyond that it displaces its own only.
 * If all places are taken, the address with the most pending clients loses one, so few make no room for many.
 * Of an address the oldest client without a request goes first.
@@ -15,23 +15,23 @@ from collections import Counter
 from typing import Generic, TypeVar
 
 MOST_OF_AN_ADDRESS = 64  # chosen: a page opens six connections at a time; a team behind one address ten pages
-MOST_STRANGERS = 128  # chosen: far below the 1024 descriptors a process usually has
+MOST_PENDING = 128  # chosen: far below the 1024 descriptors a process usually has
 IPV6_NETWORK_BITS = 64  # a provider assigns so large a network to one household or host
 
-StrangerT = TypeVar("StrangerT")
+PendingT = TypeVar("PendingT")
 
 
-class Strangers(Generic[StrangerT]):
+class PendingClients(Generic[PendingT]):
     """The clients without a token, in the order of their connections."""
 
     def __init__(self) -> None:
-        self._places: dict[StrangerT, str] = {}
-        self._silent: dict[StrangerT, None] = {}
+        self._places: dict[PendingT, str] = {}
+        self._silent: dict[PendingT, None] = {}
 
     def __len__(self) -> int:
         return len(self._places)
 
-    def came(self, who: StrangerT, address: str) -> StrangerT | None:
+    def came(self, who: PendingT, address: str) -> PendingT | None:
         """Add a client; return the client it displaces, which is removed; None: there is room.
 
         Args:
@@ -43,7 +43,7 @@ class Strangers(Generic[StrangerT]):
         displaced = None
         if counts[place] >= MOST_OF_AN_ADDRESS:
             displaced = self._first_of(place)
-        elif len(self._places) >= MOST_STRANGERS:
+        elif len(self._places) >= MOST_PENDING:
             displaced = self._first_of(counts.most_common(1)[0][0])
         if displaced is not None:
             self.gone(displaced)
@@ -51,16 +51,16 @@ class Strangers(Generic[StrangerT]):
         self._silent[who] = None
         return displaced
 
-    def asked(self, who: StrangerT) -> None:
+    def asked(self, who: PendingT) -> None:
         """Note that a client has sent a valid request."""
         self._silent.pop(who, None)
 
-    def gone(self, who: StrangerT) -> None:
+    def gone(self, who: PendingT) -> None:
         """Remove a client: it has left, or was authenticated."""
         self._places.pop(who, None)
         self._silent.pop(who, None)
 
-    def _first_of(self, place: str) -> StrangerT:
+    def _first_of(self, place: str) -> PendingT:
         all_there = [who for who, at in self._places.items() if at == place]
         return next((who for who in all_there if who in self._silent), all_there[0])
 

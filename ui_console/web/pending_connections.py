@@ -1,7 +1,7 @@
 """Connections before authentication, from their first moment on.
 
 Encryption, request and token have one deadline together. A connection that misses it, or is displaced by a new one, is
-cut off. ``Strangers`` decides which one is displaced.
+cut off. ``PendingClients`` decides which one is displaced.
 """
 
 from __future__ import annotations
@@ -14,63 +14,65 @@ from typing import Any, cast
 
 from websockets.asyncio.server import ServerConnection
 
-from ui_console.web.door import LOGIN_WITHIN_S, Fault, Offence
-from ui_console.web.strangers import Strangers
+from ui_console.web.login import LOGIN_WITHIN_S, ProtocolViolation, ViolationKind
+from ui_console.web.pending_clients import PendingClients
 
 OPEN_WITHIN_S = 5.0  # chosen: a request is a few lines
-STRANGER_WITHIN_S = 2 * OPEN_WITHIN_S + LOGIN_WITHIN_S + 1.0  # encryption, request, token, and a moment to refuse
+AUTHENTICATED_WITHIN_S = 2 * OPEN_WITHIN_S + LOGIN_WITHIN_S + 1.0  # encryption, request, token, and a moment to refuse
 CLOSE_WITHIN_S = 1.0  # chosen: a client that does not complete the closing handshake is cut off
 TOLD_EVERY_S = 10.0  # chosen: a crowd is one piece of news
 
 
-class Porch:
+class PendingConnections:
     """The connections without a token so far.
 
     Args:
         encryption: TLS context; None: plain HTTP.
-        offended: Called with each address whose connections were cut off for new ones.
+        report_violation: Called with each address whose connections were cut off for new ones.
     """
 
-    def __init__(self, encryption: SSLContext | None, offended: Callable[[str, Offence], None]) -> None:
+    def __init__(
+        self, encryption: SSLContext | None, report_violation: Callable[[str, ProtocolViolation], None]
+    ) -> None:
         self.encryption = encryption
-        self._offended = offended
-        self._strangers: Strangers[Gate] = Strangers()
-        self._gates: dict[ServerConnection, Gate] = {}
+        self._report_violation = report_violation
+        self._clients: PendingClients[ConnectionProtocol] = PendingClients()
+        self._protocols: dict[ServerConnection, ConnectionProtocol] = {}
         self._displaced, self._told_s = 0, -TOLD_EVERY_S
 
-    def gate(self, *given: Any, **options: Any) -> Gate:
+    def new_protocol(self, *given: Any, **options: Any) -> ConnectionProtocol:
         """Return the asyncio protocol of a new connection; takes the arguments of a ``ServerConnection``."""
         connection = ServerConnection(*given, **options)
-        gate = self._gates[connection] = Gate(self, connection)
-        return gate
+        protocol = self._protocols[connection] = ConnectionProtocol(self, connection)
+        return protocol
 
-    def came(self, gate: Gate, address: str) -> None:
+    def came(self, protocol: ConnectionProtocol, address: str) -> None:
         """Make room for a new connection."""
-        displaced = self._strangers.came(gate, address)
+        displaced = self._clients.came(protocol, address)
         if displaced is not None:
             displaced.abort()
             self._report_displaced(displaced.address)
 
     def asked(self, connection: ServerConnection) -> None:
         """Note that a connection has made a request."""
-        self._strangers.asked(self._gates[connection])
+        self._clients.asked(self._protocols[connection])
 
     def admit(self, connection: ServerConnection) -> None:
         """Admit a connection: no new connection displaces it any more."""
-        gate = self._gates[connection]
-        gate.be_known()
-        self._strangers.gone(gate)
+        protocol = self._protocols[connection]
+        protocol.be_known()
+        self._clients.gone(protocol)
 
-    def left(self, gate: Gate) -> None:
+    def left(self, protocol: ConnectionProtocol) -> None:
         """Forget a connection that has ended."""
-        self._strangers.gone(gate)
-        self._gates.pop(gate.connection, None)
+        self._clients.gone(protocol)
+        self._protocols.pop(protocol.connection, None)
 
     def close(self) -> None:
         """Cut off all connections without a token."""
-        for gate in list(self._gates.values()):
-            if not gate.is_known:
-                gate.abort()
+        for protocol in list(self._protocols.values()):
+            if not protocol.is_known:
+                protocol.abort()
 
     def _report_displaced(self, address: str) -> None:
         self._displaced += 1
@@ -78,10 +80,12 @@ class Porch:
         if now_s >= self._told_s + TOLD_EVERY_S:
             line = f"was cut off for a newcomer: {self._displaced} without a token so far, too many at a time"
             self._told_s = now_s
-            self._offended(address, Offence(Fault.CROWD, line, "Find out who connects there and sends no token."))
+            self._report_violation(
+                address, ProtocolViolation(ViolationKind.CROWD, line, "Find out who connects there and sends no token.")
+            )
 
 
-class Gate(asyncio.Protocol):
+class ConnectionProtocol(asyncio.Protocol):
     """asyncio's protocol of one connection: decrypts it if it is encrypted, and passes all data on.
 
     It has the plain transport from the beginning, so that a client that never ends the handshake can be cut off; if
@@ -93,9 +97,9 @@ class Gate(asyncio.Protocol):
         is_known: True once the client has sent the right token.
     """
 
-    def __init__(self, porch: Porch, connection: ServerConnection) -> None:
+    def __init__(self, pending: PendingConnections, connection: ServerConnection) -> None:
         self.connection, self.address, self.is_known = connection, "", False
-        self._porch = porch
+        self._pending = pending
         self._next: ServerConnection | SSLProtocol = connection
         self._transport: asyncio.Transport | None = None
         self._deadline: asyncio.TimerHandle | None = None
@@ -116,22 +120,22 @@ class Gate(asyncio.Protocol):
         loop = asyncio.get_running_loop()
         self._transport = cast(asyncio.Transport, transport)
         self.address = str((transport.get_extra_info("peername") or ("",))[0])
-        self._deadline = loop.call_later(STRANGER_WITHIN_S, self.abort)
-        if self._porch.encryption is not None:
+        self._deadline = loop.call_later(AUTHENTICATED_WITHIN_S, self.abort)
+        if self._pending.encryption is not None:
             self._next = SSLProtocol(
                 loop,
                 self.connection,
-                self._porch.encryption,
+                self._pending.encryption,
                 cast(Any, None),  # no future: no caller awaits the handshake
                 server_side=True,
                 ssl_handshake_timeout=int(OPEN_WITHIN_S),
                 ssl_shutdown_timeout=int(CLOSE_WITHIN_S),
             )
-        self._porch.came(self, self.address)
+        self._pending.came(self, self.address)
         self._next.connection_made(self._transport)
 
     def data_received(self, data: bytes) -> None:
-        """Pass on."""
+        """TokenRights on."""
         if not isinstance(self._next, SSLProtocol):
             self._next.data_received(data)
             return
@@ -144,20 +148,20 @@ class Gate(asyncio.Protocol):
             rest = rest[size:]
 
     def eof_received(self) -> bool | None:
-        """Pass on."""
+        """TokenRights on."""
         return self._next.eof_received()
 
     def pause_writing(self) -> None:
-        """Pass on."""
+        """TokenRights on."""
         self._next.pause_writing()
 
     def resume_writing(self) -> None:
-        """Pass on."""
+        """TokenRights on."""
         self._next.resume_writing()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End the deadline, and pass on."""
         if self._deadline is not None:
             self._deadline.cancel()
-        self._porch.left(self)
+        self._pending.left(self)
         self._next.connection_lost(exc)

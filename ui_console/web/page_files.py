@@ -107,7 +107,7 @@ class Answer:
     body: bytes
 
 
-class Site:
+class PageFiles:
     """The files of a page, read from the package.
 
     Args:

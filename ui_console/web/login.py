@@ -47,13 +47,13 @@ class Hello(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="
     page: ShortText = ""
 
 
-class Beat(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="beat"):
+class BeatRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="beat"):
     """Ask for this number back: it shows the page the age of its content, and that the server receives it."""
 
     number: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
 
-class Fault(StrEnum):
+class ViolationKind(StrEnum):
     """Kinds of violations."""
 
     TOKEN = "token"  # noqa: S105  the word for it, not one
@@ -67,17 +67,17 @@ class Fault(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Offence:
+class ProtocolViolation:
     """A message, or a silence, that breaks the protocol.
 
     Attributes:
-        fault: Its kind.
+        kind: Its kind.
         line: The event, for people; without the client's own words.
         remedy: An action against it.
         is_fatal: True: the connection has to end.
     """
 
-    fault: Fault
+    kind: ViolationKind
     line: str
     remedy: str
     is_fatal: bool = True
@@ -99,7 +99,7 @@ class Welcome:
 
 
 @dataclass(frozen=True, slots=True)
-class Pass:
+class TokenRights:
     """The rights of a token.
 
     Attributes:
@@ -111,16 +111,16 @@ class Pass:
     priority: int
 
 
-class Doorkeeper:
+class Authenticator:
     """Knows the tokens."""
 
-    def __init__(self, passes: Mapping[str, Pass]) -> None:
-        self._passes = {token.encode(): granted for token, granted in passes.items()}
+    def __init__(self, rights: Mapping[str, TokenRights]) -> None:
+        self._rights = {token.encode(): granted for token, granted in rights.items()}
 
-    def open_with(self, token: str) -> Pass | None:
+    def rights_of(self, token: str) -> TokenRights | None:
         """Return the rights of the token, None for a wrong one; both take the same time for a token of that length."""
         found = None
-        for known, granted in self._passes.items():
+        for known, granted in self._rights.items():
             if hmac.compare_digest(known, token.encode("utf-8", "surrogatepass")):
                 found = granted
         return found
@@ -131,10 +131,10 @@ def new_token() -> str:
     return secrets.token_urlsafe(TOKEN_BYTES)
 
 
-def passes_for(operators: Iterable[tuple[str, int]], priority: int) -> dict[str, Pass]:
+def new_rights(operators: Iterable[tuple[str, int]], priority: int) -> dict[str, TokenRights]:
     """Return new tokens: one for each operator with a priority of their own, else one for all."""
-    named = [Pass(user, own) for user, own in operators]
-    return {new_token(): granted for granted in named or [Pass("", priority)]}
+    named = [TokenRights(user, own) for user, own in operators]
+    return {new_token(): granted for granted in named or [TokenRights("", priority)]}
 
 
 class WrongOperator(ValueError):
@@ -157,33 +157,36 @@ def read_operator(text: str) -> tuple[str, int]:
     return user, int(priority)
 
 
-class Visitor(Generic[IntentT]):
+class ClientSession(Generic[IntentT]):
     """One connection, from the first byte on.
 
     Args:
-        doorkeeper: Knows the tokens.
+        authenticator: Knows the tokens.
         understand: Decodes a message; raises ``msgspec.DecodeError`` for an invalid one.
         now_s: Time of the connection.
     """
 
     def __init__(
-        self, doorkeeper: Doorkeeper, understand: Callable[[bytes | str], Hello | Beat | IntentT], now_s: float
+        self,
+        authenticator: Authenticator,
+        understand: Callable[[bytes | str], Hello | BeatRequest | IntentT],
+        now_s: float,
     ) -> None:
         self._understand = understand
-        self._doorkeeper, self._came_s = doorkeeper, now_s
+        self._authenticator, self._came_s = authenticator, now_s
         self._room, self._room_at_s = BURST, now_s
         self._faults = 0
         self.welcome: Welcome | None = None
         """None until the token was right."""
         self.is_out = False
-        """True after a fatal offence."""
+        """True after a fatal violation."""
 
     @property
     def must_log_in_by_s(self) -> float | None:
         """Deadline of the token; None: it has come."""
         return None if self.welcome is not None else self._came_s + LOGIN_WITHIN_S
 
-    def heard(self, data: str | bytes, now_s: float) -> Welcome | Beat | IntentT | Offence | None:
+    def heard(self, data: str | bytes, now_s: float) -> Welcome | BeatRequest | IntentT | ProtocolViolation | None:
         """Return the decoded message; None after a fatal violation.
 
         Args:
@@ -193,7 +196,7 @@ class Visitor(Generic[IntentT]):
         if self.is_out:
             return None
         if not self._has_room(now_s):
-            return self._out(Fault.FLOOD, f"sent more than {RATE_HZ:.0f} messages a second", "Reload the page.")
+            return self._out(ViolationKind.FLOOD, f"sent more than {RATE_HZ:.0f} messages a second", "Reload the page.")
         if len(data) > MAX_MESSAGE_BYTES:
             return self.oversized()
         try:
@@ -203,26 +206,30 @@ class Visitor(Generic[IntentT]):
         if isinstance(said, Hello):
             return self._log_in(said) if self.welcome is None else self._malformed()
         if self.welcome is None:
-            return self._out(Fault.TOKEN, "spoke before it showed a token", "Open the address that serve printed.")
+            return self._out(
+                ViolationKind.TOKEN, "spoke before it showed a token", "Open the address that serve printed."
+            )
         return said
 
-    def oversized(self) -> Offence:
+    def oversized(self) -> ProtocolViolation:
         """Return the violation of a message that was too long to be read."""
-        return self._out(Fault.OVERSIZED, f"sent a message of more than {MAX_MESSAGE_BYTES} bytes", "Reload the page.")
+        return self._out(
+            ViolationKind.OVERSIZED, f"sent a message of more than {MAX_MESSAGE_BYTES} bytes", "Reload the page."
+        )
 
-    def late(self) -> Offence:
+    def late(self) -> ProtocolViolation:
         """Return the violation of a client without a token at ``must_log_in_by_s``."""
-        return self._out(Fault.LATE, f"showed no token within {LOGIN_WITHIN_S:.0f} s", "Load the page again.")
+        return self._out(ViolationKind.LATE, f"showed no token within {LOGIN_WITHIN_S:.0f} s", "Load the page again.")
 
-    def slow(self, behind_s: float) -> Offence:
+    def slow(self, behind_s: float) -> ProtocolViolation:
         """Return the violation of a client that reads nothing."""
         line = f"has read nothing for {behind_s:.0f} s"
-        return self._out(Fault.SLOW, line, "Come closer to the access point, or show fewer pictures.")
+        return self._out(ViolationKind.SLOW, line, "Come closer to the access point, or show fewer pictures.")
 
-    def _log_in(self, hello: Hello) -> Welcome | Offence:
-        granted = self._doorkeeper.open_with(hello.token)
+    def _log_in(self, hello: Hello) -> Welcome | ProtocolViolation:
+        granted = self._authenticator.rights_of(hello.token)
         if granted is None:
-            return self._out(Fault.TOKEN, "showed a wrong token", "Open the address that serve printed.")
+            return self._out(ViolationKind.TOKEN, "showed a wrong token", "Open the address that serve printed.")
         user = granted.user or " ".join(hello.user.split()) or "unnamed"
         wished = granted.priority if hello.priority is None else hello.priority
         self.welcome = Welcome(user, min(max(wished, 0), granted.priority), hello.page)
@@ -236,13 +243,15 @@ class Visitor(Generic[IntentT]):
         self._room -= 1.0
         return True
 
-    def _malformed(self) -> Offence:
+    def _malformed(self) -> ProtocolViolation:
         self._faults += 1
         line = "sent a message that means nothing"
         if self.welcome is None or self._faults > FAULTS_FORGIVEN:
-            return self._out(Fault.MALFORMED, line, "Load the page again, without the browser's memory.")
-        return Offence(Fault.MALFORMED, line, "Load the page again, without the browser's memory.", is_fatal=False)
+            return self._out(ViolationKind.MALFORMED, line, "Load the page again, without the browser's memory.")
+        return ProtocolViolation(
+            ViolationKind.MALFORMED, line, "Load the page again, without the browser's memory.", is_fatal=False
+        )
 
-    def _out(self, fault: Fault, line: str, remedy: str) -> Offence:
+    def _out(self, kind: ViolationKind, line: str, remedy: str) -> ProtocolViolation:
         self.is_out = True
-        return Offence(fault, line, remedy)
+        return ProtocolViolation(kind, line, remedy)
