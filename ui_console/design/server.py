@@ -1,4 +1,4 @@
-"""The designer's server: its page, its socket, and what goes on beside them. No mission needs to be up."""
+"""The designer's server: its page, its socket, and the tasks beside them. No mission needs to be up."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ui_console.web.page_server import PageServer, port_of
 
 
 def begin(source: str) -> tuple[Draft, DraftFile]:
-    """Return the draft of a mission file: what was not saved last time, else what the file holds, else a new mission.
+    """Return the draft of a mission file: unsaved changes of last time, else the file's content, else a new mission.
 
     Raises:
         NotSaved: There is no folder to save it in.
-        DraftUnreadable: What was kept is no draft.
-        MissionInvalid: The file cannot be read, or not even as XML.
+        DraftUnreadable: The draft file holds no draft.
+        MissionInvalid: The file cannot be read, or is no XML.
     """
     folder = Path(source).parent
     if not folder.is_dir():
@@ -57,17 +57,17 @@ class DesignServer:
         end: asyncio.Event,
         encryption: SSLContext | None = None,
     ) -> None:
-        """Serve until the event is set; what is not saved is kept beside the file.
+        """Serve until the event is set; unsaved changes are kept beside the file.
 
         Args:
             host: Address to listen at.
             port: Port; 0: any that is free.
-            ready: Called with the port once browsers can come.
+            ready: Called with the port once the server listens.
             end: Ends it.
-            encryption: See ``encryption_with``; None: it speaks plain HTTP.
+            encryption: See ``encryption_with``; None: plain HTTP.
 
         Raises:
-            CannotListen: The address cannot be had.
+            CannotListen: The address is not free, or not one of this machine.
             BaseExceptionGroup: With the bug that ended it.
         """
         room = self._room

@@ -21,8 +21,8 @@ async def serve_designer(file: str, rights: Mapping[str, TokenRights], options: 
 
     Args:
         file: Mission file to change, or to begin if there is none.
-        rights: Token → whose it is.
-        options: Where it is served.
+        rights: Token → its rights.
+        options: Address and encryption.
 
     Raises:
         Refusal: ``CannotListen``, ``NoCertificate``, ``NotSaved`` or ``DraftUnreadable``.
@@ -34,7 +34,7 @@ async def serve_designer(file: str, rights: Mapping[str, TokenRights], options: 
         say(str(invalid))
         return ExitCode.MISSION_INVALID
     if kept.path.exists():
-        say(f"goes on with what was not saved, from {kept.path}")
+        say(f"goes on with the unsaved changes in {kept.path}")
     end = asyncio.Event()
     interrupted = end_server_on_signals(lambda _signal: end.set())
     tokens = TokenFile.of_design(file, options.port) if options.port else None
