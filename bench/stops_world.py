@@ -18,8 +18,8 @@ from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.launch import Launch
 from backbone.errors import LinkError
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule

@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from backbone.cli import run
-from backbone.cli_options import CommandTable, SecretFile, Version, complete_mission, finite, hub_endpoint, picture_for
-from backbone.endings import ExitCode, say
+from backbone.command_line.cli import run
+from backbone.command_line.options import (
+    CommandTable,
+    SecretFile,
+    Version,
+    complete_mission,
+    finite,
+    hub_endpoint,
+    picture_for,
+)
+from backbone.launcher.endings import ExitCode, say
 from ui_console.model.profile import Profile
 
 if TYPE_CHECKING:
@@ -271,7 +279,7 @@ def _need_a_terminal(command: str, instead: str) -> None:
 
 def _user() -> str:
     """Return who is logged in, as far as the system knows."""
-    from backbone.operators import login_name
+    from backbone.mission_log.operators import login_name
 
     return login_name()
 

@@ -12,11 +12,11 @@ from typing import Any, assert_never
 
 from backbone.component.messages import Absence, ComponentState, LifeState, MissionTime, StandingStop, StoryEvent
 from backbone.creator.messages import Processes, ProcessState
-from backbone.mission_log import Log, MissionLog, PeopleKnown
+from backbone.mission_log.log import Log, MissionLog, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.people import People
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
-from backbone.operators import OperatorActed
-from backbone.people import People
 from backbone.picture.health import MissionHealth, health
 from backbone.picture.words import stop_line
 from backbone.scheduling.requests import RequestState

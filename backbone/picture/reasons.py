@@ -13,12 +13,12 @@ from backbone.component.story import LENGTH as STORY_LENGTH
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import creator_name
 from backbone.errors import LinkError, Refusal
-from backbone.log_lines import event_json
-from backbone.mission_log import AskPeople, PeopleKnown
+from backbone.mission_log.lines import event_json
+from backbone.mission_log.log import AskPeople, PeopleKnown
+from backbone.mission_log.people import People, screens_of
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import LAUNCHER, component_of
-from backbone.people import People, screens_of
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import RULES, absence_line, stop_line

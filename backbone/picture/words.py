@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backbone.component.messages import Absence, StandingStop
-from backbone.people import People
+from backbone.mission_log.people import People
 from backbone.scheduling.views import RequestView
 
 WANTED = "self"

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from backbone.cli_options import CommandTable, finite
+from backbone.command_line.options import CommandTable, finite
 from backbone.errors import Refusal, code_of
 
 app = typer.Typer(

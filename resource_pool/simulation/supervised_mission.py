@@ -11,14 +11,14 @@ import contextvars
 import tempfile
 from collections.abc import Callable, Sequence
 
-from backbone.bring_up import CORE_POLICY, Launcher
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
-from backbone.core_launches import UpOptions
 from backbone.creator.messages import ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.keys import Conversation
+from backbone.launcher.bring_up import CORE_POLICY, Launcher
+from backbone.launcher.core_launches import UpOptions
 from backbone.naming import LAUNCHER, Subsystem
 from backbone.wire import Envelope
 from resource_pool.simulation.audit import Audit, current_audit

@@ -10,7 +10,7 @@ import pytest
 from typer.models import OptionInfo
 from typer.testing import CliRunner
 
-from backbone.cli import app as backbone_app
+from backbone.command_line.cli import app as backbone_app
 from mission_control.experiments.cli import app as experiment_app
 from ui_console.cli import app as console_app
 

@@ -10,7 +10,7 @@ from running_mission import RunningMission, mission_up
 
 from backbone.component.messages import AskStory, Story
 from backbone.keys import Conversation
-from backbone.operators import OperatorActed, OperatorAction
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Sought
 from ui_console.model.driving import Drive

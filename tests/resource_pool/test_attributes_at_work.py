@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pool_on_local_network import Owner, Pool, a_pool
 
-from backbone.attributes import WrongAttribute, attributes_of, change
 from backbone.bus.clock import run_virtual
+from backbone.command_line.attributes import WrongAttribute, attributes_of, change
 from backbone.component.component import WrongParameter
 from backbone.keys import Conversation
 from backbone.nameserver.messages import UnknownName

@@ -21,8 +21,8 @@ from backbone.bus.clock import run_virtual
 from backbone.component.launch import Launch
 from backbone.creator.messages import EndedBy
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent
 from backbone.wire import Envelope, Message

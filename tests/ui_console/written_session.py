@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from textual.pilot import Pilot
 
 from backbone.errors import Refusal
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import Drive

@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path as FilePath
 
 from backbone.atomic_file import remove_leftover
-from backbone.dry_run import DryRun, dry_run
+from backbone.dry_run.run import DryRun, dry_run
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.document import read_bytes
 from backbone.mission.edit import Node, Path, outline, set_attribute

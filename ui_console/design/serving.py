@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping
 
-from backbone.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say
 from backbone.mission.reader import MissionInvalid
 from ui_console.design.look_up import look_up
 from ui_console.design.room import DesignRoom

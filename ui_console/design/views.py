@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import msgspec
 
-from backbone.dry_run import DryRun
+from backbone.dry_run.run import DryRun
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import Node, Path

@@ -18,7 +18,7 @@ from typing import Annotated
 import msgspec
 
 from backbone.errors import Refusal
-from backbone.people import is_console
+from backbone.mission_log.people import is_console
 from backbone.ranges import Line, Mention
 from backbone.wire import Message
 

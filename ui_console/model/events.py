@@ -15,9 +15,9 @@ import msgspec
 from backbone.component.messages import ComponentState, MissionTime, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.mission_log import Log, PeopleKnown
+from backbone.mission_log.log import Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
 from backbone.nameserver.messages import Components, Disappeared
-from backbone.operators import OperatorActed
 from backbone.picture.health import MissionHealth
 from backbone.picture.words import why_lost
 from backbone.rc_manager.messages import Leases

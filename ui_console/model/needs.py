@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from backbone.component.messages import ComponentState
 from backbone.creator.messages import creator_name
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.people import is_console
 from backbone.scheduling.views import Schedule
 
 

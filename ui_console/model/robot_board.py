@@ -9,8 +9,8 @@ from collections.abc import Mapping
 
 from msgspec.structs import replace
 
+from backbone.mission_log.people import is_console, screens_of
 from backbone.naming import Subsystem, component_of
-from backbone.people import is_console, screens_of
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import because
 from backbone.rc_manager.messages import Leases

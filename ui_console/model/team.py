@@ -25,11 +25,11 @@ from backbone.component.messages import (
     StoryEvent,
 )
 from backbone.creator.messages import HostLoad, ProcessFell
-from backbone.mission_log import AskLog, Log, PeopleKnown
+from backbone.mission_log.log import AskLog, Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
+from backbone.mission_log.people import is_console, screens_of
 from backbone.nameserver.messages import Components, Disappeared
 from backbone.naming import Subsystem, component_of
-from backbone.operators import OperatorActed
-from backbone.people import is_console, screens_of
 from backbone.picture.health import MissionHealth
 from backbone.picture.mission import LOG_KEPT, MissionPicture, is_older
 from backbone.picture.words import because

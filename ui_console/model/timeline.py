@@ -17,8 +17,8 @@ from enum import StrEnum
 import msgspec
 from msgspec.structs import replace
 
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.people import is_console
 from backbone.scheduling.views import RcView, RequestView, Schedule
 
 HISTORY_S = 180.0  # chosen: several rounds of a mission whose turns are seconds

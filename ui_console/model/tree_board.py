@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from backbone.component.messages import ComponentState, LifeState, StoryEvent
+from backbone.mission_log.people import People
 from backbone.naming import Subsystem, component_of
-from backbone.people import People
 from backbone.picture.words import because
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from backbone.bus.interface import Clock
-from backbone.operators import OperatorAction
+from backbone.mission_log.operators import OperatorAction
 from ui_console.model.consent import CONSENT_WITHIN_S, Consent, ConsentDesk, Settled, Sought, Topic
 from ui_console.model.events import ConsoleEvent
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal
+from backbone.mission_log.operators import OperatorAction
+from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.operators import OperatorAction
-from backbone.people import is_console
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule

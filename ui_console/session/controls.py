@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from backbone.errors import LinkError, Refusal
-from backbone.operators import OperatorAction
+from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
 from ui_console.model.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
 from ui_console.model.events import CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed

@@ -32,11 +32,11 @@ from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.mission_log import AskLog, AskPeople, Log, PeopleKnown
+from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
+from backbone.mission_log.operators import OperatorActed
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents, Resolve, Resolved
 from backbone.naming import LAUNCHER, Subsystem, component_of
-from backbone.operators import OperatorActed
 from backbone.picture.health import MissionHealth
 from backbone.picture.mission import LOG_KEPT
 from backbone.picture.reasons import reasons_for

@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from backbone.errors import LinkError, Refusal
-from backbone.people import is_console
+from backbone.mission_log.people import is_console
 from backbone.ranges import Instant, Mention
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from backbone.component.component import NoParameters
-from backbone.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent, for_scripts
 from ui_console.model.script import Step, WrongScript, read_script

@@ -17,9 +17,9 @@ from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.cli import read_secret_option
+from backbone.command_line.cli import read_secret_option
 from backbone.component.launch import Launch
-from backbone.mission_connection import clock_elsewhere
+from backbone.launcher.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
 from ui_console.session.observer import Observer
 

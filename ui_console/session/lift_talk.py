@@ -8,7 +8,7 @@ from typing import Protocol, assert_never
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, NoResponder, Refusal
-from backbone.operators import OperatorAction
+from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import OtherStop, Stopper, StopState
 from ui_console.model.consent import CONSENT_WITHIN_S, Consent, Topic
 from ui_console.model.events import CommandRefused, ConsentAsked, ConsentHeard, ConsoleEvent

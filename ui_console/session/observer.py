@@ -13,7 +13,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
-from backbone.operators import OperatorActed, OperatorAction
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
 from backbone.scheduling.views import Schedule
 from backbone.spoken import value_text

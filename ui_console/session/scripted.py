@@ -7,8 +7,8 @@ import os
 import threading
 from collections.abc import Callable
 
-from backbone.endings import ExitCode
 from backbone.errors import Refusal
+from backbone.launcher.endings import ExitCode
 from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import StopState, Suspended, SwappedOut

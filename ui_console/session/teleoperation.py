@@ -20,7 +20,7 @@ from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.operators import OperatorAction
+from backbone.mission_log.operators import OperatorAction
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events

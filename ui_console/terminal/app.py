@@ -11,8 +11,8 @@ from textual import work
 from textual.events import AppBlur, AppFocus, Key, MouseDown
 from textual.widgets import Input
 
-from backbone.endings import ExitCode
 from backbone.errors import Refusal
+from backbone.launcher.endings import ExitCode
 from ui_console.model.driving import Direction, drive_towards
 from ui_console.model.views import AlarmView
 from ui_console.session.gamepad import buttons_help

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 from backbone.component.messages import LogLevel
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
 from backbone.spoken import counted
 
 SEARCH_HELP = f"words, and robot:NAME person:NAME level:{'|'.join(LogLevel)} since:5m until:14:05; nothing: all"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from backbone.component.component import NoParameters
-from backbone.endings import ExitCode
+from backbone.launcher.endings import ExitCode
 from ui_console.model.profile import Profile
 from ui_console.session.gamepad import find_gamepad
 from ui_console.session.joining import Where, end_on_signals, join

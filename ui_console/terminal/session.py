@@ -10,7 +10,7 @@ from typing import Any, assert_never
 
 from textual import pilot as textual_pilot
 
-from backbone.endings import ExitCode
+from backbone.launcher.endings import ExitCode
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.events import ConsoleEvent

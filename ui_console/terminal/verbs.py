@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from backbone.component.messages import LifeState
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel

@@ -10,8 +10,8 @@ from typing import Any
 
 import msgspec
 
-from backbone.log_lines import timed_event_json
-from backbone.mission_log import Log
+from backbone.mission_log.lines import timed_event_json
+from backbone.mission_log.log import Log
 from backbone.moments import Now
 
 PART_EVENTS = 100  # chosen: more than a screen shows

@@ -18,9 +18,9 @@ from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
-from backbone.log_lines import event_json
+from backbone.mission_log.lines import event_json
+from backbone.mission_log.operators import OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.operators import OperatorAction
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope, plain
 from resource_pool.arc_client import Frame

@@ -12,7 +12,7 @@ import msgspec
 
 from backbone.bus.interface import Clock
 from backbone.errors import LinkError, Refusal, code_of
-from backbone.log_question import LogQuestion
+from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel

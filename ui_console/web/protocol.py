@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from backbone.log_question import LONGEST_WORDS
+from backbone.mission_log.question import LONGEST_WORDS
 from backbone.ranges import EXACT
 from ui_console.model.consent import MAX_WHY
 from ui_console.web.login import BeatRequest, Hello, ShortText

@@ -12,7 +12,7 @@ import msgspec
 
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
-from backbone.endings import ExitCode, say
+from backbone.launcher.endings import ExitCode, say
 from ui_console.session.joining import Where, end_server_on_signals, join, write_line
 from ui_console.web.encryption import encryption_with
 from ui_console.web.hub import WebHub

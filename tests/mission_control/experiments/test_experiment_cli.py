@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from backbone.cli import app
+from backbone.command_line.cli import app
 from backbone.mission.reader import read_mission
 from mission_control.experiments.plot import NoPlotting, require_plotting
 

@@ -25,8 +25,8 @@ from hypothesis import strategies as st
 
 from backbone.component.messages import LifeState, Parameters, SetParameter, Statistics, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.nameserver.messages import Components, Disappeared
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule, Why

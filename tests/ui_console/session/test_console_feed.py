@@ -14,8 +14,8 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence, StoryEvent
 from backbone.creator.messages import HostLoad, ProcessFell
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import LAUNCHER, Subsystem
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases

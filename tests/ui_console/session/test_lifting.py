@@ -16,8 +16,8 @@ from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
+from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
-from backbone.operators import OperatorActed, OperatorAction
 from backbone.wire import Envelope
 from resource_pool.arc_client import Stopper, StopState
 from resource_pool.stop_latch import StopLatch

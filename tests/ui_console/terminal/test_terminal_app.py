@@ -18,7 +18,7 @@ from written_session import WrittenSession, settle
 
 from backbone.component.messages import StoryEvent
 from backbone.errors import Refusal
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
 from resource_pool.arc_client import Suspended
 from ui_console.model.consent import Consent, Settled, Sought
 from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick

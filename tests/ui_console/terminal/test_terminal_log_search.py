@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backbone.component.messages import StoryEvent
-from backbone.log_question import LogQuestion
-from backbone.mission_log import AskLog, Log
+from backbone.mission_log.log import AskLog, Log
+from backbone.mission_log.question import LogQuestion
 from ui_console.terminal.log_search import FOUND_SHOWN, LogResult, read_search
 
 

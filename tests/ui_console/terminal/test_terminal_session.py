@@ -14,7 +14,7 @@ from textual.pilot import Pilot
 
 from backbone.bus.clock import MissionClock
 from backbone.component.messages import LifeState
-from backbone.endings import ExitCode
+from backbone.launcher.endings import ExitCode
 from ui_console.model.events import Heard
 from ui_console.session.gamepad import BTN_EAST, BTN_NORTH, EV_KEY
 from ui_console.session.observer import Observer

@@ -19,7 +19,7 @@ from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
-from backbone.mission_log import AskLog, AskPeople, MissionLog, PeopleKnown
+from backbone.mission_log.log import AskLog, AskPeople, MissionLog, PeopleKnown
 from backbone.naming import LAUNCHER, Subsystem, address
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
