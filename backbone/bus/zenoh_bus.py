@@ -370,7 +370,9 @@ class ZenohBus(BusBase):
         pattern = key(self._mission, address, Conversation.ALIVE)
         return self._declare(
             self._session.liveliness().declare_subscriber(
-                pattern, lambda sample: self.push(changed, sample), history=True
+                pattern,
+                zenoh.handlers.Callback(lambda sample: self.push(changed, sample), indirect=False),
+                history=True,
             )
         )
 
