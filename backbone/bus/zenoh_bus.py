@@ -32,6 +32,7 @@ from backbone.bus.interface import (
     Reply,
     Subscription,
 )
+from backbone.bus.sockets import close_without_waiting
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (
@@ -155,6 +156,16 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         raise _unreachable(config, error) from error
 
 
+def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
+    """Keep the close of this session's TCP links from blocking, while the result is kept."""
+
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
+            close_without_waiting()
+
+    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
+
+
 async def close_session(session: zenoh.Session) -> None:
     """Close the session; return when its threads have ended."""
     await asyncio.get_running_loop().run_in_executor(None, session.close)
@@ -182,6 +193,7 @@ class ZenohBus(BusBase):
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
         self._session, self._is_hub, self._shared = session, is_hub, shared
+        self._links = None if shared else watch_links(session)
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()
