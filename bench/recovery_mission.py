@@ -66,9 +66,17 @@ class Look:
 
 @dataclass
 class Watch:
-    """What an observer of its own process saw, growing while it watches."""
+    """What an observer of its own process saw, growing while it watches.
+
+    Attributes:
+        process: The observer.
+        origin_s: When the mission's clock was 0, monotonic clock of the machine.
+        looks: Its looks.
+        pictures_s: When pictures came.
+    """
 
     process: subprocess.Popen[str]
+    origin_s: float = 0.0
     looks: list[Look] = field(default_factory=list)
     pictures_s: list[float] = field(default_factory=list)
 
@@ -80,6 +88,8 @@ class Watch:
             said = json.loads(line)
             if "frame" in said:
                 self.pictures_s.append(said["frame"])
+            elif "origin" in said:
+                self.origin_s = said["origin"]
             else:
                 sight = said.get("sight", sight)
                 self.looks.append(Look(said["began"], said["t"], sight))

@@ -205,10 +205,10 @@ def serve(
     secret_file: SecretFile = None,
 ) -> None:
     """Serve the console, or with --design the mission designer, as a web page: for browsers, tablets and phones."""
-    from ui_console.web.door import WrongOperator, passes_for, read_operator
+    from ui_console.web.login import WrongOperator, new_rights, read_operator
 
     try:
-        passes = passes_for([read_operator(one) for one in operator or []], priority)
+        rights = new_rights([read_operator(one) for one in operator or []], priority)
     except WrongOperator as wrong:
         raise _usage(f"--operator {wrong}") from wrong
     if key and not certificate:
@@ -217,14 +217,14 @@ def serve(
         raise _usage("--design serves a mission file; --mission and --connect are for missions that are up")
     try:
         from ui_console.design.serving import serve_designer
-        from ui_console.web.serving import Claims, Site, serve_console
+        from ui_console.web.serving import Claims, ServerOptions, serve_console
     except ModuleNotFoundError as missing:
         raise _usage(f"{missing.name} is not installed; install scout-backbone[web]") from missing
-    site, claims = Site(host, port, certificate, key, new_tokens), Claims(kind, away_after)
+    options, claims = ServerOptions(host, port, certificate, key, new_tokens), Claims(kind, away_after)
     if design:
-        run(lambda: serve_designer(design, passes, site))
+        run(lambda: serve_designer(design, rights, options))
     where = chosen(mission, connect, secret_file)
-    run(lambda: serve_console(where, passes, site, claims))
+    run(lambda: serve_console(where, rights, options, claims))
 
 
 @app.command(hidden=True, context_settings={"ignore_unknown_options": True, "allow_extra_args": True})

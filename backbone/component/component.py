@@ -90,8 +90,6 @@ class Component(Generic[P]):
 
     Args:
         launch: Name, type, host and initial parameters of this component.
-        bus: An open bus.
-        clock: The mission's clock.
 
     Raises:
         WrongParameter: The launch's parameters do not fit ``parameters_type``.

@@ -28,7 +28,6 @@ class Absence(Message, frozen=True):
     """A component that its owner wants and that does not run, or does not respond.
 
     Attributes:
-        name: Name of the absent component.
         since_s: Mission time at which its owner found it missing.
         cause: Why it is absent: how it ended, or the refusal of its start. One line.
         doing: What its owner does to start it, one line; empty: nothing.
@@ -68,11 +67,8 @@ class ComponentState(Message, frozen=True):
     Attributes:
         address: ``<subsystem>/<name>``.
         type: Component type as named in the mission file.
-        host: Host it runs on.
-        pid: Its process.
         state: State of its life cycle.
         since_s: Mission time at which it entered that state.
-        feedback: Its present work, one line for people.
         requester: Address of its owner.
         absent: Absent components that this one wants.
         stop: The emergency stop in force on it; None: no stop.
@@ -122,7 +118,6 @@ class MissionTime(Message, frozen=True):
 
     Attributes:
         at_s: Mission time of the answer.
-        rate: Mission seconds per second of the machine.
     """
 
     at_s: Instant
@@ -153,9 +148,7 @@ class SetParameter(Message, frozen=True):
     """Set a parameter. If the value does not fit, the component refuses and changes nothing.
 
     Attributes:
-        name: Name of the parameter.
         value: The new value.
-        user: The person who sets it, for the story.
     """
 
     name: Mention
@@ -186,7 +179,6 @@ class StoryEvent(Message, frozen=True):
     """One event of a component.
 
     Attributes:
-        at_s: Mission time.
         where: Address of the component that recorded it.
         what: The event, past tense, one line.
         subject: Name of its subject.
@@ -214,7 +206,6 @@ class Stop(Message, frozen=True):
     """End in good order: finish the work in progress, go to the safe state, leave.
 
     Attributes:
-        reason: Reason, for the story.
         incarnation: The incarnation to stop, see ``Launch.incarnation``; empty: any. Another incarnation of the
             address refuses with ``OtherIncarnation``.
     """

@@ -31,10 +31,8 @@ class Offered:
     """The offered machine, and the mission that may use it.
 
     Attributes:
-        mission: Name of the mission.
         endpoint: Endpoint of the mission's hub.
         host: Name of this machine in the mission.
-        tags: Tags of this machine.
         secret: Secret of the mission; empty: the hub asks for none.
     """
 
@@ -67,12 +65,8 @@ class KeepsCreator(Protocol):
 class KeptCreator:
     """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
 
-    Args:
-        launch: Launch of the offer.
-
     Attributes:
         on_fell: Called when the creator has ended unexpectedly.
-        on_changed: Called when ``absences()`` may have changed.
     """
 
     def __init__(self, launch: Launch, offered: Offered) -> None:

@@ -35,7 +35,6 @@ class Components(Message, frozen=True):
     """Answer to ``ListComponents``, sorted by address.
 
     Attributes:
-        components: The registered components.
         complete: False for ``RECONNECT_S`` after a restart of the hub, while components still reconnect: a missing
             component may then be alive.
         hub_since_s: Mission time at which the hub began to listen.

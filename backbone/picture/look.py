@@ -36,11 +36,8 @@ async def look(
     """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of what they say.
 
     Args:
-        bus: To ask on.
-        now_s: Mission time.
         before: The picture to take it into: an absence keeps its beginning, and a nameserver that does not answer
             leaves it as it was, marked as stale. None: a new one.
-        rate: Mission seconds per second of the machine.
         schedule: False: ask the RC manager only whether it lives.
 
     Raises:

@@ -49,7 +49,6 @@ class MissionPicture:
     """A mission as far as it was heard of.
 
     Attributes:
-        mission: Its name.
         at_s: Mission time of the last look.
         components: Who is there, by address.
         processes: What creators and launcher say of their processes, by component name.
@@ -57,7 +56,6 @@ class MissionPicture:
         problems: Services that did not answer, and what the picture lacks.
         missed: What this observer misses: services that did not answer, components that failed, hang or ended.
         stale_since_s: Mission time at which the rest of the picture was true; None: now.
-        rate: Mission seconds per second of the machine.
         log: The newest of what happened, and who sits at which console.
     """
 
@@ -81,7 +79,6 @@ class MissionPicture:
         """Take a message in.
 
         Args:
-            said: The message.
             source: Address of the component that said it.
         """
         match said:
@@ -181,8 +178,6 @@ def misses(
     Args:
         components: Who is registered.
         processes: What is kept by launcher and creators.
-        now_s: Mission time.
-        rate: Mission seconds per second of the machine.
     """
     found = {
         component_of(c.address): Absence(component_of(c.address), c.since_s, c.feedback or "it failed", _RESTARTS)

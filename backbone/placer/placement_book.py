@@ -52,7 +52,6 @@ class PlacementRecord:
     Attributes:
         spawn: The order to its creator.
         pin: The only possible host; empty: any.
-        phase: Its phase.
         host: The host on which it runs or starts; empty: none.
         pid: Its process; 0 if unknown.
         since_s: Mission time of the last decision about it.

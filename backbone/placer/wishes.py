@@ -36,7 +36,6 @@ class Wish:
     """One wanted component; times are mission seconds.
 
     Attributes:
-        name: The component.
         missing_since_s: Mission time at which it was found missing; negative: it is placed, or is being started.
         cause: Why it is missing.
         started: True if it was ever placed.
@@ -84,10 +83,8 @@ async def keep_placed(
     """Place the component, and place it again whenever it is missing; return the reason of the order that stops it.
 
     Args:
-        bus: Bus of the owner.
         wish: The owner's wish for this component.
         order: Order that starts it.
-        address: Address of the component.
         on_placed: Called after each start, with True if the component ran already.
         on_changed: Called when ``wish.absence()`` may have changed.
         patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be

@@ -53,8 +53,6 @@ class ContextSwitch:
     """Speaks to RCs and ARCs on behalf of the schedule manager.
 
     Args:
-        bus: Of the RC manager.
-        clock: The mission's time.
         note: Keeps that something happened to a subject.
         may_leave: Says whether an RC need not be waited for when an ARC loses it: it is down, or has no other holder.
     """

@@ -23,7 +23,6 @@ def contradiction(state: RcState, resource: Resource, now_s: float, given: int |
     Args:
         state: As the RC says.
         resource: As the mission file says.
-        now_s: Mission time.
         given: Largest epoch given for this RC so far; None if an earlier RC manager may have given larger ones.
     """
     if state.name != resource.name:

@@ -165,7 +165,6 @@ class Connect(Message, frozen=True):
     """Serve this ARC from now on.
 
     Attributes:
-        arc: Name of the ARC.
         epoch: Larger than every earlier epoch of this RC.
         lease_s: Seconds of mission time after which the hold ends unless renewed.
         use: How the ARC uses this RC.
@@ -213,8 +212,6 @@ class RcState(Message, frozen=True):
     """Answer to ``AskRc``: the truth about this resource.
 
     Attributes:
-        name: The RC.
-        kind: Its type.
         sharable: True if several ARCs may hold it.
         capacity: Share of its time it can give.
         holders: Who holds it now.
@@ -242,7 +239,6 @@ class Leases(Message, frozen=True):
     renewed here, or one that is called missing.
 
     Attributes:
-        leases: All holds that are renewed.
         lease_s: For how long, seconds of mission time.
         missing: RCs that do not answer, as far as the RC manager knows.
     """

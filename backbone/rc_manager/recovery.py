@@ -93,12 +93,7 @@ def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
 
 
 class Recovery:
-    """Asks nameserver, RCs and ARCs.
-
-    Args:
-        bus: Of the RC manager.
-        clock: The mission's time.
-    """
+    """Asks nameserver, RCs and ARCs."""
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._bus, self._clock = bus, clock

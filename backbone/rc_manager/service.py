@@ -28,9 +28,9 @@ from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
+from backbone.rc_manager.beats import Beats
 from backbone.rc_manager.context_switch import ContextSwitch
 from backbone.rc_manager.messages import (
-    BEAT_MISSED_S,
     RENEW_EVERY_S,
     AskAttributes,
     AskRequest,
@@ -127,7 +127,7 @@ class RcManager(Component[RcManagerParameters]):
         self.answers = Answers(self.manager)
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
-        self._beats: dict[str, float] = {}
+        self._beats = Beats(clock.rate)
         self._requesting: Counter[str] = Counter()
         self._switches: dict[str, asyncio.Task[None]] = {}
         self._wake = asyncio.Event()
@@ -200,7 +200,7 @@ class RcManager(Component[RcManagerParameters]):
                 return await self._request(request)
             case Withdraw(arc=arc, reason=reason):
                 self._uses.pop(arc, None)
-                self._beats.pop(arc, None)
+                self._beats.forget(arc)
                 self.happened(Departed(arc, reason or "self"))
             case SetIdle(arc=arc, idle=idle):
                 self.happened(Idled(arc) if idle else Wanted(arc))
@@ -253,7 +253,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def _remember(self, request: SchedulingRequest, rcs: tuple[str, ...]) -> None:
         self._uses[request.arc] = next(uses for uses in request.alternatives if set(uses) == set(rcs))
-        self._beats[request.arc] = self.clock.now_s()
+        self._beats.heard(request.arc, self.clock.now_s())
 
     # ------------------------------------------------------------------ decide, then do
     def happened(self, event: Event, at_s: float | None = None) -> None:
@@ -391,7 +391,7 @@ class RcManager(Component[RcManagerParameters]):
             self.happened(RcWentDown(name))
         elif name in self._uses:
             self._uses.pop(name)
-            self._beats.pop(name, None)
+            self._beats.forget(name)
             self.happened(Departed(name, "dead"))
 
     def _link_changed(self, up: bool) -> None:
@@ -426,10 +426,8 @@ class RcManager(Component[RcManagerParameters]):
         """Renew the leases of ARCs whose beat is fresh; end the hold of those that hang."""
         rate = self.clock.rate
         while True:
-            now_s = self.clock.now_s()
-            for arc in [arc for arc, at_s in self._beats.items() if now_s - at_s > BEAT_MISSED_S * rate]:
-                log.warning("%s has not beaten for %.1f s", arc, (now_s - self._beats[arc]) / rate)
-                del self._beats[arc]
+            for arc, silent_s in self._beats.look(self.clock.now_s()).items():
+                log.warning("%s has not beaten for %.1f s", arc, silent_s)
                 self._uses.pop(arc, None)
                 self.happened(Departed(arc, "silent"))
             self._publish_leases()
@@ -455,7 +453,7 @@ class RcManager(Component[RcManagerParameters]):
     def _heard_beat(self, envelope: Envelope[Any]) -> None:
         arc = envelope.body.arc
         if arc in self._uses:
-            self._beats[arc] = self.clock.now_s()
+            self._beats.heard(arc, self.clock.now_s())
         elif arc not in self._switches and not self._requesting[arc]:
             self._switch(arc, lambda: self._meet_arc(arc))
 

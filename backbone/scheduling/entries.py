@@ -25,9 +25,7 @@ class RcEntry:
     """One RC as the schedule sees it.
 
     Attributes:
-        name: Its name.
         kind: Its type, for people.
-        sharable: True if several ARCs may hold it by streams.
         capacity: Part of its time it can give, 0 to 1.
         connect_s: Settling time.
         disconnect_s: Release time.
@@ -96,7 +94,6 @@ class ArcEntry:
         has_forced: A holder lost its RCs in the middle of a slice for it, since it was queued.
         retry_s: When it counts again, after it could not open or left too often; None: when it wants time.
         retry_why: Why not sooner.
-        turns: Slices so far.
         had_s: Time it had, as the discipline ``time`` counts it; without the run that goes on.
         raised: Levels by which it rose because it waited long (aging).
         swapped_out: Why it lost its RCs last; empty: never.

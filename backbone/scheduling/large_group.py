@@ -32,7 +32,6 @@ class LargeGroupPlanner:
         """Begin with no ARC to look at.
 
         Args:
-            table: What is asked.
             slack_s: By how much two reservations may overlap.
         """
         self._table = table
@@ -121,7 +120,6 @@ class LargeGroupPlanner:
         """Return from when its RCs are reserved for the ARC: when its holders go and others first in line have run.
 
         Args:
-            arc: The ARC.
             now_s: From when on.
             behind: Those that asked for this: they do not wait for themselves, though being equal is not transitive.
         """

@@ -23,7 +23,6 @@ class Slot(NamedTuple):
     """The place the plan found for an ARC.
 
     Attributes:
-        arc: The ARC.
         start_s: When its RCs begin to settle; infinite: never, as things are.
         against: Who shares an RC with it and stands in its way for a time.
     """

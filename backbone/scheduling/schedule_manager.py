@@ -88,7 +88,6 @@ class ScheduleManager:
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
-            mission_priority: Its number among the consoles.
             goes_on: True if the trace goes on after that of an earlier RC manager.
             planner: Plans all groups; None: those of this package do.
         """
@@ -121,10 +120,6 @@ class ScheduleManager:
         """Take note of what happened and decide what follows from it.
 
         An event about an ARC or RC that is not known, or one that came too late to matter, changes nothing.
-
-        Args:
-            event: What happened.
-            now_s: Mission time of the decision.
 
         Returns:
             Instructions in the order in which they must be carried out.

@@ -38,9 +38,7 @@ class Transitions:
     """Changes the state and keeps what follows for the loop.
 
     Attributes:
-        state: What is so now.
         trace: Writes the lines.
-        now_s: Time of the decision.
         instructions: What follows from the decision so far, in order.
     """
 

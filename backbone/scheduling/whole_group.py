@@ -36,7 +36,6 @@ class WholeGroupPlanner:
         """Begin with nowhere to look.
 
         Args:
-            table: What is asked.
             slack_s: By how much two reservations may overlap. Hand-over takes time: without it an ARC never fits a
                 gap that is exactly as long as its slice.
         """

@@ -40,9 +40,6 @@ class DriverSite:
     """A driver's interface to its RC.
 
     Attributes:
-        resource: Name of the resource.
-        bus: Bus, for drivers of simulated hardware.
-        clock: The mission's clock.
         parameters: The RC's parameters; the driver's own are in ``options``, checked by its ``options_type``.
         tell: Publishes one line to the mission's log.
         fail: Ends the RC because of this bug or fault; its creator restarts it, and it opens the device again.

@@ -1,10 +1,10 @@
-"""What a person wants of a robot, and for how long a pressed key counts.
+"""Drive commands of a person, and for how long a pressed key counts.
 
 Rules of this file: no bus, no clock; times are seconds of the machine, for hands do not speed up
 with the mission's clock.
 
-A terminal tells that a key is pressed, and again and again while it is held, never that it is let
-go. So a command stands for a moment after the last press and ends by itself (dead-man).
+A terminal reports each press of a key and its repeats while the key is held, never its release. So a command lasts for
+a moment after the last press and ends by itself (dead-man).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class GiveBack:
 
 @dataclass(frozen=True, slots=True)
 class StopRobot:
-    """Emergency stop of one robot, whoever holds it."""
+    """Emergency stop of one robot, regardless of its holder."""
 
     robot: str
     reason: str = ""
@@ -64,7 +64,7 @@ Wish = Command | GiveBack | StopRobot | StopAll
 
 Direction = Literal["forward", "backward", "left", "right"]
 
-STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages say what they want
+STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages send their wish
 
 
 def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> Drive:
@@ -116,14 +116,14 @@ class DriveSpan:
         self._began_s: float | None = None
 
     def begins(self, command: Command, at_s: float) -> bool:
-        """Take in a command that was applied; return True if a drive begins with it."""
+        """Take in an applied command; return True if a drive begins with it."""
         if self._began_s is not None or not isinstance(command, Drive):
             return False
         self._began_s = at_s
         return True
 
     def ends(self, at_s: float) -> float | None:
-        """The wheels stand, or the robot is gone: return how long the drive took, seconds; None: there was none."""
+        """End the drive: the wheels stand, or the robot is gone. Return its duration, seconds; None: there was none."""
         began_s, self._began_s = self._began_s, None
         return None if began_s is None else max(0.0, at_s - began_s)
 
@@ -142,15 +142,15 @@ class DeadMan:
         self._must_halt = False
         self._keys, self._stick, self._jump = Grip(), Grip(), Grip()
 
-    # ------------------------------------------------------------------ the hands
+    # ------------------------------------------------------------------ controls
     def press(self, drive: Drive, now_s: float, lasts_s: float | None = None) -> bool:
-        """A key is down, for the first time or again; return whether that counts.
+        """Take in that a key is down, for the first time or again; return whether that counts.
 
         Args:
-            drive: What it stands for.
+            drive: The command of the key.
             now_s: When.
-            lasts_s: How long that counts, for what says so again and again while it is held and tells when it is let
-                go; None: for a key, whose rhythm is found out.
+            lasts_s: How long the press counts, for a control that reports repeatedly while it is held and reports its
+                release; None: for a key, whose repeat rate is measured.
         """
         grip, silence_s = (self._keys, KEYS_LET_GO_S) if lasts_s is None else (self._stick, lasts_s)
         if not grip.press(now_s, silence_s):
@@ -167,23 +167,23 @@ class DeadMan:
         else:
             self._repeats, hold_s, self._next_s = 0, FIRST_HOLD_S, now_s
         self._held, self._pressed_s, self._until_s = drive, now_s, now_s + hold_s
-        self._must_halt = False  # what is held now comes in its place, and ends with one
+        self._must_halt = False  # the new press replaces the halt, and ends with one
         return True
 
     def press_jump(self, now_s: float) -> bool:
-        """The key or button for one jump is down, for the first time or again; return whether that counts."""
+        """Take in that the key for one jump is down, for the first time or again; return whether that counts."""
         return self._jump.press(now_s, KEYS_LET_GO_S)
 
     def stop(self) -> None:
-        """Nothing is held any more: a halt is due at once, also if nothing was.
+        """Take in that all controls are released: a halt is due at once, also if none was held.
 
-        A stick, pad or page says by this that it was let go; keys show it by a pause.
+        A stick, pad or page reports its release by this call; keys show theirs by a pause.
         """
         self._held, self._must_halt = None, True
         self._stick.let_go()
 
     def require_let_go(self) -> None:
-        """From now on presses move nothing until the control was let go; what is held now ends with a halt."""
+        """Ignore presses until the control was let go; the present drive ends with a halt."""
         self._must_halt = self._must_halt or self._held is not None
         self._held = None
         for grip in self._grips:
@@ -193,7 +193,7 @@ class DeadMan:
         """Return whether a control is held that has to be let go before it moves anything."""
         return any(grip.is_held_back(now_s) for grip in self._grips)
 
-    # ------------------------------------------------------------------ what is to be sent
+    # ------------------------------------------------------------------ commands to send
     def due(self, now_s: float) -> Drive | Halt | None:
         """Return the command to send now, if one is due; asking counts as sending."""
         if self._held is not None and now_s >= self._until_s:
@@ -208,7 +208,7 @@ class DeadMan:
 
     @property
     def next_s(self) -> float | None:
-        """When something will be due next; None: not before a press."""
+        """When the next command is due; None: not before a press."""
         if self._must_halt:
             return 0.0
         return None if self._held is None else min(self._next_s, self._until_s)

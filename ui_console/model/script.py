@@ -1,4 +1,4 @@
-"""Driving by a script: one JSON object a line, each with the time since the grant at which it holds.
+"""Driving by a script: one JSON object a line, each with the time since the grant from which it applies.
 
 ``{"at_s": 0.5, "left_rad_s": 4, "right_rad_s": 4}`` drives until the next line, ``{"at_s": 1, "halt":
 true}`` stops, ``{"at_s": 2, "jump": true}`` jumps, ``{"at_s": 3, "release": true}`` gives the robot
@@ -44,12 +44,12 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One line of a script: from this time since the grant, this is wanted.
+    """One line of a script: the wish from this time since the grant on.
 
     Attributes:
         at_s: That time.
-        wish: What is wanted.
-        at_once: True: if it comes from a pipe, it is wanted now.
+        wish: The command.
+        at_once: True: if it comes from a pipe, it applies now.
     """
 
     at_s: float
@@ -67,7 +67,7 @@ class ScriptReader:
         """Return the step of the next line, None for an empty one.
 
         Raises:
-            WrongScript: With the line's number and what is wrong with it.
+            WrongScript: A line is not valid; with its number and its fault.
         """
         self._number += 1
         if not text.strip():
@@ -130,7 +130,7 @@ class ScriptPlayer:
 
     Laws: no command before its time; a drive is repeated until the next line, as commands end by
     themselves at the robot; nothing after ``GiveBack``, which comes exactly once; after ``require_let_go`` no drive and
-    no jump before a halt: what a hand does by letting go, a script does by that line.
+    no jump before a halt: in a script this line stands for letting go of a control.
     """
 
     def __init__(self, steps: list[Step] | None = None) -> None:
@@ -143,7 +143,7 @@ class ScriptPlayer:
         """How many lines were left out because no halt came before them."""
 
     def require_let_go(self) -> None:
-        """From now on lines move nothing before one of them halts."""
+        """Ignore drives and jumps until a line halts."""
         self._drive, self.must_let_go = None, True
 
     @property
@@ -152,15 +152,15 @@ class ScriptPlayer:
         return self._over
 
     def add(self, step: Step) -> None:
-        """Another step arrived; one whose time has passed is due at once."""
+        """Add a step; a step whose time has passed is due at once."""
         self._steps.append(step)
 
     def end(self) -> None:
-        """No step will follow."""
+        """Note that no step will follow."""
         self._ended = True
 
     def due(self, since_grant_s: float) -> list[Wish]:
-        """Return what is to be done now, in order; asking counts as doing.
+        """Return the commands to send now, in order; a command returned counts as sent.
 
         Args:
             since_grant_s: Mission seconds since the grant.
@@ -187,7 +187,7 @@ class ScriptPlayer:
 
     @property
     def next_s(self) -> float | None:
-        """Seconds since the grant at which something is due next; None: not before another step arrives."""
+        """Seconds since the grant at which the next command is due; None: not before another step arrives."""
         if self._over:
             return None
         times = [self._steps[0].at_s] if self._steps else [0.0] if self._ended else []

@@ -1,10 +1,10 @@
 """Driving by a gamepad: a stick that counts only while the dead-man button is held.
 
-``Stick`` is pure: what the device says goes in, what is wanted comes out. ``play_gamepad`` is the loop around it. The
+``Stick`` is pure: events of the device go in, drive commands come out. ``play_gamepad`` is the loop around it. The
 device is read through evdev, which is an extra (``pip install 'scout-backbone[gamepad]'``, Linux only).
 
-A gamepad tells when a button is let go; one that is unplugged or out of range tells nothing, so what is wanted is said
-again every ``SAY_EVERY_S`` and ends by itself.
+A gamepad reports when a button is let go; a gamepad that is unplugged or out of range reports nothing, so the drive
+command is repeated every ``SAY_EVERY_S`` and ends by itself.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SAY_EVERY_S = 0.1  # chosen: a third of ``STICK_LASTS_S``; machine seconds
 
 
 class PadWish(StrEnum):
-    """What a button asks for."""
+    """Action of a button."""
 
     JUMP = "jump"
     TAKE = "take"
@@ -68,16 +68,16 @@ class GamepadEvent(Protocol):
 
 
 class Gamepad(Protocol):
-    """What is used of evdev's ``InputDevice``."""
+    """The used part of evdev's ``InputDevice``."""
 
     def async_read_loop(self) -> AsyncIterator[GamepadEvent]:
-        """Yield what it says; raise ``OSError`` when it is gone."""
+        """Yield its events; raise ``OSError`` when it is gone."""
 
 
 class Stick:
-    """Turns what the device says into what is wanted.
+    """Turns events of the device into drive commands.
 
-    Law: without the dead-man button nothing drives, wherever the stick is.
+    Law: without the dead-man button the robot does not drive, in any position of the stick.
 
     Args:
         ranges: Axis → least and largest value.
@@ -89,7 +89,7 @@ class Stick:
         self._held: set[int] = set()
 
     def feel(self, event: GamepadEvent) -> PadWish | None:
-        """Take in one event; return what a button that was just pressed asks for."""
+        """Take in one event; return the action of a button that was just pressed."""
         if event.type == EV_ABS and event.code in self._at and event.code in self._ranges:
             least, most = self._ranges[event.code]
             share = 2 * (event.value - least) / max(1, most - least) - 1
@@ -104,7 +104,7 @@ class Stick:
         return None
 
     def wanted(self, speed_rad_s: float) -> Drive | None:
-        """Return what is wanted now; None: the dead-man button is not held."""
+        """Return the drive command now; None: the dead-man button is not held."""
         if not self._held:
             return None
         return drive_by_stick(-self._at[ABS_Y], self._at[ABS_X], speed_rad_s)
@@ -142,8 +142,8 @@ async def play_gamepad(
     Args:
         device: Already open.
         stick: Fresh.
-        hold: Called again and again while the dead-man button is held, with how long that counts.
-        stop: Called when it is let go.
+        hold: Called repeatedly while the dead-man button is held, with the time a call counts.
+        stop: Called when the button is let go.
         wish: Called for each button pressed.
         speed_rad_s: Returns the speed of the wheels at full forward.
     """
@@ -189,7 +189,7 @@ async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
 
 
 def buttons_help() -> list[str]:
-    """Return for people what the gamepad's buttons do."""
+    """Return the actions of the gamepad's buttons, for people."""
     names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",

@@ -1,8 +1,8 @@
-"""One person at two screens: a robot follows them to the screen at which they asked for it last.
+"""One person at two screens: a robot follows its operator to the screen of the newest claim.
 
 Two claims of one person would otherwise take the robot from each other turn by turn. A console that waits for a robot
-that the same person holds at another console settles it with that console; others are asked for their consent, see
-``consent``. Who a person is is what consoles say; a script keeps what it drives.
+that the same person holds at another console settles it with that console; it asks other persons for their consent, see
+``consent``. Consoles state the name of their person; a script keeps its robot.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from ui_console.session.observer import Observer
 
 
 class AskHandOver(Message, frozen=True):
-    """I want the robot here now. Asked by a console of the console that holds it.
+    """A console asks the console that holds a robot to give it up to the same person.
 
     Attributes:
-        robot: Which.
-        user: Who sits at the asker.
-        since_s: When they asked for it there.
+        robot: The robot.
+        user: The person at the asking console.
+        since_s: When that person claimed it there.
     """
 
     robot: Mention
@@ -37,11 +37,11 @@ class AskHandOver(Message, frozen=True):
 
 
 class Outcome(StrEnum):
-    """What becomes of two claims."""
+    """Outcome of two claims."""
 
-    GIVEN = "given"  # it is free for the asker
-    NEWER = "newer"  # the same person asked for it here later: the asker's claim is over
-    NOT_YOURS = "not_yours"  # somebody else holds it, or nobody, or a script
+    GIVEN = "given"  # the robot is free for the asker
+    NEWER = "newer"  # the same person claimed it here later: the asker's claim is over
+    NOT_YOURS = "not_yours"  # another person, no one, or a script holds it
 
 
 class HandedOver(Message, frozen=True):
@@ -51,13 +51,13 @@ class HandedOver(Message, frozen=True):
 
 
 def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_script: bool) -> Outcome:
-    """Return what becomes of the asker's claim.
+    """Return the outcome for the asker's claim.
 
     Args:
-        asked: What the other console wants.
-        user: Who sits here; empty: nobody in person.
-        robot: What is held here; empty: nothing.
-        since_s: When it was asked for here.
+        asked: The other console's question.
+        user: The person at this console; empty: none.
+        robot: The robot held here; empty: none.
+        since_s: When it was claimed here.
         by_script: A script drives it.
 
     Example:
@@ -71,7 +71,7 @@ def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_scri
 
 
 class HandOver:
-    """The talk between the screens of one person.
+    """Messages between the screens of one person.
 
     Args:
         console: One of them.
@@ -83,11 +83,11 @@ class HandOver:
         self._reason = f"{console.user} goes on at another screen"
 
     async def settle(self, robot: str, since_s: float) -> None:
-        """Have this person's other screen give up the robot, or give the claim for it up if that one is newer.
+        """Ask this person's other screen to give up the robot; give up this claim if the other one is newer.
 
         Args:
-            robot: What is waited for here.
-            since_s: When it was asked for.
+            robot: The robot this console waits for.
+            since_s: When it was claimed.
 
         Raises:
             LinkError: The RC manager did not answer.
@@ -104,7 +104,7 @@ class HandOver:
                 return
 
     async def answer(self, asked: AskHandOver, robot: str, since_s: float, *, by_script: bool) -> HandedOver:
-        """Give the robot back if the person who sits here goes on elsewhere; see ``decide``."""
+        """Give the robot back if this console's person goes on at another one; see ``decide``."""
         outcome = decide(asked, self._console.person(), robot, since_s, by_script=by_script)
         if outcome is Outcome.GIVEN:
             await self._give_back(self._reason)
@@ -113,6 +113,6 @@ class HandOver:
     async def _ask(self, holder: str, question: AskHandOver) -> Outcome:
         try:
             answer = await self._console.bus.ask(holder, question, HandedOver, within_s=REPLY_TIME_S)
-        except (Refusal, LinkError):  # a console of another make, or one that is gone: the scheduler's rule decides
+        except (Refusal, LinkError):  # a console of another make, or a console that left: the scheduler's rule decides
             return Outcome.NOT_YOURS
         return answer.outcome

@@ -1,4 +1,4 @@
-"""How a console's process joins a mission: who it is there, its clock, its bus, and the signals that end it."""
+"""How a console's process joins a mission: its name there, its clock, its bus, and the signals that end it."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Joining:
     """A console that has not opened its bus yet.
 
     Attributes:
-        launch: Who it is.
+        launch: Its identity.
         clock: The mission's clock.
-        secret: What the mission's hub asks for.
+        secret: The secret of the mission's hub.
     """
 
     launch: Launch
@@ -43,7 +43,7 @@ class Joining:
         """Return the bus once the hub has answered.
 
         Args:
-            launch: Who joins; None: this console.
+            launch: Identity of the component that joins; None: this console.
         """
         who = launch or self.launch
         config = client_config(who.endpoint, self.secret)
@@ -51,7 +51,7 @@ class Joining:
 
 
 async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joining:
-    """Return who this process is in the mission.
+    """Return the identity of this process in the mission.
 
     Args:
         where: The mission.
@@ -87,12 +87,12 @@ async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joinin
 
 
 def end_on_signals(console: Observer[Any]) -> Callable[[], bool]:
-    """Have the console end in good order on SIGINT and SIGTERM; return whether SIGINT came."""
+    """Make SIGINT and SIGTERM end the console in good order; the result returns whether SIGINT came."""
     return _end_on(console.end, signal.SIGINT, signal.SIGTERM)
 
 
 def end_server_on_signals(end: Callable[[str], None]) -> Callable[[], bool]:
-    """Have a server end in good order on SIGINT, SIGTERM and SIGHUP; return whether SIGINT came.
+    """Make SIGINT, SIGTERM and SIGHUP end a server in good order; the result returns whether SIGINT came.
 
     A SIGHUP that ``nohup`` ignores stays ignored.
 
@@ -122,7 +122,7 @@ def write_line(line: bytes) -> None:
 
 
 def _name_elsewhere(host: str) -> str:
-    """Return a console's name that those of other machines do not have: processes are numbered anew on each.
+    """Return a console's name that no console of another machine has: each machine numbers its processes anew.
 
     Example:
         >>> _name_elsewhere("Lab PC.local").rpartition("-")[0]

@@ -26,7 +26,7 @@ class ScriptDriver:
     """Plays one script on one console.
 
     Args:
-        write: Gets each line of JSON, without its end; must hand it on at once.
+        write: Called with each line of JSON, without its end; must write it at once.
         steps: The whole script; None: steps come by ``feed``.
         within_s: Mission seconds the grant may take; 0: any time.
     """
@@ -45,8 +45,8 @@ class ScriptDriver:
         self._stopped = self._is_unanswered = False
 
     def show(self, event: events.ConsoleEvent) -> None:
-        """Write the event, if it is one for scripts; commands without an answer are one line until there is one."""
-        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_told(event):
+        """Write the event if it is one for scripts; unanswered commands are one line until an answer comes."""
+        if isinstance(event, _FOR_SCREENS_ONLY) or self._is_repeated(event):
             return
         said = events.said(event)
         if isinstance(said, Suspended) and said.reason in UNDECIDED:
@@ -60,14 +60,14 @@ class ScriptDriver:
 
     @property
     def must_halt(self) -> bool:
-        """Whether its lines move nothing before one that halts."""
+        """Whether drives and jumps are ignored until a line halts."""
         return self._player.must_let_go
 
-    def _is_told(self, event: events.ConsoleEvent) -> bool:
-        """Take note of a silence and of its end; return whether the script knows of this silence."""
+    def _is_repeated(self, event: events.ConsoleEvent) -> bool:
+        """Note a missing answer, and the next answer; return True for a missing answer after another one."""
         if isinstance(event, events.LinkTrouble) and event.command:
-            is_told, self._is_unanswered = self._is_unanswered, True
-            return is_told
+            was_unanswered, self._is_unanswered = self._is_unanswered, True
+            return was_unanswered
         if isinstance(events.said(event), events.CommandApplied | events.Granted | Suspended):
             self._is_unanswered = False
         return False
@@ -109,7 +109,7 @@ class ScriptDriver:
         await self._play(console, console.clock.now_s())
 
     def exit_code(self, console: Teleoperation) -> int:
-        """Return what the command ends with: 0 only if the robot was granted and given back cleanly."""
+        """Return the command's exit code: 0 only if the robot was granted and given back cleanly."""
         if self._wrong is not None:
             return ExitCode.USAGE
         if console.refusal is not None or self._failed or self._player.held_back:
@@ -122,11 +122,11 @@ class ScriptDriver:
             self._news.clear()
             since_s, next_s = clock.now_s() - granted_s, self._player.next_s
             if next_s is not None and abs(since_s - next_s) < INSTANT_S:
-                since_s = next_s  # what was waited for is due, however the times were rounded
+                since_s = next_s  # the step is due now, regardless of rounding
             for wish in self._player.due(since_s):
                 match wish:
                     case GiveBack():
-                        self._tell_wrong(clock.now_s())
+                        self._show_wrong_line(clock.now_s())
                         await console.give_back("the script is over")
                         return
                     case StopRobot() | StopAll():
@@ -138,7 +138,7 @@ class ScriptDriver:
             await self._wait_news(console, granted_s)
 
     def _begin_stops(self) -> None:
-        """Carry out the emergency stops that count at once, if there is a console to do it by yet."""
+        """Carry out the emergency stops that count at once, if the console is there yet."""
         if self._console is None or not self._console.is_ready:
             return
         stops, self._stops = self._stops, []
@@ -146,7 +146,7 @@ class ScriptDriver:
             self._console.start_task(self._stop(self._console, stop), "stop")
 
     async def _stop(self, console: Teleoperation, stop: StopRobot | StopAll) -> None:
-        """Stop one robot or all; one that does not confirm it is told, and the script failed."""
+        """Stop one robot or all; if a robot does not confirm its stop, the script shows that and fails."""
         if isinstance(stop, StopRobot):
             is_sure = await console.stop_robot(stop.robot, stop.reason)
         else:
@@ -154,7 +154,7 @@ class ScriptDriver:
         self._failed = self._failed or not is_sure
 
     async def _wait_news(self, console: Teleoperation, granted_s: float) -> None:
-        """Return when the next step is due or another one arrived."""
+        """Return once the next step is due or another one arrived."""
         next_s = self._player.next_s
         wait_s = None
         if next_s is not None:
@@ -165,15 +165,15 @@ class ScriptDriver:
         except TimeoutError:
             return
 
-    def _tell_wrong(self, now_s: float) -> None:
+    def _show_wrong_line(self, now_s: float) -> None:
         if self._wrong is not None:
             self._write(events.event_json(events.failed(now_s, self._wrong)))
 
 
 def feed_from(descriptor: int, feed: Callable[[str | None], None]) -> None:
-    """Hand the lines read from a file descriptor to ``feed`` in this event loop, then None.
+    """Call ``feed`` in this event loop with each line read from a file descriptor, then with None.
 
-    The thread that reads dies with the process: a pipe that stays open holds nothing up.
+    The thread that reads dies with the process: a pipe that stays open delays nothing.
     """
     loop = asyncio.get_running_loop()
 

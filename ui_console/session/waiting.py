@@ -1,4 +1,4 @@
-"""While a console waits for a robot: why it does, and whether the same person holds it at another screen."""
+"""While a console waits for a robot: the reason, and a hold of the same person at another screen."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ log = logging.getLogger(__name__)
 
 
 class Waiting:
-    """Asks again whenever the schedule changed.
+    """Asks anew after each change of the schedule.
 
     Args:
-        console: Which waits.
-        hand_over: The talk with this person's other screens.
+        console: The console that waits.
+        hand_over: Messages with this person's other screens.
         waits_for: Returns the robot that the console waits for, and since when; None: it waits no more.
     """
 
@@ -35,7 +35,7 @@ class Waiting:
         self._asking: asyncio.Task[None] | None = None
 
     def ask(self, arc: str) -> None:
-        """Ask why this ARC waits, if it does, unless the answer to that is still to come."""
+        """Ask why this ARC waits, if it does, unless an answer is still under way."""
         if self._asking is None and self._waits_for() is not None:
             self._asking = self._console.start_task(self._ask(arc), "why")
 

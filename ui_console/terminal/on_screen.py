@@ -1,4 +1,4 @@
-"""Consoles with a screen in a terminal: one that drives, one that watches."""
+"""Consoles with a screen in a terminal: one drives, the other watches."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from ui_console.terminal.session import TerminalSession
 
 @dataclass(frozen=True)
 class Looks:
-    """How a console with a screen looks, and who sits at it.
+    """Look of a console with a screen, and its person.
 
     Attributes:
-        profile: Which of the screens.
-        user: Who sits at it.
-        sees: Whether pictures come to this machine.
-        is_bare: Whether it begins with the picture alone.
-        has_gamepad: Whether the gamepad of this machine drives, too.
+        profile: The screen.
+        user: The person at it.
+        sees: True: pictures come to this machine.
+        is_bare: True: it begins with the picture alone.
+        has_gamepad: True: the gamepad of this machine drives, too.
     """
 
     profile: Profile
@@ -41,7 +41,7 @@ async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> i
     Args:
         where: The mission.
         wished: Parameters of ``Teleoperation``.
-        looks: How the screen looks.
+        looks: Look of the screen.
 
     Raises:
         Refusal: The claim was refused, and no other claim followed.
@@ -76,7 +76,7 @@ async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> i
 
 
 async def watch_on_screen(where: Where, user: str) -> int:
-    """Show what happens until a key or a signal ends it; return the command's exit code."""
+    """Show the mission until a key or a signal ends it; return the command's exit code."""
     joining = await join(where)
     launch = joining.launch
     session = TerminalSession(launch.name, launch.mission, user, sees=False)

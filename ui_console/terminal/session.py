@@ -29,13 +29,13 @@ Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
 
 
 class TerminalSession(Session):
-    """Hands what a component hears to the model, and what keys want to the component.
+    """Passes a component's events to the model, and the keys' commands to the component.
 
     Args:
         name: Name of the console.
         mission: Name of the mission.
-        user: Who sits at it, for people and for the record.
-        profile: How the screen looks.
+        user: The person at it, for people and for the record.
+        profile: Look of the screen.
         is_bare: True to begin with the picture alone.
         sees: True if pictures are to come.
         gamepad: Device to drive by, with the ranges of its stick.
@@ -66,18 +66,18 @@ class TerminalSession(Session):
     async def run(
         self, console: Observer[Any], *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
     ) -> ExitCode:
-        """Show the screen until a key or the component ends it; both have ended afterwards, the component first.
+        """Show the screen until a key or the component ends it; the component ends first, then the screen.
 
         Args:
             console: The component.
-            pilot: Presses the keys, on a screen nobody sees, in place of a person at a terminal.
+            pilot: Presses the keys on a screen without a terminal, in place of a person.
             size: Columns and lines of the pilot's screen.
 
         Returns:
-            How the screen ended; a screen that crashed has said why by now.
+            Outcome of the screen; a crash has been printed by now.
 
         Raises:
-            BaseException: What ended the component, if that was a bug or a refusal.
+            BaseException: The bug or refusal that ended the component.
         """
         self._console = console
         screen = ConsoleApp(

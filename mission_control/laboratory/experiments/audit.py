@@ -62,8 +62,6 @@ def agreement(
     Args:
         trace: Lines of the schedule trace, in order.
         samples: Transmitting robots, one sample for each frame with a change, in order.
-        robots: Names of the Scouts.
-        frequencies: Names of the video frequencies.
         until_s: Time of the last possible sample; later switches are ignored.
     """
     scouts, channels = set(robots), set(frequencies)

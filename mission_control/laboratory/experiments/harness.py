@@ -30,7 +30,6 @@ def run_all(
         work: A function of a module, which other processes can import; its result depends only on its order.
         orders: One for each result; orders and results can be pickled.
         jobs: Processes; 0: one a core; 1: this one.
-        progress: Called after each result.
 
     Raises:
         Exception: The first exception of the work; no further order is begun.

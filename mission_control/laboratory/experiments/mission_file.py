@@ -52,7 +52,6 @@ def mission_of_trial(condition: Condition, world_seed: int, departs_s: float) ->
     """Return the mission of one trial.
 
     Args:
-        condition: The condition.
         world_seed: Seed of all random processes of world and air.
         departs_s: World time at which the target departs.
     """

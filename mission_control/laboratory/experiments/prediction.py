@@ -67,7 +67,6 @@ def departs_s(condition: Condition, phase: float) -> float:
     when drawn run times have come apart.
 
     Args:
-        condition: The condition.
         phase: Phase, 0 to 1, of a round: one slice of each, or as many of each as make their times equal.
     """
     asked_s = [fmean((times.shortest_s, times.longest_s)) for times in _asked(condition)]

@@ -83,7 +83,6 @@ class TrialStart:
         x_m: In the room.
         y_m: In the room.
         heading_rad: In the room.
-        world_seed: Of the world and its air.
     """
 
     range_m: float
@@ -193,7 +192,6 @@ def run_servoing(
         seed: Seed of the experiment; the same seed gives the same result with any number of jobs.
         noise: Noise of the pictures: 0 none, 1 as in the papers, at most 10.
         jobs: Processes; 0: one a core.
-        progress: Called after each trial.
     """
     began_s = time.monotonic()
     orders = [ServoOrder(seed, number, noise) for number in range(trials)]

@@ -28,9 +28,6 @@ class TrialOrder(msgspec.Struct, frozen=True):
     """One trial to be run.
 
     Attributes:
-        condition: The condition.
-        seed: Seed of the experiment.
-        number: Number of the trial.
         trace: File for its schedule trace; empty: none.
     """
 
@@ -44,9 +41,6 @@ class ConditionRow(msgspec.Struct, frozen=True):
     """The result of one condition.
 
     Attributes:
-        condition: The condition.
-        trials: Number of trials.
-        detected: Number of trials with a detection.
         predicted: Share of detections predicted from geometry and schedule.
         false_alarms: Number of false alarms, in all trials.
         switches: Grants and ends of holds compared with the transmitters, in all trials.
@@ -182,7 +176,6 @@ def run_surveillance(
         trials: Number of trials of each condition, above 0.
         seed: Seed of the experiment; the same seed gives the same rows with any number of jobs.
         jobs: Processes; 0: one a core.
-        progress: Called after each trial.
         traces: Folder for the schedule traces of all trials; None: no traces.
     """
     began_s = time.monotonic()

@@ -106,9 +106,6 @@ def run_trial(
     """Run one trial from its beginning to the detection, or until the target has passed.
 
     Args:
-        condition: The condition.
-        seed: Seed of the experiment.
-        number: Number of the trial.
         to_the_end: True: the trial continues after the detection.
         trace: File for its schedule trace, JSON lines.
     """

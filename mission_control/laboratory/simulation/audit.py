@@ -20,7 +20,6 @@ class Happening:
     """One event.
 
     Attributes:
-        at_s: Mission time.
         who: Name of its component.
         what: One word; see the laws for the meaning of each.
         values: The names and numbers of this case.

@@ -6,10 +6,9 @@ Rule of this file: no decisions. Each overriding method records, then calls the 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.rc_manager.service import RcManager
@@ -195,15 +194,3 @@ class AuditedRcManager(RcManager):
         line = {name: value for name, value in record.line.items() if name not in {"ev", "t"}}
         self._audit.note(self.name, str(record.line["ev"]), **line)
         super()._record(record)
-
-
-COMPONENTS: Mapping[str, type[Component[Any]]] = {
-    "scout": AuditedScout,
-    "command_radio": AuditedCommandRadio,
-    "video_frequency": AuditedVideoFrequency,
-    "framegrabber": AuditedFramegrabber,
-    "drive": AuditedDriveArc,
-    "video_drive": AuditedVideoDriveArc,
-    "capture": AuditedCaptureArc,
-}
-"""Component type → class, of all components that a placer starts in a simulated mission."""

@@ -33,10 +33,6 @@ class CampaignCount:
 
     Attributes:
         runs: Number of seeds; each stands for a pool mission and a supervised one.
-        happenings: Number of events.
-        grants: Number of grants.
-        packets: Number of packets on the air.
-        faults: Number of injected faults.
     """
 
     runs: int = 0
@@ -61,7 +57,6 @@ class Finding:
     """A mission that breaks a law.
 
     Attributes:
-        seed: Seed of the mission.
         supervised: True: the supervised mission of this seed; False: its pool mission.
         chaos: True if faults were injected.
         broken: The law, in the run with the fewest faults.
@@ -141,7 +136,6 @@ def simulate(
     Args:
         first: First seed.
         seeds: Number of seeds, 1 or more.
-        chaos: True: inject faults.
         tell: Called with lines of progress.
         processes: Number of processes; None: one for each processor, or only this one for few seeds.
     """

@@ -47,7 +47,6 @@ class KillFault:
     """The death of a component as by SIGKILL.
 
     Attributes:
-        at_s: Mission time.
         target: Name of the component.
         away_s: Time until its creator has restarted it, if it restarts it.
     """
@@ -65,9 +64,7 @@ class Hang:
     """A component that for a while neither gets nor sends messages; then all of them travel, in order.
 
     Attributes:
-        at_s: Mission time of its begin.
         target: Address of the component.
-        lasts_s: Duration.
     """
 
     at_s: float

@@ -45,7 +45,6 @@ class HostileMessage:
         source: Address of its alleged sender.
         target: Address of its receiver; for a publication, the address under which it is published.
         conversation: Conversation of a publication; empty: a question.
-        body: The message.
     """
 
     source: str

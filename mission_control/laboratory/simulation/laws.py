@@ -53,8 +53,6 @@ class Broken:
     """A broken law.
 
     Attributes:
-        law: Its name.
-        at_s: Mission time.
         what: One sentence with the names and numbers of this case.
         names: Components concerned.
     """
@@ -79,8 +77,6 @@ def first_broken(
     """Return the first broken law, or None if all hold.
 
     Args:
-        shape: The mission.
-        happenings: All events, in order.
         all_arrived: True if no message was lost, late or doubled.
         longest_s: Additional time for which beliefs may be wrong, because processes were paused or cut off.
         others: Paths of decision processes besides the owners; they always want time.

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
+from backbone.component.process import load_class
 from backbone.dependency_database.service import DependencyDatabase
 from backbone.nameserver.service import Nameserver
 from backbone.naming import Subsystem
 from mission_control.laboratory.simulation.audit import Audit, Happening, current_audit
-from mission_control.laboratory.simulation.audited_pool import COMPONENTS, AuditedRcManager
+from mission_control.laboratory.simulation.audited_pool import AuditedRcManager
 from mission_control.laboratory.simulation.faults import (
     CALM_WEATHER,
     DrawnFates,
@@ -28,16 +28,16 @@ from mission_control.laboratory.simulation.faults import (
     GivenFates,
     Hang,
     KillFault,
-    Weather,
     draw_moments,
     draw_weather,
 )
 from mission_control.laboratory.simulation.laws import Broken, first_broken
-from mission_control.laboratory.simulation.played_hosts import PlayedHosts, PlayedPlacer, PlayedRole
-from mission_control.laboratory.simulation.shape import BRING_UP_S, MISSION, MissionShape, draw_shape
+from mission_control.laboratory.simulation.played_hosts import PlayedHosts, PlayedRole
+from mission_control.laboratory.simulation.shape import BRING_UP_S, MISSION, POOL_TYPES, RCS, MissionShape, draw_shape
 from mission_control.laboratory.simulation.simulated_owner import SimulatedOwner
 from mission_control.laboratory.simulation.supervision_faults import SupervisionFault
 from mission_control.laboratory.simulation.unreliable_network import UnreliableNetwork
+from mission_control.laboratory.simulation.whole_mission import WholePlacer
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +45,6 @@ class MissionRun:
     """The result of one mission.
 
     Attributes:
-        shape: The mission.
-        faults: Injected faults, in order.
-        happenings: All events, in order.
         digest: Fingerprint of all events.
         broken: The first broken law; None if all hold.
     """
@@ -64,7 +61,6 @@ def run_mission(seed: int, *, chaos: bool, faults: Sequence[Fault] | None = None
 
     Args:
         seed: Seed of the mission, its moods and its faults.
-        chaos: True: inject faults.
         faults: Only these faults, instead of the seed's.
     """
     shape = draw_shape(seed)
@@ -75,12 +71,12 @@ def run_mission(seed: int, *, chaos: bool, faults: Sequence[Fault] | None = None
         moments, fates = draw_moments(shape, weather), DrawnFates(seed, weather)
     else:
         moments, fates = [fault for fault in faults if isinstance(fault, KillFault | Hang)], GivenFates(faults)
-    return run_virtual(_PoolMission(shape, weather, moments, fates).run())
+    return run_virtual(_PoolMission(shape, moments, fates).run())
 
 
 class _PoolMission:
-    def __init__(self, shape: MissionShape, weather: Weather, moments: list[KillFault | Hang], fates: Fates) -> None:
-        self._shape, self._weather, self._moments = shape, weather, moments
+    def __init__(self, shape: MissionShape, moments: list[KillFault | Hang], fates: Fates) -> None:
+        self._shape, self._moments = shape, moments
         self._audit = Audit()
         self._clock = VirtualClock()
         self._network = UnreliableNetwork(MISSION, fates, BRING_UP_S, shape.active_s)
@@ -124,10 +120,9 @@ class _PoolMission:
     # ------------------------------------------------------------------ bring-up, in the papers' order
     async def _bring_up(self) -> None:
         shape = self._shape
-        resources = {resource.name: resource for resource in shape.resources}
 
-        def placer(launch: Launch, bus: Bus, clock: Clock) -> PlayedPlacer:
-            return PlayedPlacer(launch, bus, clock, hosts=self._hosts, components=COMPONENTS, resources=resources)
+        def placer(launch: Launch, bus: Bus, clock: Clock) -> WholePlacer:
+            return WholePlacer(launch, bus, clock, hosts=self._hosts, types=POOL_TYPES, consoles={}, restarts=True)
 
         manager = {
             "mission": MISSION,
@@ -146,7 +141,7 @@ class _PoolMission:
         for resource in shape.resources:
             if resource.name not in shape.asleep:
                 role = PlayedRole(
-                    COMPONENTS[resource.type],
+                    load_class(RCS[resource.type]),
                     Subsystem.RESOURCE_POOL,
                     resource.name,
                     resource.type,
@@ -155,17 +150,6 @@ class _PoolMission:
                 await self._hosts.start(role)
         for owner in shape.owners:
             subsystem = Subsystem.UI_CONSOLE if owner.console else Subsystem.MISSION_CONTROL
-            parameters: dict[str, Any] = {
-                "seed": shape.seed,
-                "kind": owner.kind,
-                "path": [list(node) for node in owner.path],
-                "console": owner.console,
-                "minimum_runtime_s": owner.minimum_runtime_s,
-                "maximum_runtime_s": owner.maximum_runtime_s,
-                "wish": owner.wish,
-                "usage": msgspec.to_builtins(owner.usage),
-                "begins_s": owner.begins_s,
-                "calm_at_s": shape.active_s,
-                "rests": owner.rests,
-            }
-            await self._hosts.start(PlayedRole(SimulatedOwner, subsystem, owner.name, owner.name, parameters))
+            await self._hosts.start(
+                PlayedRole(SimulatedOwner, subsystem, owner.name, owner.name, shape.owner_parameters(owner))
+            )

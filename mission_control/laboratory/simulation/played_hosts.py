@@ -12,15 +12,13 @@ from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.component import Component, NoParameters
+from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import NameTaken
 from backbone.creator.messages import EndedBy
-from backbone.dependency_database.messages import Resource
 from backbone.errors import BackboneError
-from backbone.naming import Subsystem, component_of
-from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent, StoppedMeanwhile
-from backbone.wire import Envelope, Message
+from backbone.naming import Subsystem
+from backbone.placer.messages import NotPlaced
 from mission_control.laboratory.simulation.audit import Audit
 
 HOST = "host"  # chosen: all components are on one host
@@ -34,10 +32,6 @@ class PlayedRole:
 
     Attributes:
         component: Its class, or a factory.
-        subsystem: Its subsystem.
-        name: Its name.
-        kind: Its component type.
-        parameters: Its parameters.
         is_restarted: True if its creator restarts it when it falls.
     """
 
@@ -193,36 +187,3 @@ class PlayedHosts:
             self._audit.note(role.name, "gives up", error=f"{type(error).__name__}: {error}")
         else:
             self._audit.note(role.name, "fails", error=f"{type(error).__name__}: {error}")
-
-
-class PlayedPlacer(Component[NoParameters]):
-    """Answers the questions of decision processes and the RC manager to the placer."""
-
-    accepts = PlacerQuestion
-
-    def __init__(
-        self,
-        launch: Launch,
-        bus: Bus,
-        clock: Clock,
-        *,
-        hosts: PlayedHosts,
-        components: Mapping[str, type[Component[Any]]],
-        resources: Mapping[str, Resource],
-    ) -> None:
-        super().__init__(launch, bus, clock)
-        self._hosts, self._components, self._resources = hosts, components, resources
-
-    async def answer(self, asked: Envelope[Any]) -> Message:
-        """Start or stop one component."""
-        match asked.body:
-            case Start(type=kind, name=name, parameters=parameters):
-                is_rc = name in self._resources
-                role = PlayedRole(self._components[kind], Subsystem.RESOURCE_POOL, name, kind, parameters, is_rc)
-                if not await self._hosts.start(role):
-                    raise StoppedMeanwhile(f"{name} ended before it was ready", name=name)
-                return Started(f"{Subsystem.RESOURCE_POOL}/{name}", HOST, 0, [])
-            case StopComponent(name=name, reason=reason):
-                return Ended(name, await self._hosts.stop(component_of(name), reason))
-            case _:
-                return await super().answer(asked)

@@ -9,7 +9,11 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
+import msgspec
+
+from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
+from backbone.naming import Subsystem
 from backbone.scheduling.requests import Usage
 
 MISSION = "simulated"
@@ -17,8 +21,23 @@ MOST_OWNERS = 8
 BRING_UP_S = 1.0  # chosen: on virtual time all components are ready within a tenth of it
 SHORTEST_ACTIVE_S, LONGEST_ACTIVE_S = 6.0, 16.0  # chosen: several turns of each owner, several runs a second
 
-RADIO_DRIVER = "mission_control.laboratory.simulation.audited_pool:AuditedRadio"
-GRABBER_DRIVER = "mission_control.laboratory.simulation.audited_pool:AuditedGrabber"
+POOL = "mission_control.laboratory.simulation.audited_pool"
+RADIO_DRIVER, GRABBER_DRIVER = f"{POOL}:AuditedRadio", f"{POOL}:AuditedGrabber"
+RCS = {
+    "scout": f"{POOL}:AuditedScout",
+    "command_radio": f"{POOL}:AuditedCommandRadio",
+    "video_frequency": f"{POOL}:AuditedVideoFrequency",
+    "framegrabber": f"{POOL}:AuditedFramegrabber",
+}
+ARCS = {
+    "drive": f"{POOL}:AuditedDriveArc",
+    "video_drive": f"{POOL}:AuditedVideoDriveArc",
+    "capture": f"{POOL}:AuditedCaptureArc",
+}
+POOL_TYPES = (
+    *(ComponentType(name, path, Subsystem.RESOURCE_POOL) for name, path in RCS.items()),
+    *(ComponentType(name, path, Subsystem.RESOURCE_POOL, restart=False) for name, path in ARCS.items()),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +45,6 @@ class OwnerShape:
     """One decision process and the ARC it claims.
 
     Attributes:
-        name: Its name.
         kind: Kind of its ARC.
         path: Names and priorities from the mission's root, or of the console alone.
         console: True for consoles.
@@ -60,8 +78,6 @@ class MissionShape:
     """One mission.
 
     Attributes:
-        seed: Its seed.
-        resources: The hardware.
         asleep: RCs that start only when an ARC claims them.
         owners: The decision processes.
         priority: Priority of the mission among the consoles.
@@ -80,6 +96,22 @@ class MissionShape:
     policy: str
     active_s: float
     calm_s: float
+
+    def owner_parameters(self, owner: OwnerShape) -> dict[str, Any]:
+        """Return the parameters of this decision process, a ``SimulatedOwner``."""
+        return {
+            "seed": self.seed,
+            "kind": owner.kind,
+            "path": [list(node) for node in owner.path],
+            "console": owner.console,
+            "minimum_runtime_s": owner.minimum_runtime_s,
+            "maximum_runtime_s": owner.maximum_runtime_s,
+            "wish": owner.wish,
+            "usage": msgspec.to_builtins(owner.usage),
+            "begins_s": owner.begins_s,
+            "calm_at_s": self.active_s,
+            "rests": owner.rests,
+        }
 
 
 def draw_shape(seed: int) -> MissionShape:

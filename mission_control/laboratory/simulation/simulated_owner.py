@@ -43,17 +43,13 @@ TOP_WHEEL_SPEED_RAD_S = 10.0  # chosen: below the motor's limit
 
 
 class OwnerParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Parameters of a simulated owner.
+    """Parameters of a simulated owner; see ``claim_parameters``.
 
     Attributes:
         seed: Seed of its moods.
         kind: Kind of its ARC.
         path: Its place in the behavior tree.
         console: True for a console.
-        minimum_runtime_s: As for ``ArcClient.claim``.
-        maximum_runtime_s: As for ``ArcClient.claim``.
-        wish: As for ``ArcClient.claim``.
-        usage: As for ``ArcClient.claim``.
         begins_s: Mission time of its first claim.
         calm_at_s: Mission time from which it only drives.
         rests: True if it then gives its ARC back.

@@ -31,7 +31,6 @@ class SimulatedProcess:
     Args:
         loop: Its event loop.
         name: Name of its component, or of the shared process.
-        host: Its host.
         pid: Its pid, never used before.
     """
 

@@ -48,18 +48,13 @@ LOOK_EVERY_S = 0.02  # chosen: far below the time in which a mission comes up
 UP_WITHIN_S = 60.0  # chosen: of virtual time, in which only forks and settling pass
 
 
-def run_supervised(
-    seed: int, *, chaos: bool, faults: Sequence[SupervisionFault] | None = None, shape: SupervisedShape | None = None
-) -> MissionRun:
+def run_supervised(seed: int, *, chaos: bool, faults: Sequence[SupervisionFault] | None = None) -> MissionRun:
     """Run the supervised mission of this seed to its end and judge it; the same arguments give the same bytes.
 
     Args:
-        seed: Seed of the mission and its faults.
-        chaos: True: inject faults.
         faults: Only these faults, instead of the seed's.
-        shape: This mission, instead of the seed's.
     """
-    shape = shape or draw_supervised_shape(seed)
+    shape = draw_supervised_shape(seed)
     if faults is None:
         faults = draw_supervision_faults(shape) if chaos else []
     return run_processes(_SupervisedMission(shape, sorted(faults, key=lambda fault: fault.at_s)).run())

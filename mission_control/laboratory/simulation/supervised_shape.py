@@ -18,10 +18,9 @@ from backbone.dependency_database.messages import Resource
 from backbone.mission.model import ArcWish, Behavior, CoreService, Host, MissionDescription
 from backbone.mission.model import Component as MissionComponent
 from backbone.naming import Subsystem
-from mission_control.laboratory.simulation.shape import MISSION, MissionShape, OwnerShape, draw_shape
+from mission_control.laboratory.simulation.shape import MISSION, POOL, POOL_TYPES, MissionShape, draw_shape
 
 CORE = ("component_database", "placer", "creator", "dependency_database", "rc_manager")
-POOL = "mission_control.laboratory.simulation.audited_pool"
 CLASSES = {
     "nameserver": "backbone.nameserver.service:Nameserver",
     "component_database": "backbone.component_database.service:ComponentDatabase",
@@ -29,17 +28,6 @@ CLASSES = {
     "creator": "mission_control.laboratory.simulation.simulated_machines:SimulatedCreator",
     "dependency_database": "backbone.dependency_database.service:DependencyDatabase",
     "rc_manager": f"{POOL}:AuditedRcManager",
-}
-RCS = {
-    "scout": f"{POOL}:AuditedScout",
-    "command_radio": f"{POOL}:AuditedCommandRadio",
-    "video_frequency": f"{POOL}:AuditedVideoFrequency",
-    "framegrabber": f"{POOL}:AuditedFramegrabber",
-}
-ARCS = {
-    "drive": f"{POOL}:AuditedDriveArc",
-    "video_drive": f"{POOL}:AuditedVideoDriveArc",
-    "capture": f"{POOL}:AuditedCaptureArc",
 }
 OWNER = "mission_control.laboratory.simulation.simulated_owner:SimulatedOwner"
 NODE = "mission_control.behavior:Behavior"  # named, as a mission names its classes: imports run downwards only
@@ -52,7 +40,6 @@ class SupervisedShape:
     """One supervised mission.
 
     Attributes:
-        seed: Its seed.
         pool: Hardware, owners and times.
         hosts: The first has the core services.
         places: RC → host of its hardware.
@@ -96,8 +83,7 @@ class SupervisedShape:
         """Return the mission as a description, as from a mission file."""
         core = Subsystem.BACKBONE
         types = [ComponentType(name, path, core, core=True) for name, path in CLASSES.items()]
-        types += [ComponentType(name, path, Subsystem.RESOURCE_POOL) for name, path in RCS.items()]
-        types += [ComponentType(name, path, Subsystem.RESOURCE_POOL, restart=False) for name, path in ARCS.items()]
+        types += POOL_TYPES
         types.append(ComponentType("console", OWNER, Subsystem.UI_CONSOLE))
         types.append(ComponentType("owner", OWNER, Subsystem.MISSION_CONTROL))
         types.append(ComponentType("node", NODE, Subsystem.MISSION_CONTROL))
@@ -107,7 +93,9 @@ class SupervisedShape:
             services += [CoreService(type=name, host=host, parameters=self._core_parameters(name)) for host in where]
         owners = [
             MissionComponent(
-                type="console" if owner.console else "owner", name=owner.name, parameters=self._owner_parameters(owner)
+                type="console" if owner.console else "owner",
+                name=owner.name,
+                parameters=self.pool.owner_parameters(owner),
             )
             for owner in self.pool.owners
         ]
@@ -127,21 +115,6 @@ class SupervisedShape:
 
     def _core_parameters(self, service: str) -> dict[str, Any]:
         return {"grace_s": self.pool.grace_s, "policy": self.pool.policy} if service == "rc_manager" else {}
-
-    def _owner_parameters(self, owner: OwnerShape) -> dict[str, Any]:
-        return {
-            "seed": self.seed,
-            "kind": owner.kind,
-            "path": [list(node) for node in owner.path],
-            "console": owner.console,
-            "minimum_runtime_s": owner.minimum_runtime_s,
-            "maximum_runtime_s": owner.maximum_runtime_s,
-            "wish": owner.wish,
-            "usage": msgspec.to_builtins(owner.usage),
-            "begins_s": owner.begins_s,
-            "calm_at_s": self.pool.active_s,
-            "rests": owner.rests,
-        }
 
 
 def walk(nodes: tuple[Behavior, ...]) -> Iterator[Behavior]:

@@ -22,48 +22,11 @@ END = Literal["killed", "politely"]
 
 
 @dataclass(frozen=True, slots=True)
-class Pause:
-    """A process that is stopped as by SIGSTOP and continued.
-
-    Attributes:
-        at_s: Mission time of its begin.
-        target: A component in the process.
-        lasts_s: Its duration.
-    """
+class _Sudden:
+    """What strikes a target at one moment."""
 
     at_s: float
     target: str
-    lasts_s: float
-
-    def __str__(self) -> str:
-        return f"{self.target} is paused at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
-
-    @property
-    def over_s(self) -> float:
-        """Mission time of its end."""
-        return self.at_s + self.lasts_s
-
-
-@dataclass(frozen=True, slots=True)
-class End:
-    """A process that ends.
-
-    Attributes:
-        at_s: Mission time of its begin.
-        target: A component in the process.
-        how: As by SIGKILL, or in good order as by SIGTERM.
-        again_after_s: Time from the fork of its successor to the successor's end in the same way; negative: none.
-    """
-
-    at_s: float
-    target: str
-    how: END
-    again_after_s: float = -1.0
-
-    def __str__(self) -> str:
-        word = "is killed" if self.how == "killed" else "ends politely"
-        again = f", its successor {self.again_after_s:.3f} s after its fork" if self.again_after_s >= 0 else ""
-        return f"{self.target} {word} at {self.at_s:.3f} s{again}"
 
     @property
     def over_s(self) -> float:
@@ -72,21 +35,8 @@ class End:
 
 
 @dataclass(frozen=True, slots=True)
-class Cut:
-    """A link that is cut and heals.
-
-    Attributes:
-        at_s: Mission time of its begin.
-        target: Component whose process is cut off, or host, whose processes cannot reach the hub.
-        lasts_s: Its duration.
-    """
-
-    at_s: float
-    target: str
+class _Lasting(_Sudden):
     lasts_s: float
-
-    def __str__(self) -> str:
-        return f"the link of {self.target} is cut at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
 
     @property
     def over_s(self) -> float:
@@ -95,51 +45,74 @@ class Cut:
 
 
 @dataclass(frozen=True, slots=True)
-class Starve:
+class Pause(_Lasting):
+    """A process that is stopped as by SIGSTOP and continued.
+
+    Attributes:
+        target: A component in the process.
+    """
+
+    def __str__(self) -> str:
+        return f"{self.target} is paused at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class End(_Sudden):
+    """A process that ends.
+
+    Attributes:
+        target: A component in the process.
+        how: As by SIGKILL, or in good order as by SIGTERM.
+        again_after_s: Time from the fork of its successor to the successor's end in the same way; negative: none.
+    """
+
+    how: END
+    again_after_s: float = -1.0
+
+    def __str__(self) -> str:
+        word = "is killed" if self.how == "killed" else "ends politely"
+        again = f", its successor {self.again_after_s:.3f} s after its fork" if self.again_after_s >= 0 else ""
+        return f"{self.target} {word} at {self.at_s:.3f} s{again}"
+
+
+@dataclass(frozen=True, slots=True)
+class Cut(_Lasting):
+    """A link that is cut and heals.
+
+    Attributes:
+        target: Component whose process is cut off, or host, whose processes cannot reach the hub.
+    """
+
+    def __str__(self) -> str:
+        return f"the link of {self.target} is cut at {self.at_s:.3f} s for {self.lasts_s:.3f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class Starve(_Lasting):
     """A machine whose processes get a processor only for moments.
 
     Attributes:
-        at_s: Mission time of its begin.
-        target: The host.
-        lasts_s: Its duration.
         gap_s: Time between two moments.
     """
 
-    at_s: float
-    target: str
-    lasts_s: float
     gap_s: float
 
     def __str__(self) -> str:
         return f"{self.target} is starved at {self.at_s:.3f} s for {self.lasts_s:.3f} s, gaps of {self.gap_s:g} s"
 
-    @property
-    def over_s(self) -> float:
-        """Mission time of its end."""
-        return self.at_s + self.lasts_s
-
 
 @dataclass(frozen=True, slots=True)
-class Hostile:
+class Hostile(_Sudden):
     """A message with impossible numbers, in the name of a component that may send such a message.
 
     Attributes:
-        at_s: Mission time of its begin.
-        target: Its receiver.
         number: Its number in ``hostile_numbers``.
     """
 
-    at_s: float
-    target: str
     number: int
 
     def __str__(self) -> str:
         return f"{self.target} hears hostile message {self.number} at {self.at_s:.3f} s"
-
-    @property
-    def over_s(self) -> float:
-        """Mission time of its end."""
-        return self.at_s
 
 
 SupervisionFault = Pause | End | Cut | Starve | Hostile

@@ -10,12 +10,11 @@ Rule of this file: it brings the mission up, and neither decides nor judges.
 from __future__ import annotations
 
 import asyncio
-import importlib
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
@@ -26,6 +25,7 @@ from backbone.bus.local_bus import LocalBus, LocalNetwork
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, Statistics
+from backbone.component.process import load_class
 from backbone.component_database.messages import ComponentType, UnknownType
 from backbone.component_database.service import ComponentDatabase
 from backbone.dependency_database.service import DependencyDatabase
@@ -70,7 +70,6 @@ class RunningMission:
     """A mission that is up, in this process.
 
     Attributes:
-        description: The mission.
         network: Its network; ``network.join(source, clock)`` gives one more bus.
         bus: A bus like the launcher's.
         clock: The mission's clock, which shows the event loop's time.
@@ -129,10 +128,7 @@ async def mission_in_one_process(
     description: MissionDescription,
     *,
     trace: Callable[[dict[str, Any]], None] | None = None,
-    network: LocalNetwork | None = None,
     consoles: Mapping[str, Callable[[Launch, Bus, Clock], Component[Any]]] | None = None,
-    camera: Literal["paint", "gl"] = "paint",
-    may_fall: bool = False,
 ) -> AsyncIterator[RunningMission]:
     """Yield the mission, up and ready, on the running loop's time; end all components at the end of the block.
 
@@ -141,11 +137,7 @@ async def mission_in_one_process(
     Args:
         description: A checked mission; hosts and shared processes are ignored.
         trace: Also called with each line of the schedule trace, in order.
-        network: Its network, for instance one with faults; default: a new one.
         consoles: Component type → factory of its consoles; a mission file has no consoles.
-        camera: Camera of the simulated framegrabbers, instead of the mission's; the painter's pictures are the same on
-            every machine. ``gl`` needs an earlier ``scout_model.gl_probe.prepare`` in this process.
-        may_fall: True: components that fall are restarted, as by their creators, and no error is raised.
 
     Raises:
         MissionFell: A component fell; raised at the end of the block, also in place of what came of the fall.
@@ -161,11 +153,11 @@ async def mission_in_one_process(
         >>> grants = run_virtual(minute("mission.xml"))  # doctest: +SKIP
     """
     clock = VirtualClock()
-    on = network or LocalNetwork(description.name)
+    network = LocalNetwork(description.name)
     audit = Audit()
-    hosts = PlayedHosts(on, clock, audit)
-    bus = on.join(MEETING_AT, clock)
-    running = RunningMission(_filmed_by(description, camera), on, bus, clock, hosts)
+    hosts = PlayedHosts(network, clock, audit)
+    bus = network.join(MEETING_AT, clock)
+    running = RunningMission(_painted(description), network, bus, clock, hosts)
 
     def decided(envelope: Envelope[Any]) -> None:
         running.trace.append(envelope.body.line)
@@ -174,11 +166,11 @@ async def mission_in_one_process(
 
     bus.subscribe(RC_MANAGER, Conversation.EVENTS, TraceLine, decided)
     try:
-        await _bring_up(running, consoles or {}, may_fall=may_fall)
+        await _bring_up(running, consoles or {})
         yield running
     except BackboneError as error:
         fell = _first_fall(audit.happenings)
-        if may_fall or fell is None:
+        if fell is None:
             raise
         raise MissionFell(fell) from error
     finally:
@@ -188,14 +180,14 @@ async def mission_in_one_process(
         await hosts.stop_all()
         await bus.close()
     fell = _first_fall(audit.happenings)
-    if fell is not None and not may_fall:
+    if fell is not None:
         raise MissionFell(fell)
 
 
-def _filmed_by(mission: MissionDescription, camera: str) -> MissionDescription:
-    """Return the mission with this camera behind each simulated framegrabber."""
+def _painted(mission: MissionDescription) -> MissionDescription:
+    """Return the mission with the painter behind each simulated framegrabber: its pictures are the same everywhere."""
     resources = tuple(
-        msgspec.structs.replace(resource, parameters={**resource.parameters, "camera": camera})
+        msgspec.structs.replace(resource, parameters={**resource.parameters, "camera": "paint"})
         if resource.type == FRAMEGRABBER and resource.driver == SIMULATED
         else resource
         for resource in mission.resources
@@ -211,9 +203,7 @@ def _first_fall(happenings: list[Happening]) -> str | None:
 
 
 # ---------------------------------------------------------------------- bring-up, in the papers' order
-async def _bring_up(
-    running: RunningMission, consoles: Mapping[str, Callable[..., Component[Any]]], *, may_fall: bool
-) -> None:
+async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[..., Component[Any]]]) -> None:
     mission, hosts = running.description, running.hosts
     resources = [msgspec.to_builtins(resource) for resource in mission.resources]
     types = [msgspec.to_builtins(component_type) for component_type in mission.types]
@@ -224,7 +214,7 @@ async def _bring_up(
     }
 
     def placer(launch: Launch, bus: Bus, clock: Clock) -> WholePlacer:
-        return WholePlacer(launch, bus, clock, hosts=hosts, types=mission.types, consoles=consoles, may_fall=may_fall)
+        return WholePlacer(launch, bus, clock, hosts=hosts, types=mission.types, consoles=consoles)
 
     core: list[tuple[Callable[..., Component[Any]], str, dict[str, Any]]] = [
         (Nameserver, "nameserver", {}),
@@ -234,7 +224,7 @@ async def _bring_up(
         (RcManager, "rc_manager", manager),
     ]
     for component, name, parameters in core:
-        if not await hosts.start(PlayedRole(component, Subsystem.BACKBONE, name, name, parameters, may_fall)):
+        if not await hosts.start(PlayedRole(component, Subsystem.BACKBONE, name, name, parameters, is_restarted=False)):
             raise MissionFell(f"{name} ended before it was ready")
     hardware = [Start(part.type, part.name, part.parameters) for part in mission.components]
     hardware += [Start(part.type, part.name, part.rc_parameters()) for part in mission.resources]
@@ -243,7 +233,10 @@ async def _bring_up(
 
 
 class WholePlacer(Component[NoParameters]):
-    """Starts and stops all components but core services, in this process, with the real placer's messages."""
+    """Starts and stops all components but core services, in this process, with the real placer's messages.
+
+    With ``restarts`` the types that creators restart are restarted when they fall.
+    """
 
     accepts = PlacerQuestion
 
@@ -256,12 +249,12 @@ class WholePlacer(Component[NoParameters]):
         hosts: PlayedHosts,
         types: tuple[ComponentType, ...],
         consoles: Mapping[str, Callable[[Launch, Bus, Clock], Component[Any]]],
-        may_fall: bool,
+        restarts: bool = False,
     ) -> None:
         super().__init__(launch, bus, clock)
         self._hosts = hosts
         self._types = {one.name: one for one in types}
-        self._consoles, self._may_fall = consoles, may_fall
+        self._consoles, self._restarts = consoles, restarts
         self._numbers = Counter[str]()
         self._placements: dict[str, Placement] = {}
 
@@ -302,18 +295,5 @@ class WholePlacer(Component[NoParameters]):
             return PlayedRole(console, Subsystem.UI_CONSOLE, name, order.type, order.parameters, is_restarted=False)
         if known is None:
             raise UnknownType(f"{order.type} is no component type of this mission", type=order.type)
-        made = component_class(known.class_path)
-        return PlayedRole(made, known.subsystem, name, order.type, order.parameters, known.restart and self._may_fall)
-
-
-def component_class(class_path: str) -> type[Component[Any]]:
-    """Return the class behind ``package.module:Class``.
-
-    Raises:
-        MissionFell: No component class has this path.
-    """
-    module, _, name = class_path.partition(":")
-    found = getattr(importlib.import_module(module), name, None)
-    if not (isinstance(found, type) and issubclass(found, Component)):
-        raise MissionFell(f"{class_path} is no component class")
-    return found
+        made = load_class(known.class_path)
+        return PlayedRole(made, known.subsystem, name, order.type, order.parameters, known.restart and self._restarts)

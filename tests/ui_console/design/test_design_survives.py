@@ -91,7 +91,7 @@ async def assert_goes_on(file: Path, priority: str) -> None:
     assert draft.mission.text("priority") == priority
     with server(file) as (process, address):
         assert process.stderr is not None
-        assert "goes on with what was not saved" in process.stderr.readline()
+        assert "goes on with the unsaved changes" in process.stderr.readline()
         await change_priority(address, 1, "77")
     assert_not_saved(file)
 

@@ -198,7 +198,7 @@ def test_behaviors_cannot_be_asked_and_who_does_not_wait_asks_nobody(stage: Call
     async def scene(on: Stage) -> None:
         on.manager.blockers = ("watch",)
         for person, remark in (
-            (on.ben, "no operator stands in the way of ben, but watch"),
+            (on.ben, "no operator blocks the claim of ben, but watch"),
             (on.anna, "anna does not wait for a robot"),
         ):
             person.console.begin_ask_consent()

@@ -24,7 +24,7 @@ from resource_pool.stop_latch import StopLatch
 from ui_console.model.consent import CONSENT_WITHIN_S, Consent, NotAnOperator
 from ui_console.model.console import ConsoleModel
 from ui_console.model.lifting import AskFirst, AskLift, LiftNow, NotThatStop, decide_lift, is_agreed, lift_line
-from ui_console.session.observer import Observer, nobody_here
+from ui_console.session.observer import Observer, no_person_here
 
 PEOPLE = ["anna", "ben", "cleo"]
 
@@ -258,7 +258,7 @@ def test_a_program_that_watches_under_an_authors_name_is_not_that_author(
         launch = on.launch(Subsystem.UI_CONSOLE, "logger", "console")
         bus = on.network.join(launch.address, on.clock)
         logger: Observer[Any] = Observer(
-            launch, bus, on.clock, show=lambda event: None, user="anna", answers_of=nobody_here
+            launch, bus, on.clock, show=lambda event: None, user="anna", answers_of=no_person_here
         )
         async with beside(logger):
             began_s = on.clock.now_s()

@@ -28,12 +28,12 @@ from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.wire import Envelope, Message
 from resource_pool.stop_latch import StopLatch
 from resource_pool.stop_messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
-from ui_console.web.door import Pass
 from ui_console.web.hub import WebHub
+from ui_console.web.login import TokenRights
 
 MISSION = "web-test"
 HIGH, LOW, ANYBODY = "high-token", "low-token", "anybody"
-PASSES = {HIGH: Pass("anna", 100), LOW: Pass("ben", 50), ANYBODY: Pass("", 10)}
+RIGHTS = {HIGH: TokenRights("anna", 100), LOW: TokenRights("ben", 50), ANYBODY: TokenRights("", 10)}
 WITHIN_S = 15.0
 WIDTH_PX, HEIGHT_PX = 32, 24
 

@@ -2,7 +2,7 @@
 
 import { Freshness, makeClock } from "./freshness.js";
 
-/** @import { Beat } from "./messages.d.ts" */
+/** @import { BeatRequest } from "./messages.d.ts" */
 /** @import { LinkChange, LinkState, Picture } from "./types.d.ts" */
 
 const AGAIN_FIRST_MS = 500; // chosen: a server that was restarted is back soon
@@ -145,7 +145,7 @@ export class Link {
   /**
    * Say something if it can be said now: nothing is kept for later, least of all a drive.
    *
-   * @param {Said | Beat} message
+   * @param {Said | BeatRequest} message
    */
   say(message) {
     if (!this.isUp || this.socket?.readyState !== WebSocket.OPEN) return false;

@@ -2,7 +2,7 @@
 
 import { set } from "./text.js";
 
-/** @import { RobotView, StopAll, StopRobot } from "./messages.d.ts" */
+/** @import { RobotView, StopAllRequest, StopRequest } from "./messages.d.ts" */
 /** @import { Say } from "./types.d.ts" */
 
 const CONFIRMED_WITHIN_MS = 1000; // chosen: wheels stand within 0.7 s wherever the link is there
@@ -34,7 +34,7 @@ export class Stopping {
   }
 
   /**
-   * @param {StopRobot | StopAll} message
+   * @param {StopRequest | StopAllRequest} message
    * @param {string[]} names
    */
   stop(message, names) {

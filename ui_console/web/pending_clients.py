@@ -1,11 +1,11 @@
-"""Who is at the door without a token: each newcomer finds room, at the cost of who has been silent for longest.
+"""Clients without a token: a new one always gets a place, and may displace the one that was silent for longest.
 
-Rules of this file: no socket, no clock; whoever is displaced is returned, not cut off.
+Rules of this file: no socket, no clock; a displaced client is returned, not cut off.
 
-* Strangers take no operator's place, and there are never more of them than ``MOST_STRANGERS``.
+* Pending clients take no operator's place, and there are never more of them than ``MOST_PENDING``.
 * One address, or one network of IPv6, has at most ``MOST_OF_AN_ADDRESS``: beyond that it displaces its own only.
-* If all places are taken, the address with the most strangers gives one up, so few make no room for many.
-* Of an address the first to go is who has asked for nothing yet, the oldest first.
+* If all places are taken, the address with the most pending clients loses one, so few make no room for many.
+* Of an address the oldest client without a request goes first.
 """
 
 from __future__ import annotations
@@ -15,35 +15,35 @@ from collections import Counter
 from typing import Generic, TypeVar
 
 MOST_OF_AN_ADDRESS = 64  # chosen: a page opens six connections at a time; a team behind one address ten pages
-MOST_STRANGERS = 128  # chosen: far below the 1024 descriptors a process usually has
-IPV6_NETWORK_BITS = 64  # what one household or host is given to choose its addresses from
+MOST_PENDING = 128  # chosen: far below the 1024 descriptors a process usually has
+IPV6_NETWORK_BITS = 64  # a provider assigns so large a network to one household or host
 
-StrangerT = TypeVar("StrangerT")
+PendingT = TypeVar("PendingT")
 
 
-class Strangers(Generic[StrangerT]):
-    """Those at the door, in the order in which they came."""
+class PendingClients(Generic[PendingT]):
+    """The clients without a token, in the order of their connections."""
 
     def __init__(self) -> None:
-        self._places: dict[StrangerT, str] = {}
-        self._silent: dict[StrangerT, None] = {}
+        self._places: dict[PendingT, str] = {}
+        self._silent: dict[PendingT, None] = {}
 
     def __len__(self) -> int:
         return len(self._places)
 
-    def came(self, who: StrangerT, address: str) -> StrangerT | None:
-        """Note a newcomer; return whom to cut off for it, who is forgotten; None: there is room.
+    def came(self, who: PendingT, address: str) -> PendingT | None:
+        """Add a client; return the client it displaces, which is removed; None: there is room.
 
         Args:
-            who: The newcomer.
-            address: Where it is; empty: unknown.
+            who: The new client.
+            address: Its address; empty: unknown.
         """
         place = place_of(address)
         counts = Counter(self._places.values())
         displaced = None
         if counts[place] >= MOST_OF_AN_ADDRESS:
             displaced = self._first_of(place)
-        elif len(self._places) >= MOST_STRANGERS:
+        elif len(self._places) >= MOST_PENDING:
             displaced = self._first_of(counts.most_common(1)[0][0])
         if displaced is not None:
             self.gone(displaced)
@@ -51,22 +51,22 @@ class Strangers(Generic[StrangerT]):
         self._silent[who] = None
         return displaced
 
-    def asked(self, who: StrangerT) -> None:
-        """Note that a stranger has asked for something that can be understood."""
+    def asked(self, who: PendingT) -> None:
+        """Note that a client has sent a valid request."""
         self._silent.pop(who, None)
 
-    def gone(self, who: StrangerT) -> None:
-        """Forget a stranger: it has left, or is none any more."""
+    def gone(self, who: PendingT) -> None:
+        """Remove a client: it has left, or was authenticated."""
         self._places.pop(who, None)
         self._silent.pop(who, None)
 
-    def _first_of(self, place: str) -> StrangerT:
+    def _first_of(self, place: str) -> PendingT:
         all_there = [who for who, at in self._places.items() if at == place]
         return next((who for who in all_there if who in self._silent), all_there[0])
 
 
 def place_of(address: str) -> str:
-    """Return what counts as one address.
+    """Return the network that counts as one address.
 
     Example:
         >>> place_of("192.0.2.7"), place_of("2001:db8::1:7"), place_of("fe80::1%eth0"), place_of("")

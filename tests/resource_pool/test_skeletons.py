@@ -1,7 +1,11 @@
-"""The RC to be copied lives, obeys one holder, goes dark, and its driver is told what the mission file says."""
+"""RC and ARC to be copied: the lamp obeys one holder, shines while its robot is granted, and stands in a mission."""
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,6 +20,7 @@ from resource_pool.messages import Applied
 from resource_pool.rcs.scout import Scout
 from resource_pool.rcs.skeleton import Lamp, Shine
 
+TOP = Path(__file__).parents[2]
 DRIVER = "resource_pool.rcs.skeleton:PaintedLamp"
 
 
@@ -26,7 +31,7 @@ def said(pool: Pool) -> list[str]:
 
 
 def test_the_lamp_shines_for_its_holder_only_and_is_dark_afterwards(local_mission: Any) -> None:
-    async def main() -> None:
+    async def scene() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             await pool.start(Lamp, "lamp1", {"driver": DRIVER, "color": "green"})
             manager, one, two = pool.manager_voice, pool.voice("one"), pool.voice("two")
@@ -38,7 +43,35 @@ def test_the_lamp_shines_for_its_holder_only_and_is_dark_afterwards(local_missio
             await manager.ask("resource_pool/lamp1", Disconnect("one", 1), Disconnected, within_s=1)
             assert said(pool) == ["shines green at 100%", "is dark"]
 
-    run_virtual(main())
+    run_virtual(scene())
+
+
+def test_the_lamp_of_a_lit_robot_shines_while_the_robot_is_granted(local_mission: Any) -> None:
+    async def scene() -> None:
+        async with a_pool(local_mission, ["scout1", "radio", "lamp1"]) as pool:
+            arc = await pool.arc(await pool.owner("walker"), "lit_drive", "scout1")
+            await pool.clock.sleep_s(1.0)
+            assert said(pool) == ["shines green at 100%"]
+            await arc.idle()
+            await pool.clock.sleep_s(1.0)
+            assert said(pool) == ["shines green at 100%", "is dark"]
+
+    run_virtual(scene())
+
+
+def test_each_piece_of_mission_file_in_the_guide_stands_in_the_example() -> None:
+    example = " ".join((TOP / "docs/examples/lamp.xml").read_text().split())
+    pieces = re.findall(r"```xml\n(.*?)```", (TOP / "docs/how-to/write-a-driver.md").read_text(), re.S)
+    of_the_lamp = [" ".join(part.split()) for piece in pieces if "lamp" in piece for part in piece.split("…")]
+    assert len(of_the_lamp) == 3
+    assert [part for part in of_the_lamp if part not in example] == []
+
+
+@pytest.mark.processes
+def test_the_example_is_sound_and_both_robots_get_the_lamp() -> None:
+    command = [str(Path(sys.executable).parent / "scout-backbone"), "check", "docs/examples/lamp.xml", "--dry-run"]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True, check=False)
+    assert (done.returncode, "every request gets its turn" in done.stdout) == (0, True), done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
@@ -54,9 +87,9 @@ def test_the_lamp_shines_for_its_holder_only_and_is_dark_afterwards(local_missio
 def test_what_neither_rc_nor_driver_understands_keeps_it_from_starting(
     local_mission: Any, component: Any, parameters: dict[str, Any], fault: type[Exception]
 ) -> None:
-    async def main() -> None:
+    async def scene() -> None:
         async with a_pool(local_mission, [], manager=False) as pool:
             with pytest.raises(fault):
                 await pool.start(component, "lamp1", parameters)
 
-    run_virtual(main())
+    run_virtual(scene())

@@ -1,7 +1,7 @@
-"""The page: files of this package, each with what a browser must know to trust nothing else.
+"""The page: files of this package, each with the headers that make a browser trust nothing else.
 
-Rules of this file: no socket; a path goes in, what to answer comes out. Files are read once and named, so no path leads
-anywhere else.
+Rules of this file: no socket; a path goes in, an answer comes out. Files are read once and by name, so no path leads to
+another file.
 """
 
 from __future__ import annotations
@@ -95,19 +95,19 @@ SAFETY = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-cache",
 }
-"""Nothing from elsewhere, nothing inline, in nobody's frame; asked for anew each time, so no old page is shown."""
+"""Nothing from other sites, nothing inline, no frame around the page; revalidated each time: no old page is shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What to answer to a request for a file."""
+    """Answer to a request for a file."""
 
     status: int
     headers: dict[str, str]
     body: bytes
 
 
-class Site:
+class PageFiles:
     """The files of a page, read from the package.
 
     Args:
@@ -123,10 +123,10 @@ class Site:
             self._answers[path] = Answer(200, {**SAFETY, "Content-Type": kind, "ETag": tag}, body)
 
     def answer(self, path: str, known_tag: str = "") -> Answer:
-        """Return what to answer to a GET.
+        """Return the answer to a GET.
 
         Args:
-            path: As asked for, with query.
+            path: Of the request, with query.
             known_tag: ``If-None-Match`` of the request.
         """
         found = self._answers.get(path.partition("?")[0])
@@ -138,10 +138,10 @@ class Site:
 
 
 def is_own_page(origin: str, host: str) -> bool:
-    """Say whether a connection comes from this server's page, or from no page at all.
+    """Return whether a connection comes from this server's page, or from no page at all.
 
     Args:
-        origin: ``Origin`` of the request; empty: a program, which needs the token like everybody.
+        origin: ``Origin`` of the request; empty: a program, which needs the token too.
         host: ``Host`` of the request.
 
     Example:

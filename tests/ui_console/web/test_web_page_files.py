@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
+from ui_console.web.page_files import DESIGN_FILES, FILES, PageFiles, is_own_page
 from ui_console.web.pictures import jpeg, packet
-from ui_console.web.site import DESIGN_FILES, FILES, Site, is_own_page
 
 
 def texts() -> dict[str, str]:
@@ -21,7 +21,7 @@ def texts() -> dict[str, str]:
 
 def test_every_file_of_the_page_is_served_with_its_safety() -> None:
     for files, path in [(page, path) for page in (FILES, DESIGN_FILES) for path in page]:
-        answer = Site(files).answer(path + "?x=1")
+        answer = PageFiles(files).answer(path + "?x=1")
         assert answer.status == 200
         assert answer.body
         policy = answer.headers["Content-Security-Policy"]
@@ -31,7 +31,7 @@ def test_every_file_of_the_page_is_served_with_its_safety() -> None:
 
 
 def test_a_page_the_browser_has_is_not_sent_again() -> None:
-    site = Site()
+    site = PageFiles()
     tag = site.answer("/").headers["ETag"]
     assert (site.answer("/", tag).status, site.answer("/", tag).body) == (304, b"")
     assert site.answer("/", '"another"').status == 200
@@ -39,7 +39,7 @@ def test_a_page_the_browser_has_is_not_sent_again() -> None:
 
 @pytest.mark.parametrize("path", ["/../cli.py", "/page/index.html", "//", "/index.html/..", "/%2e%2e/cli.py", ""])
 def test_there_is_nothing_else(path: str) -> None:
-    assert Site().answer(path).status == 404
+    assert PageFiles().answer(path).status == 404
 
 
 def test_nothing_comes_from_elsewhere_and_nothing_is_inline() -> None:

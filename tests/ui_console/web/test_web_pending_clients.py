@@ -1,4 +1,4 @@
-"""Strangers at the door of the web console keep no operator out, whatever they do there and however many they are."""
+"""Clients without a token keep no operator of the web console out, in any number and at any step."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from websockets.asyncio.client import connect
 
-from ui_console.web import porch, strangers
-from ui_console.web.door import Doorkeeper, Hello, Offence, Pass, Welcome
+from ui_console.web import pending_clients, pending_connections
+from ui_console.web.login import Authenticator, Hello, ProtocolViolation, TokenRights, Welcome
 from ui_console.web.outbox import Outbox
+from ui_console.web.page_files import SOCKET_PATH, PageFiles
+from ui_console.web.page_server import PageServer, port_of
+from ui_console.web.pending_clients import MOST_OF_AN_ADDRESS, MOST_PENDING, PendingClients
 from ui_console.web.protocol import Intent, understand
-from ui_console.web.reception import Reception, port_of
-from ui_console.web.site import SOCKET_PATH, Site
-from ui_console.web.strangers import MOST_OF_AN_ADDRESS, MOST_STRANGERS, Strangers
 
 TOKEN = "right"  # noqa: S105  of this test
 WITHIN_S = 5.0
@@ -44,37 +44,37 @@ class Person:
         self.welcome, self.outbox, self.news = welcome, Outbox(), asyncio.Event()
 
 
-class Hall:
-    """A house without a mission."""
+class Receiver:
+    """An application without a mission."""
 
     def __init__(self) -> None:
-        self.guests: dict[Person, None] = {}
-        self.offences: list[tuple[str, Offence]] = []
+        self.clients: dict[Person, None] = {}
+        self.violations: list[tuple[str, ProtocolViolation]] = []
 
     def enter(self, welcome: Welcome) -> Person:
         person = Person(welcome)
         person.outbox.put_section("welcome", json.dumps(welcome.user).encode())
-        self.guests[person] = None
+        self.clients[person] = None
         return person
 
-    async def obey(self, guest: Person, intent: Intent) -> None:
+    async def obey(self, client: Person, intent: Intent) -> None:
         raise AssertionError(intent)
 
-    def refused(self, guest: Person) -> None:
-        raise AssertionError(guest)
+    def refused(self, client: Person) -> None:
+        raise AssertionError(client)
 
-    async def leave(self, guest: Person, reason: str) -> None:
-        del self.guests[guest]
+    async def leave(self, client: Person, reason: str) -> None:
+        del self.clients[client]
 
-    def offended(self, who: str, offence: Offence) -> None:
-        self.offences.append((who, offence))
+    def report_violation(self, who: str, violation: ProtocolViolation) -> None:
+        self.violations.append((who, violation))
 
 
-class Door:
-    """A reception that serves, and who comes to it."""
+class Served:
+    """A page server, and the clients that connect to it."""
 
-    def __init__(self, hall: Hall, port: int, client: ssl.SSLContext | None) -> None:
-        self.hall, self.port, self.client = hall, port, client
+    def __init__(self, application: Receiver, port: int, client: ssl.SSLContext | None) -> None:
+        self.application, self.port, self.client = application, port, client
 
     async def come_in(self) -> None:
         """Be welcomed with the right token, and leave."""
@@ -109,16 +109,18 @@ class Door:
 
 
 @asynccontextmanager
-async def door(encryption: ssl.SSLContext | None, client: ssl.SSLContext | None) -> AsyncIterator[Door]:
-    hall = Hall()
+async def served(encryption: ssl.SSLContext | None, client: ssl.SSLContext | None) -> AsyncIterator[Served]:
+    application = Receiver()
     read: Callable[[bytes | str], Hello | Intent] = understand
-    reception: Reception[Person, Intent] = Reception(hall, Doorkeeper({TOKEN: Pass("", 1)}), Site(), read)
-    async with reception.open("127.0.0.1", 0, encryption) as server:
-        yield Door(hall, port_of(server), client)
+    page_server: PageServer[Person, Intent] = PageServer(
+        application, Authenticator({TOKEN: TokenRights("", 1)}), PageFiles(), read
+    )
+    async with page_server.open("127.0.0.1", 0, encryption) as server:
+        yield Served(application, port_of(server), client)
 
 
-def at_door(visit: Callable[[Door], Awaitable[None]], *, encrypted: bool, loop: str) -> None:
-    """Let this visit happen at a door, in the loop of tests or of real servers."""
+def at_server(visit: Callable[[Served], Awaitable[None]], *, encrypted: bool, loop: str) -> None:
+    """Run this visit at a server, in the loop of tests or of real servers."""
     server = client = None
     if encrypted:
         authority = trustme.CA()
@@ -127,7 +129,7 @@ def at_door(visit: Callable[[Door], Awaitable[None]], *, encrypted: bool, loop: 
         authority.configure_trust(client)
 
     async def main() -> None:
-        async with door(server, client) as here:
+        async with served(server, client) as here:
             await visit(here)
 
     with asyncio.Runner(loop_factory=uvloop.new_event_loop if loop == "uvloop" else None) as runner:
@@ -139,7 +141,7 @@ def at_door(visit: Callable[[Door], Awaitable[None]], *, encrypted: bool, loop: 
 @pytest.mark.parametrize("many", [16, 200])
 @pytest.mark.parametrize("way", WAYS)
 def test_an_operator_gets_in_whatever_strangers_do(way: str, many: int, encrypted: bool, loop: str) -> None:
-    async def visit(here: Door) -> None:
+    async def visit(here: Served) -> None:
         with ExitStack() as stack:
             await here.crowd(stack, many, WAYS[way])
             await here.load_page()
@@ -147,12 +149,12 @@ def test_an_operator_gets_in_whatever_strangers_do(way: str, many: int, encrypte
             await here.crowd(stack, many, WAYS[way])
             await here.come_in()
 
-    at_door(visit, encrypted=encrypted, loop=loop)
+    at_server(visit, encrypted=encrypted, loop=loop)
 
 
 @pytest.mark.parametrize("encrypted", [False, True])
 def test_an_operator_who_is_in_is_not_cut_off_for_newcomers(encrypted: bool) -> None:
-    async def visit(here: Door) -> None:
+    async def visit(here: Served) -> None:
         scheme = "wss" if encrypted else "ws"
         async with connect(f"{scheme}://127.0.0.1:{here.port}{SOCKET_PATH}", ssl=here.client, proxy=None) as me:
             await me.send(json.dumps({"do": "hello", "token": TOKEN, "user": "anna"}))
@@ -162,9 +164,9 @@ def test_an_operator_who_is_in_is_not_cut_off_for_newcomers(encrypted: bool) -> 
                 await here.come_in()
                 async with asyncio.timeout(WITHIN_S):
                     await (await me.ping())
-                assert len(here.hall.guests) >= 1
+                assert len(here.application.clients) >= 1
 
-    at_door(visit, encrypted=encrypted, loop="uvloop")
+    at_server(visit, encrypted=encrypted, loop="uvloop")
 
 
 @pytest.mark.parametrize("loop", ["asyncio", "uvloop"])
@@ -173,9 +175,9 @@ def test_an_operator_who_is_in_is_not_cut_off_for_newcomers(encrypted: bool) -> 
 def test_strangers_are_gone_after_a_while(
     way: str, encrypted: bool, loop: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(porch, "STRANGER_WITHIN_S", 0.3)
+    monkeypatch.setattr(pending_connections, "AUTHENTICATED_WITHIN_S", 0.3)
 
-    async def visit(here: Door) -> None:
+    async def visit(here: Served) -> None:
         with ExitStack() as stack:
             running = asyncio.get_running_loop()
             for one in await here.crowd(stack, 3, WAYS[way]):
@@ -186,60 +188,60 @@ def test_strangers_are_gone_after_a_while(
                     except ConnectionError:
                         pass
 
-    at_door(visit, encrypted=encrypted, loop=loop)
+    at_server(visit, encrypted=encrypted, loop=loop)
 
 
 def test_a_crowd_is_told_once_with_its_address() -> None:
-    async def visit(here: Door) -> None:
+    async def visit(here: Served) -> None:
         with ExitStack() as stack:
             await here.crowd(stack, 200, b"")
             await here.come_in()
-        [(who, offence)] = here.hall.offences
+        [(who, violation)] = here.application.violations
         assert who == "127.0.0.1"
-        assert offence.fault == "crowd"
+        assert violation.kind == "crowd"
 
-    at_door(visit, encrypted=False, loop="asyncio")
+    at_server(visit, encrypted=False, loop="asyncio")
 
 
 # ---------------------------------------------------------------------- who makes room
 def test_of_an_address_the_oldest_silent_one_makes_room_before_any_that_asked() -> None:
-    door_: Strangers[int] = Strangers()
-    assert [door_.came(who, "a") for who in range(MOST_OF_AN_ADDRESS)] == [None] * MOST_OF_AN_ADDRESS
-    door_.asked(0)
-    assert door_.came(100, "a") == 1
-    door_.gone(2)
-    assert door_.came(101, "a") is None
+    pending: PendingClients[int] = PendingClients()
+    assert [pending.came(who, "a") for who in range(MOST_OF_AN_ADDRESS)] == [None] * MOST_OF_AN_ADDRESS
+    pending.asked(0)
+    assert pending.came(100, "a") == 1
+    pending.gone(2)
+    assert pending.came(101, "a") is None
     for who in range(3, 102):
-        door_.asked(who)
-    assert door_.came(102, "a") == 0, "all have asked: the oldest"
+        pending.asked(who)
+    assert pending.came(102, "a") == 0, "all have asked: the oldest"
 
 
 def test_many_from_few_addresses_keep_nobody_of_another_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(strangers, "MOST_STRANGERS", 6)
-    door_: Strangers[str] = Strangers()
+    monkeypatch.setattr(pending_clients, "MOST_PENDING", 6)
+    pending: PendingClients[str] = PendingClients()
     for number in range(4):
-        door_.came(f"flood {number}", "flood")
-    assert door_.came("anna", "lab") is None
-    assert door_.came("ben", "home") is None
-    assert door_.came("carla", "hall") == "flood 0"
-    assert door_.came("flood 9", "flood") == "flood 1"
+        pending.came(f"flood {number}", "flood")
+    assert pending.came("anna", "lab") is None
+    assert pending.came("ben", "home") is None
+    assert pending.came("carla", "hall") == "flood 0"
+    assert pending.came("flood 9", "flood") == "flood 1"
 
 
 @given(st.lists(st.tuples(st.sampled_from(["came", "asked", "gone"]), st.integers(0, 400), st.integers(0, 4))))
 def test_law_there_are_never_more_than_there_is_room_for(events: list[tuple[str, int, int]]) -> None:
-    door_: Strangers[int] = Strangers()
+    pending: PendingClients[int] = PendingClients()
     there: dict[int, int] = {}
     for what, who, address in events:
         if what == "came" and who not in there:
-            displaced = door_.came(who, str(address))
+            displaced = pending.came(who, str(address))
             there[who] = address
             if displaced is not None:
                 assert displaced != who
                 del there[displaced]
         elif what == "asked" and who in there:
-            door_.asked(who)
+            pending.asked(who)
         elif what == "gone":
-            door_.gone(who)
+            pending.gone(who)
             there.pop(who, None)
-        assert len(door_) == len(there) <= MOST_STRANGERS
+        assert len(pending) == len(there) <= MOST_PENDING
         assert all(list(there.values()).count(address) <= MOST_OF_AN_ADDRESS for address in range(5))
