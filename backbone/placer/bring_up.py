@@ -20,6 +20,7 @@ from backbone.nameserver.messages import (
     UnknownName,
 )
 from backbone.placer.creators import ANSWER_EACH_S, SPAWN_WITHIN_S, Creators, Fate, creator_of
+from backbone.placer.decisions import PlacementPhase, PlacementRecord
 from backbone.placer.messages import (
     CreatorSilent,
     NoHost,
@@ -27,11 +28,7 @@ from backbone.placer.messages import (
     StoppedMeanwhile,
 )
 from backbone.placer.news import News
-from backbone.placer.placement_book import (
-    PlacementBook,
-    PlacementPhase,
-    PlacementRecord,
-)
+from backbone.placer.placement_book import PlacementBook
 
 CREATOR_BACK_S = 5.0  # chosen: a killed creator is back within one second
 OLD_LIFE_S = 5.0  # chosen: longer than any lease that keeps tokens of a lost host's components

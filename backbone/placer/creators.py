@@ -28,14 +28,12 @@ from backbone.nameserver.messages import (
     UnknownName,
 )
 from backbone.naming import Subsystem
+from backbone.placer.decisions import PlacementRecord
 from backbone.placer.messages import (
     CreatorSilent,
 )
 from backbone.placer.news import News
-from backbone.placer.placement_book import (
-    PlacementBook,
-    PlacementRecord,
-)
+from backbone.placer.placement_book import PlacementBook
 
 ANSWER_EACH_S, ANSWER_WITHIN_S = 1.0, 5.0  # chosen: a killed core service is back within one second
 SPAWN_WITHIN_S = START_MOST_S + 5.0  # chosen: a creator's limit and a moment; silence ends a start long before

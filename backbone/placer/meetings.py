@@ -24,12 +24,9 @@ from backbone.nameserver.messages import (
 )
 from backbone.naming import component_of
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, Creators, creator_of
+from backbone.placer.decisions import Inspect, Instruction
 from backbone.placer.news import News
-from backbone.placer.placement_book import (
-    Inspect,
-    Instruction,
-    PlacementBook,
-)
+from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope
 
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED, LifeState.FAILED)

@@ -39,6 +39,7 @@ from backbone.nameserver.messages import (
 from backbone.naming import legal
 from backbone.placer.bring_up import BringUp
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, SPAWN_WITHIN_S, Creators, creator_of
+from backbone.placer.decisions import EndOrphan, Inspect, Instruction, Note, PlaceAgain, PlacementPhase, PlacementRecord
 from backbone.placer.meetings import Meetings, Work
 from backbone.placer.messages import (
     AskPlacement,
@@ -55,16 +56,7 @@ from backbone.placer.messages import (
     StoppedMeanwhile,
 )
 from backbone.placer.news import News
-from backbone.placer.placement_book import (
-    EndOrphan,
-    Inspect,
-    Instruction,
-    Note,
-    PlaceAgain,
-    PlacementBook,
-    PlacementPhase,
-    PlacementRecord,
-)
+from backbone.placer.placement_book import PlacementBook
 from backbone.wire import Envelope, Message, UnknownMessage
 
 AGAIN_PAUSES_S = (0.0, 0.25, 0.5, 1.0, 2.0, 5.0)  # chosen: before each try to place a missing component again
