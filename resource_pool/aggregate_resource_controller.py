@@ -46,12 +46,7 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.scheduling.claims import STREAMED_KINDS
-from backbone.scheduling.requests import (
-    PathNode,
-    Scheduled,
-    SchedulingRequest,
-    UnknownRequest,
-)
+from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.wire import Envelope, Message
 from resource_pool.arc_request import ArcParameters, request_of, require_runtime, set_of
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import msgspec
 
 from backbone.scheduling.claims import scheduling_request
-from backbone.scheduling.requests import (
-    MissingRuntime,
-    SchedulingRequest,
-    Usage,
-)
-from resource_pool.messages import (
-    NotMySet,
-)
+from backbone.scheduling.requests import MissingRuntime, PathNode, SchedulingRequest, Usage
+from resource_pool.messages import DEFAULT_DRIVE_USAGE, NotMySet
 
 
 class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Request and owner of an ARC; see ``arc_client.claim_parameters``.
+    """Request and owner of an ARC; see ``claim_parameters``.
 
     Attributes:
         owner: Address of the decision process.
@@ -48,6 +43,61 @@ class ArcParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     idle: bool = False
     stops_at_once: bool = False
     may_say_not_now: bool = False
+
+
+def claim_parameters(
+    owner: str,
+    *,
+    path: list[PathNode],
+    minimum_runtime_s: float,
+    maximum_runtime_s: float = 0.0,
+    wish: dict[str, str] | None = None,
+    features: dict[str, list[str]] | None = None,
+    usage: Usage | Sequence[Usage] = DEFAULT_DRIVE_USAGE,
+    console: bool = False,
+    idle: bool = False,
+    stops_at_once: bool = False,
+    may_say_not_now: bool = False,
+) -> dict[str, Any]:
+    """Return the parameters of an ARC for this owner.
+
+    Args:
+        owner: Address of the decision process.
+        path: Priority path from the mission's root, or of the console alone.
+        minimum_runtime_s: Shortest useful time, seconds, above 0.
+        maximum_runtime_s: End of extensions; 0: the minimum.
+        wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
+        features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
+        usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
+            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
+        console: True for consoles.
+        idle: True: no time is wanted yet.
+        stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
+            called, and the context switch does not wait for the owner.
+        may_say_not_now: True: the owner is asked shortly before the end of each slice that can be extended.
+
+    Raises:
+        ValueError: No usage is given, or two usages have the same kind.
+    """
+    usages = [usage] if isinstance(usage, Usage) else list(usage)
+    kinds = {one.kind for one in usages}
+    if not usages or len(kinds) < len(usages):
+        raise ValueError(f"{owner} claims with usages of the kinds {[one.kind for one in usages]}")
+    first, *further = ([one.period_s, one.packet_time_s, one.deadline_s, one.jitter_s, one.kind] for one in usages)
+    return {
+        "owner": owner,
+        "path": [[node.name, node.priority] for node in path],
+        "console": console,
+        "minimum_runtime_s": minimum_runtime_s,
+        "maximum_runtime_s": maximum_runtime_s,
+        "wish": wish or {},
+        "features": features or {},
+        "usage": first,
+        "further_usages": further,
+        "idle": idle,
+        "stops_at_once": stops_at_once,
+        "may_say_not_now": may_say_not_now,
+    }
 
 
 def request_of(

@@ -8,15 +8,9 @@ from collections.abc import Callable
 from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
-from backbone.rc_manager.messages import (
-    Done,
-    Extend,
-)
+from backbone.rc_manager.messages import Done, Extend
 from resource_pool.gate import Gate
-from resource_pool.messages import (
-    Noted,
-    SliceEnds,
-)
+from resource_pool.messages import Noted, SliceEnds
 
 ASK_BEFORE_END_S = 0.2  # chosen: question and answer take milliseconds, and a later answer is more accurate
 RC_REPLY_S = 0.8  # chosen: a robot RC itself gives the radio half a second

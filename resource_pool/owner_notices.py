@@ -8,12 +8,7 @@ from dataclasses import dataclass
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
-from resource_pool.messages import (
-    Noted,
-    Resumed,
-    Suspended,
-    Suspending,
-)
+from resource_pool.messages import Noted, Resumed, Suspended, Suspending
 
 NOTICE_S = 1.0  # chosen: an owner that needs longer fails its beat too
 NOTICE_AGAIN_S = 0.1  # chosen: a restarted hub is back after a few attempts; machine seconds

@@ -7,9 +7,7 @@ import os
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
 from backbone.component.process import EXIT_REFUSED, refusal_in_log
-from backbone.creator.messages import (
-    StartFailed,
-)
+from backbone.creator.messages import StartFailed
 from backbone.creator.supervision import describe
 from backbone.errors import code_of
 

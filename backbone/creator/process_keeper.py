@@ -20,10 +20,7 @@ from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
 from backbone.component.heartbeat import forget_heartbeat, read_vitals
 from backbone.component.launch import Launch
-from backbone.component.membership import (
-    PROCESSES,
-    read_process_address,
-)
+from backbone.component.membership import PROCESSES, read_process_address
 from backbone.component.messages import Absence, Stop, Stopping
 from backbone.creator.decisions import (
     AskToStop,

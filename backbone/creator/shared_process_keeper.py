@@ -23,9 +23,7 @@ from backbone.component.membership import (
     MemberEnding,
     process_address,
 )
-from backbone.creator.decisions import (
-    Instruction,
-)
+from backbone.creator.decisions import Instruction
 from backbone.creator.shared_processes import (
     AdmitMember,
     EndMemberAlone,

@@ -9,24 +9,12 @@ from collections.abc import Callable
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
-from backbone.creator.messages import (
-    Spawned,
-    StartFailed,
-)
+from backbone.creator.messages import Spawned, StartFailed
 from backbone.errors import LinkError, NoResponder
-from backbone.nameserver.messages import (
-    Resolve,
-    Resolved,
-    UnknownName,
-)
+from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.placer.creators import ANSWER_EACH_S, SPAWN_WITHIN_S, Creators, Fate, creator_of
 from backbone.placer.decisions import PlacementPhase, PlacementRecord
-from backbone.placer.messages import (
-    CreatorSilent,
-    NoHost,
-    Started,
-    StoppedMeanwhile,
-)
+from backbone.placer.messages import CreatorSilent, NoHost, Started, StoppedMeanwhile
 from backbone.placer.news import News
 from backbone.placer.placement_book import PlacementBook
 

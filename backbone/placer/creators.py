@@ -20,18 +20,10 @@ from backbone.creator.messages import (
 )
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import LinkError
-from backbone.nameserver.messages import (
-    Components,
-    ListComponents,
-    Resolve,
-    Resolved,
-    UnknownName,
-)
+from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.naming import Subsystem
 from backbone.placer.decisions import PlacementRecord
-from backbone.placer.messages import (
-    CreatorSilent,
-)
+from backbone.placer.messages import CreatorSilent
 from backbone.placer.news import News
 from backbone.placer.placement_book import PlacementBook
 

@@ -10,18 +10,10 @@ from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.component.messages import ComponentState, LifeState
-from backbone.creator.messages import (
-    CUT_OFF_ENDS_WITHIN_S,
-    HostLoad,
-    ListProcesses,
-    Processes,
-    ProcessFell,
-)
+from backbone.creator.messages import CUT_OFF_ENDS_WITHIN_S, HostLoad, ListProcesses, Processes, ProcessFell
 from backbone.errors import LinkError
 from backbone.keys import Conversation
-from backbone.nameserver.messages import (
-    RECONNECT_S,
-)
+from backbone.nameserver.messages import RECONNECT_S
 from backbone.naming import component_of
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, Creators, creator_of
 from backbone.placer.decisions import Inspect, Instruction

@@ -23,19 +23,10 @@ from backbone.component.launch import Launch
 from backbone.component.messages import Absence
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
 from backbone.creator.messages import TYPE as CREATOR
-from backbone.creator.messages import (
-    EndedBy,
-    RestartPolicy,
-    Spawn,
-)
+from backbone.creator.messages import EndedBy, RestartPolicy, Spawn
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import (
-    Appeared,
-    Components,
-    Disappeared,
-    ListComponents,
-)
+from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
 from backbone.naming import legal
 from backbone.placer.bring_up import BringUp
 from backbone.placer.creators import ANSWER_EACH_S, ANSWER_WITHIN_S, SPAWN_WITHIN_S, Creators, creator_of

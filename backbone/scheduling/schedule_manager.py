@@ -50,11 +50,7 @@ from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
-from backbone.scheduling.requests import (
-    Lease,
-    NotMovable,
-    SchedulingRequest,
-)
+from backbone.scheduling.requests import Lease, NotMovable, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.transitions import Transitions
