@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from typing import Any
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -41,9 +40,9 @@ class ChildKeeper:
         nodes: Mapping[str, BehaviorNode],
         path: Callable[[], Sequence[PathStep]],
         *,
-        reported: Callable[[str, BehaviorStatus, Mapping[str, Any]], None],
+        reported: Callable[[str, BehaviorStatus, Mapping[str, object]], None],
         left: Callable[[str], None],
-        begin: Callable[[Coroutine[Any, Any, Any], str], asyncio.Task[None] | None],
+        begin: Callable[[Coroutine[object, None, None], str], asyncio.Task[None] | None],
         note: Callable[[str, str], object],
         publish_event: Callable[..., None],
         changed: Callable[[], None],
@@ -173,8 +172,8 @@ class ChildKeeper:
                 creator, Conversation.EVENTS, ProcessFell, self._heard_fall
             )
 
-    def _heard_fall(self, envelope: Envelope[Any]) -> None:
-        fell: ProcessFell = envelope.body
+    def _heard_fall(self, envelope: Envelope[ProcessFell]) -> None:
+        fell = envelope.body
         if fell.name in self._nodes and fell.failing:
             fell_too_often = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
             self._reported(fell.name, BehaviorStatus.FAILURE, fell_too_often)
@@ -187,6 +186,6 @@ async def end_task(task: asyncio.Task[None] | None) -> None:
         await asyncio.wait({task})
 
 
-def why(refusal: Refusal) -> dict[str, Any]:
+def why(refusal: Refusal) -> dict[str, object]:
     """Return a refusal as the payload of a report."""
     return {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}

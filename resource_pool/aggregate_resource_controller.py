@@ -418,7 +418,7 @@ class AggregateResourceController(Component[ArcParameters]):
 
     # ------------------------------------------------------------------ watching
 
-    def _heard_leases(self, envelope: Envelope[Any]) -> None:
+    def _heard_leases(self, envelope: Envelope[Leases]) -> None:
         if self._lease.heard(envelope.body, envelope.stamp_s, self._gate.epochs):
             self.publish_event(self.name, "is counted as running and holds nothing: sends its request again")
             self.start_task(self._ask_anew(), "ask anew")

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
@@ -64,7 +64,7 @@ class ArcKeeper:
         self._bus, self._arc, self._wish, self._client = bus, arc, wish, client
         self._clock, self._on_changed = clock, on_changed
 
-    async def keep(self, kind: str, parameters: dict[str, Any], *, rests: bool, patience_s: float) -> None:
+    async def keep(self, kind: str, parameters: dict[str, object], *, rests: bool, patience_s: float) -> None:
         """Claim the ARC, and claim it again whenever it is gone, until cancelled; see ``ArcClient.keep``."""
         is_there = rests and await self._wake()
         give_up_s = self._clock.now_s() + patience_s * self._clock.rate
@@ -99,7 +99,7 @@ class ArcKeeper:
             return False
         return True
 
-    async def _start_anew(self, kind: str, parameters: dict[str, Any], give_up_s: float) -> None:
+    async def _start_anew(self, kind: str, parameters: dict[str, object], give_up_s: float) -> None:
         """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
         while True:
             try:

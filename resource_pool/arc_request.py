@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import msgspec
 
@@ -58,7 +57,7 @@ def claim_parameters(
     idle: bool = False,
     stops_at_once: bool = False,
     may_say_not_now: bool = False,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the parameters of an ARC for this owner.
 
     Args:

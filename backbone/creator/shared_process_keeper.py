@@ -7,7 +7,7 @@ import logging
 import math
 import signal
 from collections.abc import Callable, Coroutine
-from typing import Any, assert_never
+from typing import assert_never
 
 import msgspec
 
@@ -58,7 +58,7 @@ class SharedProcessKeeper:
         *,
         launch_of: Callable[[str], Launch],
         report: Callable[[list[Instruction]], None],
-        task: Callable[[Coroutine[Any, Any, None], str], asyncio.Task[None]],
+        task: Callable[[Coroutine[object, None, None], str], asyncio.Task[None]],
     ) -> None:
         """Keep no process yet.
 
@@ -186,7 +186,7 @@ class SharedProcessKeeper:
             raise RuntimeError("a shared process serves before there is a bus to hear of it")
         return self._bus
 
-    def _talk(self, pid: int, work: Coroutine[Any, Any, None], name: str) -> None:
+    def _talk(self, pid: int, work: Coroutine[object, None, None], name: str) -> None:
         """Run work that is cancelled when its shared process ends."""
         talks, talk = self._talks.setdefault(pid, set()), self._task(work, name)
         talks.add(talk)

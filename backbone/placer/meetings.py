@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from functools import partial
-from typing import Any
 
 from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -23,7 +22,7 @@ from backbone.wire import Envelope
 
 LEAVING = (LifeState.DRAINING, LifeState.STOPPED, LifeState.FAILED)
 
-Work = Callable[[], Coroutine[Any, Any, None]]
+Work = Callable[[], Coroutine[object, None, None]]
 
 
 class Meetings:
