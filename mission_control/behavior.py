@@ -1,8 +1,8 @@
 """Behavior: base class of every decision process that is no console.
 
 A behavior claims at most one ARC, is notified of the begin and end of grants, starts its children through the placer
-and reports its progress to its parent. Derive and override the hooks you need; each hook documents when it is called,
-its purpose, and what it must not do. Begin with a copy of ``behaviors/skeleton.py``.
+and reports its progress to its parent. Derive and override the hooks you need (``behavior_hooks``). Begin with a copy
+of ``behaviors/skeleton.py``.
 
 State on ``self`` survives every suspension, because only the RCs are taken and the process continues.
 
@@ -28,6 +28,7 @@ from backbone.errors import LinkError, Refusal
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.wire import Envelope, Message, UnknownMessage
+from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_tree import (
     ArcNeed,
     BehaviorNode,
@@ -86,10 +87,11 @@ class NotAChild(Refusal):
 B = TypeVar("B", bound=BehaviorParameters)
 
 
-class Behavior(Component[B], Generic[B]):
+class Behavior(Component[B], BehaviorHooks, Generic[B]):
     """A running node of the behavior tree.
 
-    Class variables to set: ``parameters_type``, and ``children_together`` (False: one after the other).
+    Derive and override the hooks of ``BehaviorHooks`` that you need. Class variables to set: ``parameters_type``, and
+    ``children_together`` (False: one after the other).
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
@@ -125,102 +127,13 @@ class Behavior(Component[B], Generic[B]):
         self._keeping: asyncio.Task[None] | None = None
         self._acting: asyncio.Task[None] | None = None
 
-    # ------------------------------------------------------------------ hooks
-    async def start(self) -> None:
-        """Prepare.
-
-        When: once, after readiness, before the claim of the ARC and the start of children.
-        What: subscribe to events of other components, set up state. Not: wait for the ARC or for children.
-        """
-
+    # ------------------------------------------------------------------ hooks with a default of their own
     def need(self) -> ArcNeed | None:
-        """Return the ARC to claim.
-
-        When: once, after ``start``. What: by default the ARC of the tree; a behavior that computes better run times
-        returns the same need with these. Not: ask for another kind of ARC.
-        """
+        """Return the ARC of the tree; see ``BehaviorHooks``."""
         return self.parameters.arc
 
-    async def resumed(self, rcs: Mapping[str, str]) -> None:
-        """Continue with the granted RCs.
-
-        When: at the begin of each grant; commands pass and pictures arrive from now on.
-        What: inform algorithms of the elapsed time. Not: drive in a loop; that is ``act``.
-
-        Args:
-            rcs: Kind → name of the granted RCs.
-        """
-
-    async def act(self) -> None:
-        """Command the robot.
-
-        When: runs as a task from each ``resumed`` on; it is cancelled before ``suspending`` and ``suspended``.
-        What: await ``self.arc`` commands and the clock, keep progress on ``self``. If a command is too late for the
-        grant, the task ends without an error. After a ``LinkError`` it begins again; after an operator's stop it begins
-        again when that stop is lifted.
-        Not: catch the cancellation and continue.
-        """
-
-    async def suspending(self, deadline_s: float) -> None:
-        """Stop cleanly.
-
-        When: shortly before the end of a slice, except before an override by a human. A behavior that overrides neither
-        this hook nor ``act`` is not called. Commands still pass.
-        What: stop the robot, then return. Not: exceed the deadline.
-
-        Args:
-            deadline_s: Seconds left.
-        """
-
-    def not_now(self) -> float:
-        """Return the time that is needed beyond the end of the slice.
-
-        When: shortly before the end of the minimum run time and of each extension, if the maximum run time is longer
-        and the behavior overrides this hook.
-        What: return an estimate of the needed time, from known data. Not: wait; ask for spare time, because other ARCs
-        wait for it; rely on it, because a higher behavior or a person still preempts.
-
-        Returns:
-            Seconds still needed beyond the end of the slice; 0: it may end.
-        """
-        return 0.0
-
-    async def suspended(self, reason: str, by: str) -> None:
-        """Handle the end of a grant.
-
-        When: after every loss of the RCs, also without an announcement. What: keep the state, report it.
-        Not: send commands; no picture arrives until ``resumed``.
-
-        Args:
-            reason: ``slice``, ``higher``, ``rc``, ``lost`` …
-            by: The ARC or RC that caused it.
-        """
-
-    def see(self, frame: Frame) -> None:
-        """Process a picture.
-
-        When: for the newest picture of the present grant; older pictures are skipped.
-        What: detect, publish, ``report``. Not: take longer than a picture's period, because it blocks the event loop.
-        """
-
-    async def child_finished(
-        self,
-        child: str,  # noqa: ARG002  for those who override
-        status: BehaviorStatus,
-        payload: Mapping[str, Any],  # noqa: ARG002
-    ) -> Decision:
-        """Decide what follows the end of a child.
-
-        When: a child reported success or failure, was refused at its start, or fell too often.
-        What: return the decision; by default a failure aborts, a success continues. Not: start or stop children here.
-        """
-        return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
-
     async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
-        """Conclude after the end of all children.
-
-        When: the last child finished, or one aborted the others. What: by default, finish with the same status.
-        """
+        """Finish with the same status; see ``BehaviorHooks``."""
         self.finish(status, payload)
 
     # ------------------------------------------------------------------ for derived classes
@@ -356,7 +269,7 @@ class Behavior(Component[B], Generic[B]):
     @property
     def _commands_nothing(self) -> bool:
         """True if it sends no commands, because it overrides neither ``act`` nor ``suspending``."""
-        return type(self).act is Behavior.act and type(self).suspending is Behavior.suspending
+        return type(self).act is BehaviorHooks.act and type(self).suspending is BehaviorHooks.suspending
 
     async def _keep(self, arc: ArcClient, need: ArcNeed) -> None:
         parameters = claim_parameters(
@@ -368,7 +281,7 @@ class Behavior(Component[B], Generic[B]):
             features=need.features,
             usage=Usage(need.period_s, need.packet_time_s, kind=need.kind),
             stops_at_once=self._commands_nothing,
-            may_say_not_now=type(self).not_now is not Behavior.not_now,
+            may_say_not_now=type(self).not_now is not BehaviorHooks.not_now,
         )
         try:
             await arc.keep(self.clock, need.kind, parameters, patience_s=START_PATIENCE_S, on_changed=self.changed)

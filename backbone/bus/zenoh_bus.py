@@ -21,16 +21,7 @@ from typing import Any, cast
 import zenoh
 
 from backbone.bus.bus_base import BusBase, settle
-from backbone.bus.interface import (
-    Accepted,
-    Answer,
-    Clock,
-    LifeListener,
-    LinkListener,
-    Listener,
-    Reply,
-    Subscription,
-)
+from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
 from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
