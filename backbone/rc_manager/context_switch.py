@@ -118,8 +118,8 @@ class ContextSwitch:
             It confirmed that it holds nothing any more.
         """
         left = self._left[rc]
-        while holds := {*found, *(hold for hold, until_s in left.items() if until_s > self._clock.now_s())}:
-            if await self._disconnect([*holds], "held from before it was down", math.inf):
+        while holds := [*dict.fromkeys([*found, *(one for one in left if left[one] > self._clock.now_s())])]:
+            if await self._disconnect(holds, "held from before it was down", math.inf):
                 return False
             found = ()
             for hold in holds:

@@ -22,6 +22,7 @@ from backbone.placer.messages import NotPlaced
 from mission_control.laboratory.simulation.audit import Audit
 
 HOST = "host"  # chosen: all components are on one host
+PID = 1  # chosen: they share one process; its true pid would make two runs of one seed differ
 FALLEN_AWAY_S = 0.3  # chosen: a creator's first back-off is of this order
 STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when it withdraws
 
@@ -166,6 +167,7 @@ class PlayedHosts:
             await bus.close()
             self._audit.note(role.name, "gives up", error=f"{type(refusal).__name__}: {refusal}")
             return
+        component.pid = PID
         life.component = component
         self._audit.note(role.name, "begins")
         watching = bus.watch_alive(launch.address, lambda _, alive: life.ready.set() if alive else life.ready.clear())
