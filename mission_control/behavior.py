@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Coroutine, Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar, assert_never
 
@@ -33,7 +32,7 @@ from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_tree import (
     ArcNeed,
     BehaviorNode,
@@ -104,7 +103,7 @@ class Behavior(Component[B], Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | ChildReport | AskBehavior
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
@@ -271,7 +270,7 @@ class Behavior(Component[B], Generic[B]):
         if self._nodes:
             self._begin(self._stop_children_of_an_earlier_life(), "children of an earlier life")
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC, the children, and ``AskBehavior``."""
         match asked.body:
             case ChildReport(child=child, status=status, payload=payload):
@@ -436,7 +435,7 @@ class Behavior(Component[B], Generic[B]):
             self._begin(self._carry_out_in_order(instructions), "children")
 
     async def _carry_out_in_order(self, instructions: Sequence[Instruction]) -> None:
-        starting: list[Coroutine[Any, Any, None]] = []
+        starting: list[Coroutine[object, None, None]] = []
         for instruction in instructions:
             match instruction:
                 case StartChild(name):
@@ -548,8 +547,8 @@ class Behavior(Component[B], Generic[B]):
             creator = address(Subsystem.BACKBONE, creator_name(host))
             self._heard_creators[host] = self.bus.subscribe(creator, Conversation.EVENTS, ProcessFell, self._heard_fall)
 
-    def _heard_fall(self, envelope: Envelope[Any]) -> None:
-        fell: ProcessFell = envelope.body
+    def _heard_fall(self, envelope: Envelope[ProcessFell]) -> None:
+        fell = envelope.body
         if fell.name in self._nodes and fell.failing:
             why = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
             self._child_reported(fell.name, BehaviorStatus.FAILURE, why)
@@ -594,7 +593,7 @@ class Behavior(Component[B], Generic[B]):
     def _report(self) -> ChildReport:
         return ChildReport(self.name, self.status, self.payload)
 
-    def _begin(self, work: Coroutine[Any, Any, Any], name: str) -> asyncio.Task[None] | None:
+    def _begin(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""
         if self.state is not LifeState.READY:
             work.close()

@@ -13,10 +13,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import types
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -58,7 +57,7 @@ from backbone.scheduling.requests import (
     UnknownRequest,
     Usage,
 )
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.gate import Gate
 from resource_pool.messages import (
     Accepted,
@@ -147,7 +146,7 @@ class AggregateResourceController(Component[ArcParameters]):
     """Base class of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC in its set, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
@@ -239,7 +238,7 @@ class AggregateResourceController(Component[ArcParameters]):
             except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
                 log.info("not withdrawn: %s", error)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Obey the RC manager for the gate, and the owner for everything else."""
         match asked.body:
             case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:
@@ -576,9 +575,9 @@ class AggregateResourceController(Component[ArcParameters]):
             await self.clock.sleep_s(NOTICE_AGAIN_S * self.clock.rate)
 
     # ------------------------------------------------------------------ watching
-    def _heard_leases(self, envelope: Envelope[Any]) -> None:
+    def _heard_leases(self, envelope: Envelope[Leases]) -> None:
         """Extend the lease of the set if all its RCs were renewed."""
-        leases: Leases = envelope.body
+        leases = envelope.body
         renewed = {lease.rc: lease.epoch for lease in leases.leases if lease.arc == self.name}
         if self._gate.epochs and self._gate.epochs.items() <= renewed.items():
             self._lease_until_s = max(self._lease_until_s, envelope.stamp_s + leases.lease_s)

@@ -161,7 +161,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return future
 
 
-def run_virtual(main: Coroutine[Any, Any, T]) -> T:
+def run_virtual(main: Coroutine[object, None, T]) -> T:
     """Run the coroutine on a new ``VirtualLoop`` and return its result.
 
     Example:

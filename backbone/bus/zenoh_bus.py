@@ -23,7 +23,6 @@ import zenoh
 from backbone.authentication import USER
 from backbone.bus.bus_base import BusBase, settle
 from backbone.bus.interface import (
-    Accepted,
     Answer,
     Clock,
     LifeListener,
@@ -35,6 +34,7 @@ from backbone.bus.interface import (
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (
+    Accepts,
     Envelope,
     MalformedMessage,
     Message,
@@ -264,7 +264,7 @@ class ZenohBus(BusBase):
             raise body.revive()
         return cast("Reply", body)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         reader = _reader(accepts)
@@ -275,7 +275,7 @@ class ZenohBus(BusBase):
 
         return self._declare(self._session.declare_queryable(own, lambda query: self.push(arrived, query)))
 
-    async def _answer(self, reader: Reader[Any], answer: Answer, own: str, query: zenoh.Query) -> None:
+    async def _answer(self, reader: Reader[Message], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
             question = reader.read(_bytes_of(query.payload))
             envelope = await self.reply_to(question, answer)
@@ -291,7 +291,7 @@ class ZenohBus(BusBase):
         finally:
             query.drop()  # type: ignore[no-untyped-call]
 
-    def _write_reply(self, envelope: Any) -> bytes:
+    def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:
             return write(envelope)
         except OversizedMessage as refusal:
@@ -303,7 +303,7 @@ class ZenohBus(BusBase):
         if not self.closed:
             self.send(address, conversation, message)
 
-    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
+    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Message]:
         """Publish over the session and return the envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
         self._publishers.move_to_end((address, conversation))
@@ -326,7 +326,7 @@ class ZenohBus(BusBase):
         return publisher
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
@@ -483,7 +483,7 @@ class _Arrived:
 class _Each:
     """Receives every sample of a subscriber, in order."""
 
-    def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
+    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
         self._bus, self._reader, self._listener = bus, reader, listener
 
     def __call__(self, sample: zenoh.Sample) -> None:
@@ -506,7 +506,7 @@ class _Latest(_Each):
     before it reads the flag, and the loop clears the flag before it takes samples out.
     """
 
-    def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
+    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
         super().__init__(bus, reader, listener)
         self._newest: dict[str, zenoh.Sample] = {}
         self._pushed = False
@@ -536,18 +536,18 @@ def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
     return payload.to_bytes()
 
 
-_readers: dict[Any, Reader[Any]] = {}
-_reply_readers: dict[type[Any], Reader[Any]] = {}
+_readers: dict[Accepts, Reader[Message]] = {}
+_reply_readers: dict[type[Message], Reader[Message]] = {}
 
 
-def _reader(accepts: Accepted) -> Reader[Any]:
+def _reader(accepts: Accepts) -> Reader[Message]:
     reader = _readers.get(accepts)
     if reader is None:
         reader = _readers[accepts] = Reader(accepts)
     return reader
 
 
-def _reply_reader(reply: type[Any]) -> Reader[Any]:
+def _reply_reader(reply: type[Message]) -> Reader[Message]:
     reader = _reply_readers.get(reply)
     if reader is None:
         reader = _reply_readers[reply] = Reader(reply | Refused)

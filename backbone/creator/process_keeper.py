@@ -509,7 +509,7 @@ class ProcessKeeper:
             raise RuntimeError("a shared process serves before there is a bus to hear of it")
         return self._bus
 
-    def _talk(self, pid: int, work: Coroutine[Any, Any, None], name: str) -> None:
+    def _talk(self, pid: int, work: Coroutine[object, None, None], name: str) -> None:
         """Run work that is cancelled when its shared process ends."""
         talks, talk = self._talks.setdefault(pid, set()), self._task(work, name)
         talks.add(talk)
@@ -523,7 +523,7 @@ class ProcessKeeper:
         self._alarm_s = at_s
         self._alarm = self._task(self._ring(at_s), "supervision's alarm")
 
-    def _task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+    def _task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         task = asyncio.create_task(work, name=name)
         self._tasks.add(task)
         task.add_done_callback(self._task_done)

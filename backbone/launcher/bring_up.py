@@ -185,7 +185,7 @@ class Launcher(Component[NoParameters]):
         publish_action(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
         self.end(signal.SIGINT.name)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``ListProcesses`` for the core services, ``AskLog`` and ``AskPeople``."""
         match asked.body:
             case ListProcesses():

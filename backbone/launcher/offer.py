@@ -79,7 +79,7 @@ class Offer(Component[NoParameters]):
         """Report that the machine is in the mission."""
         self._on_ready()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``ListProcesses`` with the creator's process."""
         if isinstance(asked.body, ListProcesses):
             return Processes(self.launch.host, [], self._creator.processes())

@@ -14,7 +14,7 @@ from contextlib import AsyncExitStack
 from enum import Enum
 from functools import partial
 from itertools import chain, repeat
-from typing import Any, assert_never
+from typing import assert_never
 
 from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -132,7 +132,7 @@ class Placer(Component[NoParameters]):
             begin = await self._queue.get()
             begin()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Start``, ``StopComponent``, ``AskPlacement`` and ``ListPlacements``."""
         match asked.body:
             case Start() as order:
@@ -409,7 +409,7 @@ class Placer(Component[NoParameters]):
             ) from error
 
     # ------------------------------------------------------------------ events
-    def _component_changed(self, heard: Envelope[Any]) -> None:
+    def _component_changed(self, heard: Envelope[Message]) -> None:
         match heard.body:
             case Appeared(component=component) if component.type == CREATOR:
                 self._enqueue(partial(self._begin_meeting, component))
@@ -442,7 +442,7 @@ class Placer(Component[NoParameters]):
         """Queue this for ``serve``, because events arrive before the component serves."""
         self._queue.put_nowait(begin)
 
-    def _begin(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
+    def _begin(self, work: Callable[[], Coroutine[object, None, None]], name: str) -> None:
         self.start_task(work(), name)
 
     def _carry_out(self, instructions: list[Instruction]) -> None:

@@ -59,7 +59,7 @@ class Surveillance(Behavior[SurveillanceParameters]):
         """Return the base's counters and the events by robot."""
         return {**super().statistics(), **{f"events_{robot}": count for robot, count in self._events.items()}}
 
-    def _heard(self, envelope: Envelope[Any]) -> None:
+    def _heard(self, envelope: Envelope[MotionSeen]) -> None:
         self._last = envelope.body
         self._events[envelope.body.robot] += 1
         self.tell_parent({"events": dict(self._events), "last_event_s": envelope.body.at_s})

@@ -21,7 +21,7 @@ from backbone.command_line.cli import read_secret_option
 from backbone.component.launch import Launch
 from backbone.launcher.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
 
@@ -102,7 +102,7 @@ async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joinin
     return Joining(launch, clock, secret)
 
 
-def end_on_signals(console: Observer[Any]) -> Callable[[], bool]:
+def end_on_signals(console: AnyObserver) -> Callable[[], bool]:
     """Make SIGINT and SIGTERM end the console in good order; the result returns whether SIGINT came."""
     return _end_on(console.end, signal.SIGINT, signal.SIGTERM)
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Awaitable, Callable
 from typing import Any, ClassVar
 
@@ -21,7 +20,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.operators import OperatorAction
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
@@ -57,7 +56,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskHandOver | AskLift
+    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift
 
     def __init__(
         self,
@@ -290,7 +289,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.start_task(self._work_and_end(self._work), "work")
         await self.watch()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())

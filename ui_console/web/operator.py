@@ -21,7 +21,7 @@ from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, Pic
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
 from ui_console.session.consent_answers import ConsentAnswers
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web import protocol
 from ui_console.web.found_log import FoundLog
@@ -49,7 +49,7 @@ AtWork = (
 class OperatorServices(Protocol):
     """Services of the server for an operator."""
 
-    observer: Observer[Any]
+    observer: AnyObserver
     team: TeamModel
     clock: Clock
 

@@ -122,7 +122,7 @@ class Operator(Component[OperatorParameters]):
         )
         await self._arc.keep(self.clock, KIND, parameters)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC's notices."""
         if not isinstance(asked.body, ArcNotice):
             raise NotMyArc(f"{self.name} answers its ARC alone")

@@ -203,8 +203,8 @@ class _Trial:
         if line["ev"] == "request" and line["arc"] in self._requested:
             self._requested[line["arc"]].set()
 
-    def _world_moved(self, envelope: Envelope[Any]) -> None:
-        state: WorldState = envelope.body
+    def _world_moved(self, envelope: Envelope[WorldState]) -> None:
+        state = envelope.body
         self._frame, self._world_began_s = state.frame, state.at_s - state.frame / FRAMES_PER_S
         if not self._samples or self._samples[-1].on != state.transmitting:
             self._samples.append(Transmitting(state.at_s, dict(state.transmitting)))
@@ -212,8 +212,8 @@ class _Trial:
             self._waits_for[1].set()
             self._waits_for = None
 
-    def _motion_seen(self, envelope: Envelope[Any]) -> None:
-        seen: MotionSeen = envelope.body
+    def _motion_seen(self, envelope: Envelope[MotionSeen]) -> None:
+        seen = envelope.body
         since_s = seen.at_s - self._world_began_s - self._departs_s
         is_true = is_in_view(self._condition.passage, self._places[seen.robot], since_s)
         self._seen.append((since_s, seen.robot, is_true))

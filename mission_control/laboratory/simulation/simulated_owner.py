@@ -92,9 +92,11 @@ class SimulatedOwner(Component[OwnerParameters]):
         if not self.parameters.rests:
             await self._live_with_arc()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Pass a notice to the ARC client."""
-        notice: ArcNotice = asked.body
+        notice = asked.body
+        if not isinstance(notice, ArcNotice):
+            return await super().answer(asked)
         if self._arc is None:
             raise NotMyArc(f"{self.name} claims nothing", arc=notice_arc(notice))
         return await self._arc.handle(notice)

@@ -22,7 +22,7 @@ from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalBus, LocalNetwork
-from backbone.component.component import Component, NoParameters
+from backbone.component.component import AnyComponent, Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.component.process import load_class
@@ -102,7 +102,7 @@ class RunningMission:
         """
         return await self.bus.ask(PLACER, StopComponent(name, reason), Ended, within_s=START_TIME_S)
 
-    def component(self, name: str) -> Component[Any]:
+    def component(self, name: str) -> AnyComponent:
         """Return the component of this name.
 
         Raises:
@@ -128,7 +128,7 @@ async def mission_in_one_process(
     description: MissionDescription,
     *,
     trace: Callable[[dict[str, Any]], None] | None = None,
-    consoles: Mapping[str, Callable[[Launch, Bus, Clock], Component[Any]]] | None = None,
+    consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]] | None = None,
 ) -> AsyncIterator[RunningMission]:
     """Yield the mission, up and ready, on the running loop's time; end all components at the end of the block.
 
@@ -159,7 +159,7 @@ async def mission_in_one_process(
     bus = network.join(MEETING_AT, clock)
     running = RunningMission(_painted(description), network, bus, clock, hosts)
 
-    def decided(envelope: Envelope[Any]) -> None:
+    def decided(envelope: Envelope[TraceLine]) -> None:
         running.trace.append(envelope.body.line)
         if trace is not None:
             trace(envelope.body.line)
@@ -203,7 +203,7 @@ def _first_fall(happenings: list[Happening]) -> str | None:
 
 
 # ---------------------------------------------------------------------- bring-up, in the papers' order
-async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[..., Component[Any]]]) -> None:
+async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[..., AnyComponent]]) -> None:
     mission, hosts = running.description, running.hosts
     resources = [msgspec.to_builtins(resource) for resource in mission.resources]
     types = [msgspec.to_builtins(component_type) for component_type in mission.types]
@@ -216,7 +216,7 @@ async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[...
     def placer(launch: Launch, bus: Bus, clock: Clock) -> WholePlacer:
         return WholePlacer(launch, bus, clock, hosts=hosts, types=mission.types, consoles=consoles)
 
-    core: list[tuple[Callable[..., Component[Any]], str, dict[str, Any]]] = [
+    core: list[tuple[Callable[..., AnyComponent], str, dict[str, Any]]] = [
         (Nameserver, "nameserver", {}),
         (ComponentDatabase, "component_database", {"types": types}),
         (placer, "placer", {}),
@@ -248,7 +248,7 @@ class WholePlacer(Component[NoParameters]):
         *,
         hosts: PlayedHosts,
         types: tuple[ComponentType, ...],
-        consoles: Mapping[str, Callable[[Launch, Bus, Clock], Component[Any]]],
+        consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]],
         restarts: bool = False,
     ) -> None:
         super().__init__(launch, bus, clock)
@@ -258,7 +258,7 @@ class WholePlacer(Component[NoParameters]):
         self._numbers = Counter[str]()
         self._placements: dict[str, Placement] = {}
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Start``, ``StopComponent`` and ``AskPlacement``."""
         match asked.body:
             case Start() as order:
