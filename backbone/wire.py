@@ -163,7 +163,7 @@ def refuse_oversized(length: int) -> None:
         raise OversizedMessage(f"message of {length} bytes", bytes=length)
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """Return messages, which travel as arrays, and dataclasses as dictionaries of their fields, all the way down.
 
     Example:

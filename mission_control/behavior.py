@@ -108,7 +108,7 @@ class Behavior(Component[B], Generic[B]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, Any]()
+        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
         self.rcs: Mapping[str, str] = {}
         """Kind → name of the granted RCs; empty while suspended."""
         self.arc: ArcClient | None = None
@@ -207,7 +207,7 @@ class Behavior(Component[B], Generic[B]):
         self,
         child: str,  # noqa: ARG002  for those who override
         status: BehaviorStatus,
-        payload: Mapping[str, Any],  # noqa: ARG002
+        payload: Mapping[str, object],  # noqa: ARG002
     ) -> Decision:
         """Decide what follows the end of a child.
 
@@ -216,7 +216,7 @@ class Behavior(Component[B], Generic[B]):
         """
         return Decision.NEXT if status is BehaviorStatus.SUCCESS else Decision.ABORT
 
-    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         """Conclude after the end of all children.
 
         When: the last child finished, or one aborted the others. What: by default, finish with the same status.
@@ -234,7 +234,7 @@ class Behavior(Component[B], Generic[B]):
         """Status of each child that was started."""
         return self._children.status
 
-    def finish(self, status: BehaviorStatus, payload: Mapping[str, Any] | None = None) -> None:
+    def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
         if self.status.is_final or not status.is_final:
             return
@@ -245,7 +245,7 @@ class Behavior(Component[B], Generic[B]):
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
-    def tell_parent(self, payload: Mapping[str, Any]) -> None:
+    def tell_parent(self, payload: Mapping[str, object]) -> None:
         """Send a report of progress to the parent; it is lost if the parent cannot be reached."""
         self.payload = dict(payload)
         if self._parent is not None and not self.status.is_final:
@@ -534,7 +534,7 @@ class Behavior(Component[B], Generic[B]):
                 return
             await self.clock.sleep_s(AGAIN_AFTER_S * self.clock.rate)
 
-    def _abandon(self, name: str, payload: Mapping[str, Any]) -> None:
+    def _abandon(self, name: str, payload: Mapping[str, object]) -> None:
         """Report a child that could not work as a lasting absence; a finished child that failed is no absence."""
         if "code" in payload:
             remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"
@@ -553,12 +553,12 @@ class Behavior(Component[B], Generic[B]):
             why = {"code": "child.given_up", "detail": f"{fell.name} fell too often: {fell.how}"}
             self._child_reported(fell.name, BehaviorStatus.FAILURE, why)
 
-    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         if self._children.reported(name, status, payload):
             self.story.note(name, f"finished: {status}")
             self._begin(self._decide(name, status, payload), f"decide on {name}")
 
-    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         decision = await self.child_finished(name, status, payload)
         self.story.note(name, f"{decision} after {status}")
         if decision is not Decision.RETRY:
@@ -622,5 +622,5 @@ async def _end_task(task: asyncio.Task[None] | None) -> None:
         await asyncio.wait({task})
 
 
-def _why(refusal: Refusal) -> dict[str, Any]:
+def _why(refusal: Refusal) -> dict[str, object]:
     return {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}

@@ -10,7 +10,7 @@ import asyncio
 import contextlib
 import logging
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -152,7 +152,7 @@ class ArcClient:
         self,
         clock: Clock,
         kind: str,
-        parameters: dict[str, Any],
+        parameters: dict[str, object],
         *,
         rests: bool = False,
         patience_s: float = 0.0,
@@ -347,7 +347,7 @@ class ArcClient:
         return True
 
     async def _start_anew(
-        self, clock: Clock, kind: str, parameters: dict[str, Any], on_changed: Callable[[], None], give_up_s: float
+        self, clock: Clock, kind: str, parameters: dict[str, object], on_changed: Callable[[], None], give_up_s: float
     ) -> None:
         """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
         while True:
@@ -448,7 +448,7 @@ def claim_parameters(
     idle: bool = False,
     stops_at_once: bool = False,
     may_say_not_now: bool = False,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Return the parameters of an ARC for this owner.
 
     Args:

@@ -95,7 +95,7 @@ class ResourceController(Component[R], Generic[R]):
     confirms no disconnection of an earlier hold. 0: the effect ends with the process."""
     accepts: ClassVar[Accepts | None] = Connect | Disconnect | AskRc
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
         if cls.commands is not None:
             cls.accepts = Connect | Disconnect | AskRc | cls.commands

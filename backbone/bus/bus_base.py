@@ -65,7 +65,7 @@ class BusBase(ABC):
         self.heard += 1
         self.call(envelope.id, listener, envelope)
 
-    def call(self, cause: str, act: Callable[..., None], *arguments: Any) -> None:
+    def call(self, cause: str, act: Callable[..., None], *arguments: object) -> None:
         """Call a callback with the message of this id as the current cause; its bugs go to ``on_bug``."""
         token = current_cause.set(cause)
         try:
@@ -156,7 +156,7 @@ class BusBase(ABC):
         await self.leave()
 
 
-def settle(answered: asyncio.Future[Any], answer: Any) -> None:
+def settle(answered: asyncio.Future[T], answer: T) -> None:
     """Set the result of the future unless the future is done."""
     if not answered.done():
         answered.set_result(answer)

@@ -14,9 +14,9 @@ import asyncio
 import json
 import logging
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import zenoh
 
@@ -46,6 +46,7 @@ from backbone.wire import (
 )
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 
 LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
 RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
@@ -72,7 +73,7 @@ _QUALITY = {
 }
 
 
-def _transport() -> dict[str, Any]:
+def _transport() -> dict[str, object]:
     return {
         "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
         "link": {
@@ -86,7 +87,7 @@ def _transport() -> dict[str, Any]:
     }
 
 
-def _config(settings: dict[str, Any], auth: dict[str, Any]) -> zenoh.Config:
+def _config(settings: Mapping[str, object], auth: Mapping[str, object]) -> zenoh.Config:
     quiet = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
     transport = {**_transport(), "auth": auth}
     return zenoh.Config.from_json5(json.dumps({"scouting": quiet, "transport": transport, **settings}))
@@ -122,7 +123,7 @@ def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionar
     Args:
         dictionary_file: Users and secrets of its clients; empty: it authenticates no client.
     """
-    settings: dict[str, Any] = {
+    settings: dict[str, object] = {
         "mode": "router",
         "listen": {"endpoints": listen, "exit_on_failure": True},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
@@ -414,7 +415,7 @@ class ZenohBus(BusBase):
         self._publishers.clear()
 
     # ------------------------------------------------------------------ from zenoh's threads into the loop
-    def push(self, act: Callable[[Any], None], what: Any) -> None:
+    def push(self, act: Callable[[T], None], what: T) -> None:
         """Make the loop call ``act(what)``; called from zenoh's threads."""
         self._inbox.append((act, what))
         if not self._woken:
@@ -465,7 +466,7 @@ class _Arrived:
 
     __slots__ = ("_answered", "_bus", "_replied")
 
-    def __init__(self, bus: ZenohBus, answered: asyncio.Future[Any]) -> None:
+    def __init__(self, bus: ZenohBus, answered: asyncio.Future[zenoh.Reply | None]) -> None:
         self._bus, self._answered, self._replied = bus, answered, False
 
     def reply(self, got: zenoh.Reply) -> None:

@@ -14,7 +14,7 @@ import logging
 import os
 from collections.abc import Coroutine
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar, cast
+from typing import ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
@@ -435,7 +435,7 @@ class Component(Generic[P_co]):
             case _:
                 return await self.answer(asked)
 
-    def _set_parameter(self, name: str, value: Any, user: str) -> Parameters:
+    def _set_parameter(self, name: str, value: object, user: str) -> Parameters:
         old = msgspec.to_builtins(self.parameters)
         if name not in old:
             raise WrongParameter(f"{self.name} has no parameter {name!r}; it has: {', '.join(sorted(old)) or 'none'}")
@@ -457,7 +457,7 @@ def _complaint(bug: BaseException) -> str:
     return f"{type(bug).__name__}: {bug}"[:MAX_FEEDBACK_LENGTH]
 
 
-def _convert(values: dict[str, Any], kind: type[msgspec.Struct]) -> msgspec.Struct:
+def _convert(values: dict[str, object], kind: type[msgspec.Struct]) -> msgspec.Struct:
     try:
         return msgspec.convert(values, kind)
     except msgspec.ValidationError as error:

@@ -18,7 +18,7 @@ import time
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import msgspec
 
@@ -59,7 +59,7 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)
 
@@ -121,7 +121,7 @@ class BringUpObserver(Protocol):
 class Launcher(Component[NoParameters]):
     """Starts the core services and the mission, restarts core services, stops all."""
 
-    accepts: ClassVar[Any] = ListProcesses | AskLog | AskPeople
+    accepts: ClassVar[Accepts | None] = ListProcesses | AskLog | AskPeople
 
     def __init__(
         self,

@@ -12,7 +12,6 @@ import logging
 import time
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import Any
 
 from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -170,7 +169,7 @@ class ConsoleFeed:
             return True
         return False
 
-    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
+    async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
         """Set a parameter of a component; return whether the component applied it."""
         with self._showing_failure():
             address = await self._resolve(name)

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
@@ -66,7 +65,7 @@ class Joining:
         return await ZenohBus.open_when_up(who.mission, who.address, self.clock, config)
 
 
-async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joining:
+async def join(where: Where, parameters: dict[str, object] | None = None) -> Joining:
     """Return the identity of this process in the mission.
 
     Args:

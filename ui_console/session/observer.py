@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -120,7 +120,7 @@ class Observer(Component[P_co], Generic[P_co]):
         """Answer the first question to this operator: for the robot held here, or to lift a stop."""
         self.answers.decide(is_given, reason)
 
-    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
+    async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
         """Set a parameter of a component; return whether the component applied it."""
         is_set = await self.feed.set_parameter(name, parameter, value, user or self.user)
         detail = f"{parameter} = {value_text(value)}{'' if is_set else ', which it did not take'}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -77,7 +77,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
-        self._claimed: tuple[str, dict[str, Any]] | None = None
+        self._claimed: tuple[str, dict[str, object]] | None = None
         self._rests = False
         self._keeping: asyncio.Task[None] | None = None
         self._frames: Subscription | None = None

@@ -6,7 +6,7 @@ import asyncio
 import os
 import sys
 from collections.abc import Callable, Coroutine, Mapping
-from typing import Any, assert_never
+from typing import assert_never
 
 from textual import pilot as textual_pilot
 
@@ -25,7 +25,7 @@ from ui_console.terminal.pixels import can_show_pixels
 from ui_console.terminal.verbs import Session
 
 LIFT_REMEDY = "When the robot may move, press c, then l."
-Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[object, None, None]]
+Pilot = Callable[[textual_pilot.Pilot[object]], Coroutine[object, None, None]]
 
 
 class TerminalSession(Session):

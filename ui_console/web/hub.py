@@ -8,7 +8,6 @@ import logging
 import os
 import re
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -220,7 +219,7 @@ class WebHub:
 
     def _send_tables(self, outboxes: list[Outbox]) -> None:
         team, now_s = self.team, self.clock.now_s()
-        tables: dict[str, Any] = {
+        tables: dict[str, object] = {
             "tree": team.tree(),
             "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),

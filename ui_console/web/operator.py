@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
-from typing import Any, Protocol, assert_never
+from typing import Protocol, assert_never
 
 import msgspec
 
@@ -319,10 +319,10 @@ class Operator:
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
 
-    def _answer(self, answer: dict[str, Any]) -> None:
+    def _answer(self, answer: dict[str, object]) -> None:
         self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
         self.news.set()
 
 
-def _encode(views: list[Any]) -> bytes:
+def _encode(views: Sequence[object]) -> bytes:
     return msgspec.json.encode(views)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
@@ -39,7 +38,7 @@ class PlayedRole:
     subsystem: Subsystem
     name: str
     kind: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, object]
     is_restarted: bool = True
 
 

@@ -13,7 +13,7 @@ import asyncio
 import contextvars
 from collections.abc import Callable, Coroutine, Generator
 from contextvars import Context, ContextVar
-from typing import Any, TypeVar, TypeVarTuple
+from typing import TypeVar, TypeVarTuple
 
 from backbone.bus.clock import VirtualLoop
 from backbone.component.heartbeat import BEAT_EVERY_S, Vitals
@@ -187,7 +187,7 @@ class ProcessLoop(VirtualLoop):
 
     def create_task(
         self,
-        coro: Coroutine[object, None, R] | Generator[Any, None, R],
+        coro: Coroutine[object, None, R] | Generator[object, None, R],
         *,
         name: object = None,
         context: Context | None = None,

@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any
 
 import msgspec
 
@@ -50,6 +49,7 @@ from backbone.placer.messages import (
 )
 from backbone.rc_manager.messages import TraceLine
 from backbone.rc_manager.service import RcManager
+from backbone.scheduling.trace import Line
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.audit import Audit, Happening
 from mission_control.laboratory.simulation.played_hosts import HOST, PlayedHosts, PlayedRole
@@ -83,7 +83,7 @@ class RunningMission:
     bus: LocalBus
     clock: Clock
     hosts: PlayedHosts
-    trace: list[dict[str, Any]] = field(default_factory=list)
+    trace: list[Line] = field(default_factory=list)
     placer: str = PLACER
 
     async def start(self, order: Start) -> Started:
@@ -127,7 +127,7 @@ class RunningMission:
 async def mission_in_one_process(
     description: MissionDescription,
     *,
-    trace: Callable[[dict[str, Any]], None] | None = None,
+    trace: Callable[[Line], None] | None = None,
     consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]] | None = None,
 ) -> AsyncIterator[RunningMission]:
     """Yield the mission, up and ready, on the running loop's time; end all components at the end of the block.
@@ -216,7 +216,7 @@ async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[...
     def placer(launch: Launch, bus: Bus, clock: Clock) -> WholePlacer:
         return WholePlacer(launch, bus, clock, hosts=hosts, types=mission.types, consoles=consoles)
 
-    core: list[tuple[Callable[..., AnyComponent], str, dict[str, Any]]] = [
+    core: list[tuple[Callable[..., AnyComponent], str, dict[str, object]]] = [
         (Nameserver, "nameserver", {}),
         (ComponentDatabase, "component_database", {"types": types}),
         (placer, "placer", {}),
