@@ -20,8 +20,8 @@ _PEOPLE = {"number": "a number", "integer": "a whole number", "string": "a text"
 _TYPES = {"number": float, "integer": int, "string": str, "boolean": bool, "null": None}
 
 
-Schema = dict[str, Any]
-"""A JSON schema, or a part of one."""
+ValueSchema = dict[str, Any]
+"""The JSON schema of the values of a parameter."""
 
 
 class ParameterFacts(msgspec.Struct, frozen=True):
@@ -32,7 +32,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
     """
 
     name: str
-    schema: Schema = {}
+    schema: ValueSchema = {}
     doc: str = ""
 
     @property
@@ -136,7 +136,7 @@ def parameters_of(struct: type[msgspec.Struct]) -> tuple[ParameterFacts, ...]:
     )
 
 
-def _simple(one: Schema, definitions: Schema) -> Schema:
+def _simple(one: ValueSchema, definitions: ValueSchema) -> ValueSchema:
     """Return the part of a schema that a value in a mission file can meet: no objects, no lists."""
     if "$ref" in one:
         return _simple(definitions[one["$ref"]], definitions)
@@ -146,7 +146,7 @@ def _simple(one: Schema, definitions: Schema) -> Schema:
     return kept
 
 
-def _type_text(schema: Schema) -> str:
+def _type_text(schema: ValueSchema) -> str:
     if "enum" in schema:
         return "one of " + ", ".join(map(str, schema["enum"]))
     if "anyOf" in schema:
@@ -154,7 +154,7 @@ def _type_text(schema: Schema) -> str:
     return str(schema.get("type", "any"))
 
 
-def _value_type(schema: Schema) -> Any:
+def _value_type(schema: ValueSchema) -> Any:
     """Return the type that msgspec accepts the same values for."""
     if "enum" in schema:
         return Literal[tuple(schema["enum"])]

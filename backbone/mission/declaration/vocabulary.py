@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
-from backbone.mission.class_facts import Schema
 from backbone.mission.declaration.elements import MissionElement
 
 ROOT = "mission"
 MANY = 1 << 30  # any number of an element
+
+Schema = dict[str, Any]
+"""A JSON schema, or a part of one."""
 
 
 @dataclass(frozen=True, slots=True)

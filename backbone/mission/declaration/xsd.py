@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.sax.saxutils import escape, quoteattr
 
-from backbone.mission.class_facts import Schema
 from backbone.mission.declaration.values import LEAST_WHOLE, MOST_WHOLE
-from backbone.mission.declaration.vocabulary import MANY, AttributeRule, ElementRule, vocabulary
+from backbone.mission.declaration.vocabulary import MANY, AttributeRule, ElementRule, Schema, vocabulary
 
 XSD = "mission.xsd"
 
