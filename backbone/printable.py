@@ -27,7 +27,7 @@ def with_texts(value: Value, change: Callable[[str], str]) -> Value:
     return cast(Value, _with_texts(value, change))
 
 
-def _with_texts(value: Any, change: Callable[[str], str]) -> Any:
+def _with_texts(value: object, change: Callable[[str], str]) -> Any:
     match value:
         case str():
             return change(value) if type(value) is str else value  # texts of an enumeration come from this project
@@ -48,8 +48,8 @@ def _with_texts(value: Any, change: Callable[[str], str]) -> Any:
     return value
 
 
-def _changes(value: Any, names: Iterable[str], change: Callable[[str], str]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def _changes(value: object, names: Iterable[str], change: Callable[[str], str]) -> dict[str, object]:
+    found: dict[str, object] = {}
     for name in names:
         before = getattr(value, name)
         if (after := _with_texts(before, change)) is not before:

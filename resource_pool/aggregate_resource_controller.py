@@ -93,7 +93,7 @@ class AggregateResourceController(Component[ArcParameters]):
     """Base class of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC in its set, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
@@ -183,7 +183,7 @@ class AggregateResourceController(Component[ArcParameters]):
             except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
                 log.info("not withdrawn: %s", error)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Obey the RC manager for the gate, and the owner for everything else."""
         match asked.body:
             case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:

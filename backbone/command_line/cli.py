@@ -342,14 +342,14 @@ def _width() -> int | None:
     return None if sys.stdout.isatty() else PIPE_WIDTH
 
 
-def _parameter(given: str) -> tuple[str, Any]:
+def _parameter(given: str) -> tuple[str, object]:
     name, equals, value = given.partition("=")
     if not equals or not name:
         raise typer.BadParameter(f"{given!r} is not NAME=VALUE")
     return name, _value(value)
 
 
-def _value(text: str) -> Any:
+def _value(text: str) -> object:
     try:
         return json.loads(text)
     except json.JSONDecodeError:

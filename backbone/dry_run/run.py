@@ -29,10 +29,11 @@ from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import RcKnown, Requested
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.rehearsal import Line, Rehearsal, Timetable
+from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.requests import SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.trace import Line
 from backbone.scheduling.views import Why
 
 FIRST_MINUTE_S = 60.0

@@ -18,7 +18,6 @@ import logging
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
@@ -44,7 +43,7 @@ ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
 CONFIRM_S = 0.04  # chosen: ten round trips, within the tolerance of a trace; also for what is late already
 CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; one that hangs must not cost the next its turn
 
-Note = Callable[[str, str], Any]
+Note = Callable[[str, str], object]
 Hold = tuple[str, str, int]
 """RC, ARC and epoch."""
 

@@ -13,7 +13,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.errors import Refusal
 from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
@@ -190,7 +190,7 @@ async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
 
 def buttons_help() -> list[str]:
     """Return the actions of the gamepad's buttons, for people."""
-    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
+    names: dict[int, str] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),
