@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -47,7 +46,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.claims import STREAMED_KINDS
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_request import ArcParameters, request_of, require_runtime, set_of
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.gate import Gate

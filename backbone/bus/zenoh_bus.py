@@ -14,14 +14,14 @@ import asyncio
 import json
 import logging
 from collections import OrderedDict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar, cast
 
 import zenoh
 
 from backbone.bus.bus_base import BusBase, settle
-from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
+from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
 from backbone.bus.sockets import close_without_waiting
 from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout

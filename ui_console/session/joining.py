@@ -10,7 +10,6 @@ import socket
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
