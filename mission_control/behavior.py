@@ -26,7 +26,7 @@ from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_tree import (
     ArcNeed,
