@@ -1,13 +1,13 @@
 """Schedule manager: carries the master schedule out, one context switch after the other.
 
-Events go in, instructions come out. The caller owns the clock and the bus: it reports what happened and when, carries
-the instructions out, and reports the outcome. A decision has three steps: *apply* the event to the state, *plan* whose
-turn it is, *switch* to it; the last two again until it is no ARC's turn.
+Events go in, instructions come out. The caller owns the clock and the bus: it reports events with their times, carries
+the instructions out, and reports their outcomes. A decision has three steps: *apply* the event to the state, *plan* the
+next turn, *switch* to it; the last two repeat until no ARC's time has come.
 
 Rules of this file (numbers as in docs and ``why``):
 
-* 4  What was freed by force goes to the ARC it was freed for: it has a reservation, and comes before its equals.
-* 5  A slice ends only if an ARC that is entitled can use the RCs.
+* 4  Preempted RCs go to the ARC that preempted them: it has a reservation, and comes before its equals.
+* 5  A slice ends only if an entitled ARC can use the RCs.
 * 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
@@ -73,7 +73,7 @@ FORESEEN_LINES = 1000  # chosen: some two hundred slices; measured: 32 ARCs take
 
 
 class ScheduleManager:
-    """Who holds which RC now and next."""
+    """Decides on the present and next holders of every RC."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ class ScheduleManager:
         """Begin with no RCs and no ARCs.
 
         Args:
-            rules: With which rules to decide.
+            rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
@@ -119,16 +119,16 @@ class ScheduleManager:
     # Events in, instructions out: apply, plan, switch.
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Take note of what happened and decide what follows from it.
+        """Apply an event and decide.
 
-        An event about an ARC or RC that is not known, or one that came too late to matter, changes nothing.
+        An event about an unknown ARC or RC, or an outdated event, changes nothing.
 
         Args:
-            event: What happened.
+            event: The event.
             now_s: Mission time of the decision.
 
         Returns:
-            Instructions in the order in which they must be carried out.
+            Instructions, to be carried out in this order.
         """
         self._transitions.begin(now_s)
         self._apply(event)
@@ -184,7 +184,7 @@ class ScheduleManager:
                 assert_never(event)
 
     def _switch(self, turn: Turn) -> None:
-        """Connect the ARC whose turn it is, or first revoke who is in its way."""
+        """Connect the ARC whose turn it is, or first revoke the holders of its RCs."""
         if not turn.in_the_way:
             self._transitions.connect(turn.arc)
             return
@@ -199,7 +199,7 @@ class ScheduleManager:
                 self._transitions.end_slice(holder, turn.arc)
 
     def _set_alarm(self, *, rang: bool) -> None:
-        """Ask to be woken when the next decision can be due without an event."""
+        """Instruct the caller to wake the manager when the next decision can be due without an event."""
         slice_end_s = self._state.end_slices(self._transitions.now_s)
         times_s = [self._arcs.next_retry_s(), slice_end_s, self._priorities.next_aging_s()]
         wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
@@ -213,15 +213,15 @@ class ScheduleManager:
         """Return the set of RCs this request should wait for; nothing changes.
 
         Raises:
-            MissingRuntime: It does not say for how long it must run at least.
+            MissingRuntime: The request has no valid minimum run time.
             UnknownRc: All alternatives name RCs that do not exist.
             CapacityExceeded: It could not run even alone; facts ``demanded``, ``used`` and ``free``.
-            SchedulingRefusal: It asks for nothing, or for streams that make no sense.
+            SchedulingRefusal: The request has no RC, or a stream with impossible times.
         """
         return choose(self._state, request)
 
     def scheduled(self, arc: str, now_s: float) -> Scheduled:
-        """Return where the request of this ARC is.
+        """Return the state of this ARC's request.
 
         Raises:
             UnknownRequest: It has none.
@@ -229,7 +229,7 @@ class ScheduleManager:
         return self._explanation.scheduled(self._known(arc), max(now_s, self._transitions.now_s))
 
     def schedule(self, now_s: float) -> Schedule:
-        """Return who holds what, who waits for whom, and until when."""
+        """Return the schedule: holders, waiting ARCs, blockers and times."""
         return self._explanation.schedule(max(now_s, self._transitions.now_s))
 
     def why(self, name: str, now_s: float) -> Why:
@@ -241,7 +241,7 @@ class ScheduleManager:
         return self._explanation.why(name, max(now_s, self._transitions.now_s))
 
     def attributes(self, name: str) -> Attributes:
-        """Return what an ARC, an owner (name or address), or all at and below a node ask for.
+        """Return the requests of an ARC, of an owner (name or address), or of all at and below a node.
 
         Raises:
             UnknownRequest: There is none of this name.
@@ -280,7 +280,7 @@ class ScheduleManager:
         """Make sure that the invariants of the schedule hold.
 
         Raises:
-            AssertionError: One does not; with the story of the ARCs concerned.
+            AssertionError: An invariant is broken; with the story of the ARCs concerned.
         """
         for invariant, whom in broken(self._schedule, self._transitions.now_s):
             story = self._transitions.trace.story_of({arc.name for arc in whom})
@@ -291,7 +291,7 @@ class ScheduleManager:
                 raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))
 
     def _granted_s(self, arc: ArcEntry, now_s: float) -> float:
-        """Return when a waiting ARC is granted if nothing else happens, by playing a copy of this schedule forward.
+        """Return when a waiting ARC is granted if no event comes, by playing a copy of this schedule forward.
 
         Infinite: not within ``FORESEEN_S``.
         """
@@ -305,7 +305,7 @@ class ScheduleManager:
         return math.inf
 
     def _going_on(self, now_s: float) -> Rehearsal:
-        """Return a rehearsal of what comes; of the time to stop cleanly half is expected to be taken."""
+        """Return a rehearsal of the next slices; it expects half of the time to stop cleanly to be taken."""
         under_way: list[tuple[float, Opened | Freed]] = []
         for arc in self._state.arcs.values():
             if arc.state is RequestState.CONNECTING:
