@@ -146,7 +146,7 @@ def test_an_events_cause_may_be_typed_with_or_without_its_subsystem(text: str) -
 
 
 def test_a_message_that_led_to_nothing_says_so() -> None:
-    assert why("scout1#7").lines(5.0)[0].startswith("nobody tells that scout1#7 led to anything")
+    assert why("scout1#7").lines(5.0)[0].startswith("no component has an event that scout1#7 led to")
 
 
 def test_an_alarm_means_what_it_is_about() -> None:
