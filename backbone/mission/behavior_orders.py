@@ -15,7 +15,7 @@ from backbone.errors import Refusal
 from backbone.placer.messages import Start
 
 if TYPE_CHECKING:
-    from backbone.mission.model import Behavior, MissionDescription
+    from backbone.mission.model import BehaviorDescription, MissionDescription
 
 PathStep = tuple[str, int]
 TREE_PARAMETERS = ("path", "arc", "children")
@@ -61,7 +61,7 @@ def behavior_order(node: Mapping[str, Any], parent_path: Sequence[PathStep]) -> 
     return Start(node["type"], node["name"], {**own, **tree}, process=node.get("process", ""))
 
 
-def _node(behavior: Behavior) -> dict[str, Any]:
+def _node(behavior: BehaviorDescription) -> dict[str, Any]:
     node = behavior.model_dump(mode="json")
     _refuse_reserved(node)
     return node

@@ -108,7 +108,7 @@ class Reasons:
 
 
 @dataclass(frozen=True)
-class Asked:
+class AskedName:
     """Meaning of a name that a person types.
 
     Attributes:
@@ -120,14 +120,14 @@ class Asked:
     message: str = ""
 
     @classmethod
-    def of(cls, text: str) -> Asked:
+    def of(cls, text: str) -> AskedName:
         """Return the meaning of a name, an address, an alarm, or the id of a message, with its subsystem or without.
 
         Example:
-            >>> Asked.of("rc_manager").name, Asked.of("backbone/rc_manager").name, Asked.of("lost:scout1").name
-            ('rc_manager', 'rc_manager', 'scout1')
-            >>> Asked.of("rc_manager#112")
-            Asked(name='rc_manager', message='rc_manager#112')
+            >>> AskedName.of("backbone/rc_manager").name, AskedName.of("lost:scout1").name
+            ('rc_manager', 'scout1')
+            >>> AskedName.of("rc_manager#112")
+            AskedName(name='rc_manager', message='rc_manager#112')
         """
         address, number, _ = text.rpartition(":")[2].partition("#")
         return cls(component_of(address), text if number else "")
@@ -140,7 +140,7 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         UnknownName: None of them knows it.
         LinkError: None of them answered.
     """
-    asked = Asked.of(text)
+    asked = AskedName.of(text)
     name = asked.name
     why, placement, resolved, picture = await asyncio.gather(
         _or_error(bus, RC_MANAGER, AskWhy(name), Why),
@@ -219,7 +219,7 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     Raises:
         LinkError: The nameserver did not answer: there is no list of components to ask.
     """
-    asked = Asked.of(text)
+    asked = AskedName.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
     picture, *stories = await asyncio.gather(
         _seen(bus, clock),
@@ -256,7 +256,7 @@ async def _looked(bus: Bus, clock: Clock) -> MissionPicture:
         return MissionPicture(bus.mission)
 
 
-def _question(address: str, asked: Asked) -> AskStory:
+def _question(address: str, asked: AskedName) -> AskStory:
     """Ask the component itself for its whole story, the others for events about it; for a message all components."""
     if asked.message:
         return AskStory(asked.message)

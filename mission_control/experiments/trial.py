@@ -29,7 +29,7 @@ from mission_control.experiments.mission_file import (
     mission_of_trial,
     watcher_of,
 )
-from mission_control.experiments.operator import Operator
+from mission_control.experiments.operator import SimulatedOperator
 from mission_control.experiments.prediction import departs_s
 from mission_control.messages import MotionSeen
 from resource_pool.messages import WorldState
@@ -136,7 +136,7 @@ class _Trial:
 
     async def run(self) -> tuple[Trial, list[dict[str, Any]]]:
         bare = self._mission.model_copy(update={"behaviors": ()})
-        consoles = {"operator": Operator}
+        consoles = {"operator": SimulatedOperator}
         async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
             running.bus.subscribe(
                 address(Subsystem.RESOURCE_POOL, WORLD), Conversation.TELEMETRY, WorldState, self._world_moved

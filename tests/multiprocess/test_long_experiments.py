@@ -47,7 +47,7 @@ from backbone.wire import Envelope
 from resource_pool.arc_client import Suspended
 from resource_pool.messages import RadioPacket
 from scout_model import radio_link
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, said
 from ui_console.session.teleoperation import Teleoperation
 
@@ -437,7 +437,7 @@ class Driven:
             if self.over.is_set():
                 break
             speed_rad_s = 1.0 + (number % 4000) * 0.001
-            self.refused += not await teleoperation.do(Drive(speed_rad_s, -speed_rad_s))
+            self.refused += not await teleoperation.do(DriveWish(speed_rad_s, -speed_rad_s))
             await clock.sleep_s(COMMAND_EVERY_S)
         await teleoperation.give_back()
 

@@ -28,7 +28,7 @@ from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
 from resource_pool.messages import Applied, AskPose, CommandScout, Drive, Pose
-from ui_console.model.driving import Drive as DriveKey
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.session.teleoperation import Teleoperation
 
@@ -104,7 +104,7 @@ async def take_over(mission: RunningMission, bus: Bus, number: int) -> Turn:
         await console.wait_granted()
         before = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
         for _tenth in range(3):
-            await console.do(DriveKey(6, -6))
+            await console.do(DriveWish(6, -6))
             await clock.sleep_s(0.1)
         after = await bus.ask(WORLD, AskPose("scout1"), Pose, within_s=2)
         turn.turned_rad = abs(math.remainder(after.heading_rad - before.heading_rad, math.tau))

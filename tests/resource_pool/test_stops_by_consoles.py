@@ -30,7 +30,7 @@ from resource_pool.arc_client import StopState, watch_stops
 from scout_model.radio_link import encode_drive
 from ui_console.model.consent import CONSENT_WITHIN_S
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, Drive
+from ui_console.model.driving import STICK_LASTS_S, DriveWish
 from ui_console.session.teleoperation import Teleoperation
 
 PEOPLE = ("anna", "ben", "cleo")
@@ -86,7 +86,7 @@ class Person:
         self.console = Teleoperation(
             launch, bus, stage.pool.clock, show=self.model.apply, takes=False, keeps_arc=True, user=name
         )
-        self.drive: Drive | None = None
+        self.drive: DriveWish | None = None
 
     async def hands(self) -> None:
         """Say again what is held, for ever."""
@@ -119,10 +119,10 @@ class Stage:
         watch_stops(ear, lambda state: self.stops.append((pool.clock.now_s(), state)))
         ear.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
 
-    def new_press(self) -> Drive:
+    def new_press(self) -> DriveWish:
         """Return wheel speeds that no other press has."""
         number = len(self.presses)
-        drive = Drive(1.0 + number % 100 / 20, 1.0 + number // 100 / 20)
+        drive = DriveWish(1.0 + number % 100 / 20, 1.0 + number // 100 / 20)
         self.presses[encode_drive(drive.left_rad_s, drive.right_rad_s)] = self.pool.clock.now_s()
         return drive
 

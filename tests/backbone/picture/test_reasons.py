@@ -22,7 +22,7 @@ from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.picture.reasons import Asked, Reasons, Told, reasons_for, story_of
+from backbone.picture.reasons import AskedName, Reasons, Told, reasons_for, story_of
 
 CAUSE = "backbone/rc_manager#112"
 SCOUT = ComponentState(
@@ -107,7 +107,7 @@ def test_a_cause_has_the_events_that_it_led_to_and_no_others() -> None:
 
 
 def test_an_address_means_its_component() -> None:
-    assert Asked.of("resource_pool/scout1") == Asked("scout1")
+    assert AskedName.of("resource_pool/scout1") == AskedName("scout1")
     assert why("resource_pool/scout1").component == SCOUT
 
 

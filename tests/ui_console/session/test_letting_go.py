@@ -24,7 +24,7 @@ from resource_pool.messages import Halt as ArcHalt
 from resource_pool.messages import Jump as ArcJump
 from resource_pool.stop_latch import StopLatch
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, Drive, Halt, drive_towards
+from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, DriveWish, HaltWish, drive_towards
 from ui_console.session.scripted import ScriptDriver
 from ui_console.session.teleoperation import Teleoperation
 
@@ -60,7 +60,7 @@ def test_a_press_counts_only_if_its_control_was_let_go_since_that_was_required(p
                 assert counts is is_clean[control]
                 until_s[control] = now_s + silence_s[control]
         if not any(is_clean[control] and now_s < end_s for control, end_s in until_s.items()):
-            assert not isinstance(hand.due(now_s), Drive)
+            assert not isinstance(hand.due(now_s), DriveWish)
 
 
 def test_what_is_held_when_letting_go_is_required_halts_at_once() -> None:
@@ -68,7 +68,7 @@ def test_what_is_held_when_letting_go_is_required_halts_at_once() -> None:
     hand.press(FORWARD, 0.0)
     assert hand.due(0.0) == FORWARD
     hand.require_let_go()
-    assert hand.due(0.0) == Halt()
+    assert hand.due(0.0) == HaltWish()
     assert hand.due(0.1) is None
 
 
