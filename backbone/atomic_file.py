@@ -22,7 +22,6 @@ def replace_file(target: Path, content: bytes, *, is_lasting: bool = True) -> No
 
     Args:
         target: The file; its folder exists.
-        content: The whole new content.
         is_lasting: True: the new content survives a power cut. False: for files that are useless after one.
 
     Raises:

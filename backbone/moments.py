@@ -28,7 +28,6 @@ class Now:
     Attributes:
         mission_s: Mission time.
         here: Local time of this machine.
-        rate: Mission seconds per second of the machine.
     """
 
     mission_s: float

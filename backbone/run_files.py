@@ -31,8 +31,6 @@ class RunFile(msgspec.Struct, frozen=True):
     """How to connect to a mission that is up.
 
     Attributes:
-        mission: Name of the mission.
-        endpoint: Endpoint of its hub.
         launcher_pid: Pid of the launcher.
         clock_origin_monotonic_s: This machine's monotonic clock at mission time 0.
         clock_rate: Mission seconds per second of the machine.

@@ -54,7 +54,6 @@ class Envelope(msgspec.Struct, Generic[Body], frozen=True, array_like=True, forb
         sequence: Grows by one with each message of that sender.
         stamp_s: Mission time of sending, seconds.
         cause: Id of the message that led to it; empty: a first cause.
-        body: The message.
     """
 
     wire: Version

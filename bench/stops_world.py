@@ -12,6 +12,7 @@ from typing import Any
 from stops_places import OTHERS, ROBOT
 
 from backbone import run_files
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -20,12 +21,11 @@ from backbone.errors import LinkError
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope
 from resource_pool.arc_client import OtherStop, StopState, ask_stop, lift_stop, stop_robot, watch_stops
-from resource_pool.messages import AskPose, Pose
+from resource_pool.drivers.world_messages import AskPose, Pose
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DriveWish
 from ui_console.session.teleoperation import Teleoperation
 

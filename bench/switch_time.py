@@ -28,10 +28,10 @@ from time import perf_counter
 from measuring import report
 
 from backbone import run_files
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskState, AskStatistics, ComponentState, Statistics
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 
 MISSION = Path(__file__).parents[1] / "mission.xml"
 HALTING_WATCHER = '<type name="watch_for_motion" class="halting_watcher:HaltingWatcher" subsystem="mission_control"/>'

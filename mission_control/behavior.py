@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar, assert_never
 
 import msgspec
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
@@ -30,7 +31,6 @@ from backbone.errors import LinkError, Refusal, code_of
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import CreatorSilent, Ended, ListPlacements, Placement, Placements, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope, Message, UnknownMessage

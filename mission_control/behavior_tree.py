@@ -47,12 +47,9 @@ class BehaviorNode(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A node of the tree, with its branch.
 
     Attributes:
-        type: Component type.
         name: Name of the node and of its component.
         priority: Among its siblings; larger is higher.
-        parameters: Its own parameters.
         arc: The ARC that it claims, if any.
-        children: Nodes it starts.
         process: Name of its shared process; empty: a process of its own.
     """
 

@@ -26,7 +26,6 @@ class ChildReport(Message, frozen=True):
     """Progress of a child, sent to its parent.
 
     Attributes:
-        child: Name of the child.
         status: Its status; a final one is sent once and never changes.
         payload: Data for the parent's decision: plain values only.
     """
@@ -48,8 +47,6 @@ class BehaviorState(Message, frozen=True):
     """Answer to ``AskBehavior``.
 
     Attributes:
-        name: Name of the behavior.
-        status: Its status.
         payload: Payload of its last report to its parent.
         holds: Kind → name of its granted RCs; empty while suspended or without an ARC.
         suspended_because: Reason and cause of the suspension; empty unless suspended.
@@ -91,7 +88,6 @@ class WaypointReached(Message, frozen=True):
     """Arrival at a way point, published as an event by a patrol.
 
     Attributes:
-        at_s: Mission time.
         robot: The patrolling robot.
         number: Counts from 1 over all rounds; each number is published once.
         waypoint: Number of the way point, from 0, in the order of the patrol's parameter.

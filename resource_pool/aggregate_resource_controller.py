@@ -20,18 +20,17 @@ from typing import Any, ClassVar
 
 import msgspec
 
+from backbone.addresses import DEPENDENCY_DATABASE, RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
 from backbone.component.peer_monitor import PeerMonitor
-from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import FindRcs, RcSets
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     BEAT_EVERY_S,
     AskRequest,

@@ -12,18 +12,18 @@ import logging
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.messages import Stop, Stopping
+from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal, ReplyTimeout
 from backbone.keys import Conversation
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
 from backbone.placer.wishes import Wish
 from backbone.scheduling.requests import PathNode, Usage
 from backbone.wire import Envelope, Message
+from resource_pool.drivers.world_messages import AskPose, Pose
 from resource_pool.messages import (
     DEFAULT_DRIVE_USAGE,
     Accepted,
@@ -32,25 +32,15 @@ from resource_pool.messages import (
     ArcState,
     AskArc,
     AskBeat,
-    AskPose,
-    AskStop,
     Drive,
-    EmergencyStop,
-    EmergencyStopped,
     Frame,
-    GivenBeforeStop,
     Halt,
     Jump,
-    LiftStop,
     NoSuchAction,
     Noted,
-    OtherStop,
-    Pose,
     Release,
     Resumed,
     SliceEnds,
-    Stopper,
-    StopState,
     Suspended,
     Suspending,
     SwappedOut,
@@ -59,6 +49,16 @@ from resource_pool.messages import (
     WantRuntime,
 )
 from resource_pool.stop_knowledge import StopKnowledge
+from resource_pool.stop_messages import (
+    AskStop,
+    EmergencyStop,
+    EmergencyStopped,
+    GivenBeforeStop,
+    LiftStop,
+    OtherStop,
+    Stopper,
+    StopState,
+)
 
 __all__ = [
     "DEFAULT_DRIVE_USAGE",
@@ -122,7 +122,10 @@ class ArcListener(Protocol):
 
 
 class ArcClient:
-    """A decision process's client of one ARC. Make one with ``claim``."""
+    """A decision process's client of one ARC, named ``arc_name(bus, kind)``; ``keep`` claims it.
+
+    Its component passes each ``ArcNotice`` question to ``handle``, also while the ARC is still starting.
+    """
 
     def __init__(self, bus: Bus, arc: str, listener: ArcListener, not_now: Callable[[], float] | None = None) -> None:
         """Begin with nothing claimed.
@@ -131,8 +134,8 @@ class ArcClient:
             bus: Bus of the decision process.
             arc: Name of the ARC.
             listener: Called at the begin and end of grants.
-            not_now: Returns how many seconds are still needed beyond the end of the present slice; called only if the
-                ARC was claimed with ``may_say_not_now``.
+            not_now: Called shortly before the end of a slice that can be extended, if the ARC was claimed with
+                ``may_say_not_now``: seconds still needed; 0: none.
         """
         self.arc = arc
         self.address = address(Subsystem.RESOURCE_POOL, arc)
@@ -144,72 +147,6 @@ class ArcClient:
         self._suspended.set()
         self._frames: Subscription | None = None
         self._stops = StopKnowledge()
-
-    @classmethod
-    async def claim(
-        cls,
-        bus: Bus,
-        kind: str,
-        listener: ArcListener,
-        *,
-        path: list[PathNode],
-        minimum_runtime_s: float,
-        maximum_runtime_s: float = 0.0,
-        wish: dict[str, str] | None = None,
-        features: dict[str, list[str]] | None = None,
-        usage: Usage | Sequence[Usage] = DEFAULT_DRIVE_USAGE,
-        console: bool = False,
-        idle: bool = False,
-        stops_at_once: bool = False,
-        not_now: Callable[[], float] | None = None,
-    ) -> ArcClient:
-        """Start an ARC of this kind for the component of ``bus``; the ARC requests its RCs.
-
-        The caller passes ``ArcNotice`` questions to ``handle``. Notices may arrive before this method returns, so route
-        them by ``notice.arc == arc_name(bus, kind)``.
-
-        Args:
-            bus: Bus of the decision process; its source is the owner.
-            kind: Component type of the ARC: ``drive``, ``video_drive``, ``capture``.
-            listener: Called at the begin and end of grants.
-            path: Priority path from the mission's root, or of the console alone.
-            minimum_runtime_s: Shortest useful time, seconds, above 0.
-            maximum_runtime_s: End of extensions; 0: the minimum.
-            wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
-            features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
-            usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
-                kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
-            console: True for consoles.
-            idle: True: no time is wanted yet.
-            stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
-                called, and the context switch does not wait for the owner.
-            not_now: Called shortly before the end of a slice that can be extended: seconds still needed; 0: none.
-
-        Raises:
-            Refusal: The ARC did not start, or its request can never be served.
-            LinkError: The placer did not answer; the outcome is unknown.
-        """
-        client = cls(bus, arc_name(bus, kind), listener, not_now)
-        parameters = claim_parameters(
-            bus.source,
-            path=path,
-            minimum_runtime_s=minimum_runtime_s,
-            maximum_runtime_s=maximum_runtime_s,
-            wish=wish,
-            features=features,
-            usage=usage,
-            console=console,
-            idle=idle,
-            stops_at_once=stops_at_once,
-            may_say_not_now=not_now is not None,
-        )
-        await client.start(kind, parameters)
-        return client
-
-    async def start(self, kind: str, parameters: dict[str, Any]) -> None:
-        """Start the ARC; see ``claim``."""
-        order = Start(kind, self.arc, parameters)
-        await self._bus.ask(PLACER, order, Started, within_s=START_TIME_S)
 
     async def keep(
         self,
@@ -227,7 +164,7 @@ class ArcClient:
 
         Args:
             clock: The mission's clock.
-            kind: As for ``claim``.
+            kind: Component type of the ARC: ``drive``, ``video_drive``, ``capture``.
             parameters: Made by ``claim_parameters``.
             rests: True: the ARC was started with these parameters before and rests; it is only asked to want time
                 again, unless it is gone.
@@ -369,8 +306,7 @@ class ArcClient:
         """Give the RCs back and keep the ARC, which wants no time until ``keep`` with ``rests``.
 
         When: during a grant, because a waiting ARC could be granted at this moment. Afterwards the ARC holds no RC, and
-            a
-        new request needs no new process.
+        a new request needs no new process.
 
         Raises:
             LinkError: The ARC did not confirm; release it.
@@ -416,7 +352,8 @@ class ArcClient:
         """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
         while True:
             try:
-                return await self.start(kind, parameters)
+                await self._bus.ask(PLACER, Start(kind, self.arc, parameters), Started, within_s=START_TIME_S)
+                return
             except NameTaken as refusal:
                 cause = f"one from before has its name: {refusal.detail}"
                 self.wish.missing(cause, clock.now_s())
@@ -512,9 +449,22 @@ def claim_parameters(
     stops_at_once: bool = False,
     may_say_not_now: bool = False,
 ) -> dict[str, Any]:
-    """Return the parameters of an ARC for this owner; see ``ArcClient.claim``.
+    """Return the parameters of an ARC for this owner.
 
-    With ``may_say_not_now`` the owner is asked shortly before the end of each slice that can be extended.
+    Args:
+        owner: Address of the decision process.
+        path: Priority path from the mission's root, or of the console alone.
+        minimum_runtime_s: Shortest useful time, seconds, above 0.
+        maximum_runtime_s: End of extensions; 0: the minimum.
+        wish: Kind of RC → name (``{"scout": "scout2"}``); kinds left out: any.
+        features: Kind of RC → features it must have (``{"scout": ["camera"]}``).
+        usage: Period of commands on the radio; several: one for each kind of command, ``drive`` among them. With a
+            kind of its own, ``jump`` or ``transmitter`` is sent soon while ``drive`` has a long period.
+        console: True for consoles.
+        idle: True: no time is wanted yet.
+        stops_at_once: True: the owner needs no time to stop at the end of a slice. Then ``arc_suspending`` is not
+            called, and the context switch does not wait for the owner.
+        may_say_not_now: True: the owner is asked shortly before the end of each slice that can be extended.
 
     Raises:
         ValueError: No usage is given, or two usages have the same kind.

@@ -18,7 +18,6 @@ class Gate:
     """State of the gate.
 
     Attributes:
-        arc: The ARC, for refusals.
         epochs: RC → epoch of the preparing or open connection; empty while shut.
         is_open: True while commands of the decision process pass.
         granted_s: Mission time of the opening; negative while not open.

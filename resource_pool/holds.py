@@ -19,9 +19,7 @@ class Hold:
     """One ARC's connection to the RC.
 
     Attributes:
-        arc: The ARC.
         epoch: Epoch of the connection.
-        since_s: Mission time of the connection.
         lease_until_s: Mission time at which it ends unless renewed.
         use: The ARC's use of the RC.
         companions: The other RCs of the set with their epochs.
@@ -42,18 +40,12 @@ class HoldTable:
 
     Args:
         rc: Name of the RC, for refusals.
-        sharable: True if several ARCs may hold it.
-        last_epoch: Epochs up to this one are stale.
+        last_epoch: Largest known epoch; epochs up to it are stale.
     """
 
     def __init__(self, rc: str, *, sharable: bool, last_epoch: int) -> None:
-        self._rc, self._sharable, self._last_epoch = rc, sharable, last_epoch
+        self._rc, self._sharable, self.last_epoch = rc, sharable, last_epoch
         self._holds: dict[str, Hold] = {}
-
-    @property
-    def last_epoch(self) -> int:
-        """Largest known epoch."""
-        return self._last_epoch
 
     def holds(self) -> list[Hold]:
         """Return all holds, higher user priority first."""
@@ -67,7 +59,7 @@ class HoldTable:
             Held: Another ARC holds this unit RC.
         """
         self.check(hold)
-        self._last_epoch = hold.epoch
+        self.last_epoch = hold.epoch
         self._holds[hold.arc] = hold
 
     def check(self, hold: Hold) -> Hold | None:
@@ -77,11 +69,11 @@ class HoldTable:
             StaleEpoch: As for ``connect``.
             Held: As for ``connect``.
         """
-        if hold.epoch <= self._last_epoch:
+        if hold.epoch <= self.last_epoch:
             raise StaleEpoch(
-                f"{self._rc}: epoch {hold.epoch} of {hold.arc} is not after {self._last_epoch}",
+                f"{self._rc}: epoch {hold.epoch} of {hold.arc} is not after {self.last_epoch}",
                 epoch=hold.epoch,
-                last_epoch=self._last_epoch,
+                last_epoch=self.last_epoch,
             )
         others = [other for other in self._holds if other != hold.arc]
         if others and not self._sharable:
@@ -99,7 +91,7 @@ class HoldTable:
 
     def disconnect(self, arc: str, epoch: int) -> Hold | None:
         """End the ARC's hold if its epoch is this one or older; return the ended hold."""
-        self._last_epoch = max(self._last_epoch, epoch)
+        self.last_epoch = max(self.last_epoch, epoch)
         hold = self._holds.get(arc)
         if hold is None or hold.epoch > epoch:
             return None
@@ -117,7 +109,7 @@ class HoldTable:
             raise StaleEpoch(
                 f"{self._rc}: {arc} commands under epoch {epoch}, it has {present}",
                 epoch=epoch,
-                last_epoch=self._last_epoch,
+                last_epoch=self.last_epoch,
             )
         return hold
 

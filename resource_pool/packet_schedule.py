@@ -159,7 +159,6 @@ class Sending:
     """One packet that is due.
 
     Attributes:
-        packet: The packet.
         air_time_s: Its admitted time on the air.
         number: Number of its stream; -1: no stream, because it is a safe packet.
         release_s: Mission time of its release.
@@ -299,7 +298,6 @@ class PacketSchedule:
         Args:
             sending: As returned by ``take``.
             begun_s: Mission time of its begin.
-            took_s: Its duration, seconds.
 
         Returns:
             Faults of this stream that occurred for the first time, for people.

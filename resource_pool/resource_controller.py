@@ -17,6 +17,7 @@ from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
@@ -25,7 +26,6 @@ from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.naming import Subsystem, address
 from backbone.ranges import LONGEST_LEASE_S
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import (
     EPOCHS_PER_S,
     AskRc,
@@ -40,9 +40,16 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.requests import Holder, Lease
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import AdjustableDriver, DriverSite, NoOptions, build_driver, options_of_drivers
+from resource_pool.drivers.interface import (
+    AdjustableDriver,
+    DriverSite,
+    HardwareFault,
+    NoOptions,
+    build_driver,
+    options_of_drivers,
+)
 from resource_pool.holds import Hold, HoldTable
-from resource_pool.messages import HardwareFault, ImpossibleUse, NeedsRestart, NotFromYou
+from resource_pool.messages import ImpossibleUse, NeedsRestart, NotFromYou
 
 log = logging.getLogger(__name__)
 

@@ -17,15 +17,7 @@ from backbone.component.launch import Launch
 from backbone.errors import Refusal
 from backbone.keys import Conversation
 from backbone.wire import Envelope, Message
-from resource_pool.messages import (
-    AskPose,
-    AskWorld,
-    ClockTick,
-    Pose,
-    RadioPacket,
-    WorldModel,
-    WorldState,
-)
+from resource_pool.drivers.world_messages import AskPose, AskWorld, ClockTick, Pose, RadioPacket, WorldModel, WorldState
 from scout_model.air import antenna_m, distance_m
 from scout_model.description import WorldDescription
 from scout_model.dimensions import FRAMES_PER_S

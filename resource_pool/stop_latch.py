@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import msgspec
 
-from resource_pool.messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
+from resource_pool.stop_messages import EmergencyStopped, GivenBeforeStop, OtherStop, Stopper, StopState
 
 MOST_AUTHORS = 16  # chosen: more people than operate one robot
 
@@ -22,7 +22,6 @@ class StopLatch:
     """The stop of one robot.
 
     Args:
-        rc: Name of the robot.
         state: State before the RC's process began; None: it may move and was never stopped.
     """
 
@@ -35,8 +34,6 @@ class StopLatch:
 
         Args:
             by: Name of the operator, for people.
-            reason: The operator's reason.
-            now_s: Mission time.
             console: Address of the operator's console.
         """
         state, author = self.state, Stopper(by, console)

@@ -99,7 +99,8 @@ class Camera:
         self._shade = _Shade(self._model)
         self._memo: OrderedDict[bytes, NDArray[np.uint8]] = OrderedDict()
         self._memo_pictures = memo_pictures
-        self._drawn = 0
+        self.drawn = 0
+        """How many pictures were drawn, not found in the memo."""
         self._shown: NDArray[np.float64] | None = None
         self._length = mujoco.mj_stateSize(self._model, STATE)
         state = np.empty(self._length)
@@ -113,11 +114,6 @@ class Camera:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    @property
-    def drawn(self) -> int:
-        """How many pictures were drawn, not found in the memo."""
-        return self._drawn
 
     def show(self, state: NDArray[np.float64]) -> None:
         """Let the following pictures show the world in this state.
@@ -156,7 +152,7 @@ class Camera:
             return picture
         picture = self._drawing.draw(self._data, camera)
         picture.flags.writeable = False
-        self._drawn += 1
+        self.drawn += 1
         self._memo[seen] = picture
         while len(self._memo) > self._memo_pictures:
             self._memo.popitem(last=False)

@@ -105,7 +105,6 @@ class ScoutPlace(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A Scout, or a robot of another kind, and where it begins.
 
     Attributes:
-        name: Name of the robot.
         network_id: Its address on the command radio, 1 to 254.
         x_m: Position of its axle's middle.
         y_m: Position.

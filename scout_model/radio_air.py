@@ -28,7 +28,6 @@ class Sent:
     """A packet as it leaves a radio.
 
     Attributes:
-        radio: Name of the radio.
         number: Of the packet among those of its radio, 0 or more.
         network_id: Robot it is for.
         payload: As ``scout_model.radio_link`` encodes it.
@@ -48,7 +47,6 @@ class RadioAir:
     """Packets between the base's antenna and the robots.
 
     Args:
-        seed: Of the world.
         air: Delays and losses of packets.
     """
 
@@ -58,7 +56,8 @@ class RadioAir:
         self._order = itertools.count()
         self._delivered: Counter[int] = Counter()
         self._lost: Counter[int] = Counter()
-        self._for_no_robot = 0
+        self.for_no_robot = 0
+        """Number of packets to ids without a robot."""
 
     @property
     def delivered(self) -> Mapping[int, int]:
@@ -70,11 +69,6 @@ class RadioAir:
         """Network id → packets that will never arrive."""
         return MappingProxyType(self._lost)
 
-    @property
-    def for_no_robot(self) -> int:
-        """Number of packets to ids without a robot."""
-        return self._for_no_robot
-
     def send(self, sent: Sent, away_m: float | None) -> None:
         """Put a packet on the air.
 
@@ -83,7 +77,7 @@ class RadioAir:
             away_m: Distance of its robot from the antenna, above 0; None: no robot has the id.
         """
         if away_m is None:
-            self._for_no_robot += 1
+            self.for_no_robot += 1
         elif self._is_lost(sent, away_m):
             self._lost[sent.network_id] += 1
         else:

@@ -92,7 +92,8 @@ class Firmware:
         self._left_rad_s = self._right_rad_s = 0.0
         self._frequency = ""
         self._heard_s = 0.0
-        self._spring = Spring.WOUND
+        self.spring = Spring.WOUND
+        """Where the spring foot is in its jump."""
         self._spring_since_s = 0.0
         self._let_out_m = 0.0
         self._heard = self._malformed = self._refused_jumps = self._timeouts = 0
@@ -101,11 +102,6 @@ class Firmware:
     def frequency(self) -> str:
         """Where the transmitter sends, empty while it is off."""
         return self._frequency
-
-    @property
-    def spring(self) -> Spring:
-        """Where the spring foot is in its jump."""
-        return self._spring
 
     def statistics(self) -> FirmwareStatistics:
         """Return the counts so far."""
@@ -143,16 +139,16 @@ class Firmware:
 
     def tick(self, now_s: float) -> Actuation:
         """Advance watchdog and jump to this time and return what the actuators shall do."""
-        is_active = self._left_rad_s or self._right_rad_s or self._frequency or self._spring is Spring.PRELOADING
+        is_active = self._left_rad_s or self._right_rad_s or self._frequency or self.spring is Spring.PRELOADING
         if is_active and now_s - self._heard_s >= COMMAND_TIMEOUT_S:
             self._timeouts += 1
             self._safe(now_s)
         winch_m = self._advance_spring(now_s)
-        return Actuation(self._left_rad_s, self._right_rad_s, self._spring is Spring.KICKING, winch_m)
+        return Actuation(self._left_rad_s, self._right_rad_s, self.spring is Spring.KICKING, winch_m)
 
     def _halt(self, now_s: float) -> None:
         self._left_rad_s = self._right_rad_s = 0.0
-        if self._spring is Spring.PRELOADING:
+        if self.spring is Spring.PRELOADING:
             self._rewind(FOOT_PRELOAD_M, now_s)
 
     def _safe(self, now_s: float) -> None:
@@ -160,7 +156,7 @@ class Firmware:
         self._frequency = ""
 
     def _jump(self, now_s: float) -> None:
-        if self._spring is not Spring.WOUND:
+        if self.spring is not Spring.WOUND:
             self._refused_jumps += 1
             return
         # A body that rolls while its foot is on the floor trips over it.
@@ -172,12 +168,12 @@ class Firmware:
         self._enter(Spring.REWINDING, now_s)
 
     def _enter(self, spring: Spring, now_s: float) -> None:
-        self._spring, self._spring_since_s = spring, now_s
+        self.spring, self._spring_since_s = spring, now_s
 
     def _advance_spring(self, now_s: float) -> float:
         """Return how far the winch lets the foot out."""
         elapsed_s = now_s - self._spring_since_s
-        match self._spring:
+        match self.spring:
             case Spring.WOUND:
                 return 0.0
             case Spring.PRELOADING:
@@ -196,7 +192,7 @@ class Firmware:
                 self._enter(Spring.WOUND, now_s)
                 return 0.0
             case _:
-                assert_never(self._spring)
+                assert_never(self.spring)
 
 
 class Scout(Firmware):

@@ -67,7 +67,6 @@ class Signal:
 
     Attributes:
         picture: Of its camera: grey levels 0 to 255, shape (240, 320), row 0 on top. It is only read.
-        robot: Its name.
         distance_m: From the receiver's antenna, above 0.
         motors: How fast its wheels turn, 0 to 1 of their limit, both on average.
         on_since_frame: First frame in which its transmitter was on at this frequency.
@@ -130,8 +129,6 @@ class Receiver:
     """A video receiver tuned to one frequency, with its framegrabber.
 
     Args:
-        seed: Of the world.
-        frequency: Name of the frequency.
         air: Which effects there are, and how strong.
     """
 

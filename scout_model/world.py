@@ -65,11 +65,13 @@ class World:
     """
 
     def __init__(self, description: WorldDescription) -> None:
-        self._mjcf = compose(description)
+        self.mjcf = compose(description)
+        """The world's model, from which ``Camera`` builds an identical one."""
         # From the text, not from the composed model: the world steps the very model its viewers draw.
-        self._model = mujoco.MjModel.from_xml_string(self._mjcf)
+        self._model = mujoco.MjModel.from_xml_string(self.mjcf)
         self._data = mujoco.MjData(self._model)
-        self._frame = 0
+        self.frame = 0
+        """Frames stepped so far."""
         self._step = 0
         self._robots = {place.name: self._body(place.name, place.kind) for place in description.scouts}
         self._by_network_id = {place.network_id: self._robots[place.name] for place in description.scouts}
@@ -92,19 +94,9 @@ class World:
         mujoco.mj_forward(self._model, self._data)
 
     @property
-    def mjcf(self) -> str:
-        """The world's model, from which ``Camera`` builds an identical one."""
-        return self._mjcf
-
-    @property
-    def frame(self) -> int:
-        """Frames stepped so far."""
-        return self._frame
-
-    @property
     def time_s(self) -> float:
         """World time: frames stepped so far, in seconds."""
-        return self._frame / FRAMES_PER_S
+        return self.frame / FRAMES_PER_S
 
     def hear(self, network_id: int, payload: bytes) -> None:
         """Let a radio packet reach the robots: the one with this id obeys from the next frame on, others never.
@@ -149,7 +141,7 @@ class World:
                 self._step += 1
                 self._place_targets()
                 self._hold_carried()
-        self._frame += 1
+        self.frame += 1
 
     def transmitting(self) -> dict[str, str]:
         """Return robot → video frequency, of the robots whose transmitter is on."""

@@ -18,9 +18,7 @@ class BusBase(ABC):
     """Base class of both buses: the messages of one source.
 
     Args:
-        mission: Mission the keys belong to.
         source: Address of the component; every envelope carries it.
-        clock: Stamps every envelope.
     """
 
     def __init__(self, mission: str, source: str, clock: Clock) -> None:

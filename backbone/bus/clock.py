@@ -33,30 +33,20 @@ class MissionClock:
     def __init__(self, origin_monotonic_s: float, rate: float = 1.0) -> None:
         if not rate > 0:
             raise ValueError(f"rate must be above 0, not {rate}")
-        self._origin_s, self._rate = origin_monotonic_s, rate
+        self.origin_monotonic_s, self.rate = origin_monotonic_s, rate
 
     @classmethod
     def started_now(cls, rate: float = 1.0) -> MissionClock:
         """Return a clock whose mission begins now."""
         return cls(time.monotonic(), rate)
 
-    @property
-    def origin_monotonic_s(self) -> float:
-        """The machine's monotonic clock at mission time 0."""
-        return self._origin_s
-
-    @property
-    def rate(self) -> float:
-        """Mission seconds per second of the machine."""
-        return self._rate
-
     def now_s(self) -> float:
         """Return the mission time in seconds."""
-        return (time.monotonic() - self._origin_s) * self._rate
+        return (time.monotonic() - self.origin_monotonic_s) * self.rate
 
     async def sleep_s(self, duration_s: float) -> None:
         """Return after this many mission seconds; at least yields once."""
-        await asyncio.sleep(max(0.0, duration_s) / self._rate)
+        await asyncio.sleep(max(0.0, duration_s) / self.rate)
 
     async def sleep_until_s(self, at_s: float) -> None:
         """Return at this mission time, at once if it has passed."""

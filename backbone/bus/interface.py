@@ -74,8 +74,6 @@ class Bus(Protocol):
 
         Args:
             address: ``<subsystem>/<component>``.
-            question: The message.
-            reply: Class of the answer.
             within_s: Seconds of the machine (not mission time: a link does not speed up with the clock).
 
         Raises:

@@ -367,12 +367,12 @@ class ZenohBus(BusBase):
         def changed(sample: zenoh.Sample) -> None:
             self.call("", listener, address_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
 
+        def heard(sample: zenoh.Sample) -> None:
+            self.push(changed, sample)
+
         pattern = key(self._mission, address, Conversation.ALIVE)
-        return self._declare(
-            self._session.liveliness().declare_subscriber(
-                pattern, lambda sample: self.push(changed, sample), history=True
-            )
-        )
+        at_once = zenoh.handlers.Callback(heard, indirect=False)
+        return self._declare(self._session.liveliness().declare_subscriber(pattern, at_once, history=True))
 
     def watch_link(self, listener: LinkListener) -> _Declared:
         """Report the loss and return of this session's link; see ``Bus.watch_link``.

@@ -10,13 +10,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.messages import AskParameters, Parameters, SetParameter
 from backbone.errors import Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Resolve, Resolved, UnknownName
 from backbone.naming import component_of
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskAttributes, Done, MoveNode, SetPriority
 from backbone.scheduling.requests import PathNode, RcUse, UnknownRequest, Usage
 from backbone.scheduling.views import Attributes, RequestAttributes
@@ -41,7 +40,6 @@ class ShownAttributes:
     """Attributes of one name: requests, parameters, or both.
 
     Attributes:
-        name: The name.
         requests: Requests of this ARC, or of all ARCs at and below this node.
         parameters: Parameters of the component of this name; None: no component has it.
     """
@@ -107,11 +105,9 @@ async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> 
     """Change one attribute; the next decision of RC manager, ARC or component uses the new value.
 
     Args:
-        bus: Bus to the mission.
         name: Name of a component, an ARC, a console, or a node of the behavior tree.
         attribute: ``priority``, ``parent``, a run time, or a parameter of the component.
         value: The new value.
-        user: The person who changes it, for the story.
 
     Returns:
         The present values, for people.

@@ -48,8 +48,9 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
-EXPERIMENTS = "mission_control.experiments.cli"
-SIMULATION = "resource_pool.simulation.campaign"  # named, as a mission names its classes: imports run downwards only
+# named, as a mission names its classes: imports run downwards only
+EXPERIMENTS = "mission_control.laboratory.experiments.cli"
+SIMULATION = "mission_control.laboratory.simulation.campaign"
 LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to compute
 LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer time is a typing error
 MOST_SEEDS = 1_000_000  # chosen: a day of work
@@ -321,11 +322,11 @@ def log(
     async def work() -> int:
         from datetime import datetime
 
+        from backbone.addresses import LAUNCHER
         from backbone.mission_log.lines import log_json, log_lines
         from backbone.mission_log.log import Log
         from backbone.mission_log.question import LogQuestion
         from backbone.moments import Now
-        from backbone.naming import LAUNCHER
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             now = Now(clock.now_s(), datetime.now(), clock.rate)
@@ -359,15 +360,16 @@ def start(
     parameters = dict(_parameter(given) for given in parameter or [])
 
     async def work() -> int:
+        from backbone.addresses import PLACER
         from backbone.launcher.start_by_hand import completed
         from backbone.mission_log.operators import OperatorAction, publish_action
         from backbone.naming import component_of
-        from backbone.placer.messages import ADDRESS, Start, Started
+        from backbone.placer.messages import Start, Started
         from backbone.placer.wishes import START_WITHIN_S
 
         async with connected(mission, connect, secret_file) as (bus, clock):
             order, remark = await completed(bus, Start(type_, name, parameters, host))
-            started = await bus.ask(ADDRESS, order, Started, within_s=START_WITHIN_S)
+            started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
             if remark:
                 say(remark)
             publish_action(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
@@ -389,11 +391,12 @@ def stop(
     """Stop one component; it is not restarted."""
 
     async def work() -> int:
+        from backbone.addresses import PLACER
         from backbone.mission_log.operators import OperatorAction, publish_action
-        from backbone.placer.messages import ADDRESS, Ended, StopComponent
+        from backbone.placer.messages import Ended, StopComponent
 
         async with connected(mission, connect, secret_file) as (bus, clock):
-            ended = await bus.ask(ADDRESS, StopComponent(name, "by command"), Ended, within_s=20.0)
+            ended = await bus.ask(PLACER, StopComponent(name, "by command"), Ended, within_s=20.0)
             publish_action(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
             show([f"{name} ended by {ended.by}"])
         return ExitCode.DONE

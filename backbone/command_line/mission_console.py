@@ -10,6 +10,7 @@ from typing import IO, Any
 from rich.console import Console
 from rich.live import Live
 
+from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
@@ -20,14 +21,13 @@ from backbone.launcher.endings import ExitCode, complaint_of
 from backbone.launcher.verdict import VerdictPipe
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.operators import OperatorActed
-from backbone.naming import LAUNCHER, Subsystem
+from backbone.naming import Subsystem
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, Said, holders_line
 from backbone.picture.screen import live_screen
 from backbone.picture.words import absence_line
 from backbone.printable import printable_all, printable_lines
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import msgspec
 
+from backbone.addresses import NAMESERVER
 from backbone.authentication import secret_of
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -36,7 +37,10 @@ from backbone.component.messages import (
     LifeState,
     LogLevel,
     MissionTime,
+    NameTaken,
     Parameters,
+    Register,
+    Registered,
     SetParameter,
     StandingStop,
     Statistics,
@@ -47,8 +51,6 @@ from backbone.component.messages import (
 from backbone.component.story import StoryBook
 from backbone.errors import BackboneError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
-from backbone.nameserver.messages import NameTaken, Register, Registered
 from backbone.naming import claim_address
 from backbone.spoken import value_text
 from backbone.wire import Envelope, Message, UnknownMessage
@@ -88,8 +90,6 @@ class Component(Generic[P]):
 
     Args:
         launch: Name, type, host and initial parameters of this component.
-        bus: An open bus.
-        clock: The mission's clock.
 
     Raises:
         WrongParameter: The launch's parameters do not fit ``parameters_type``.

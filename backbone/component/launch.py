@@ -11,8 +11,6 @@ class Launch(Message, frozen=True):
     """Order to become one component.
 
     Attributes:
-        mission: Name of the mission.
-        subsystem: Subsystem of the component.
         name: Name of the component, unique in the mission.
         type: Component type as named in the mission file.
         class_path: ``package.module:Class``, a ``Component``.

@@ -64,7 +64,6 @@ class ComponentLog(logging.Handler):
     """Writes this process's log records to standard error, and limits the size of the file behind it.
 
     Args:
-        name: Name of the component, in each line.
         run_directory: As for ``redirect``; without ``redirect``, standard error is not limited.
     """
 

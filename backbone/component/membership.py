@@ -20,7 +20,6 @@ class BeginMember(Message, frozen=True):
     """Admit this component. Idempotent for the same life.
 
     Attributes:
-        launch: The component's launch.
         life: Number of this admission, unique for this creator.
     """
 

@@ -1,10 +1,11 @@
-"""Common messages: the questions that every component answers, and its status."""
+"""Common messages: the questions that every component answers, its status, and its registration."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 from typing import Annotated, Any
 
+from backbone.errors import Refusal
 from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
@@ -27,7 +28,6 @@ class Absence(Message, frozen=True):
     """A component that its owner wants and that does not run, or does not respond.
 
     Attributes:
-        name: Name of the absent component.
         since_s: Mission time at which its owner found it missing.
         cause: Why it is absent: how it ended, or the refusal of its start. One line.
         doing: What its owner does to start it, one line; empty: nothing.
@@ -67,11 +67,8 @@ class ComponentState(Message, frozen=True):
     Attributes:
         address: ``<subsystem>/<name>``.
         type: Component type as named in the mission file.
-        host: Host it runs on.
-        pid: Its process.
         state: State of its life cycle.
         since_s: Mission time at which it entered that state.
-        feedback: Its present work, one line for people.
         requester: Address of its owner.
         absent: Absent components that this one wants.
         stop: The emergency stop in force on it; None: no stop.
@@ -91,6 +88,27 @@ class ComponentState(Message, frozen=True):
     user: Mention = ""
 
 
+class Register(Message, frozen=True):
+    """Register a name at the nameserver. The component shell asks this before its readiness.
+
+    Attributes:
+        component: The component; its state is CONNECTING.
+    """
+
+    component: ComponentState
+
+
+class Registered(Message, frozen=True):
+    """Answer to ``Register``: the component holds the name until its liveliness token falls."""
+
+
+class NameTaken(Refusal):
+    """A living component has this name."""
+
+    code = "nameserver.taken"
+    remedy = "It runs already: see 'scout-backbone status'. Stop it first, or give the new one a name of its own."
+
+
 class AskTime(Message, frozen=True):
     """Ask for the mission's time."""
 
@@ -100,7 +118,6 @@ class MissionTime(Message, frozen=True):
 
     Attributes:
         at_s: Mission time of the answer.
-        rate: Mission seconds per second of the machine.
     """
 
     at_s: Instant
@@ -131,9 +148,7 @@ class SetParameter(Message, frozen=True):
     """Set a parameter. If the value does not fit, the component refuses and changes nothing.
 
     Attributes:
-        name: Name of the parameter.
         value: The new value.
-        user: The person who sets it, for the story.
     """
 
     name: Mention
@@ -164,7 +179,6 @@ class StoryEvent(Message, frozen=True):
     """One event of a component.
 
     Attributes:
-        at_s: Mission time.
         where: Address of the component that recorded it.
         what: The event, past tense, one line.
         subject: Name of its subject.
@@ -192,7 +206,6 @@ class Stop(Message, frozen=True):
     """End in good order: finish the work in progress, go to the safe state, leave.
 
     Attributes:
-        reason: Reason, for the story.
         incarnation: The incarnation to stop, see ``Launch.incarnation``; empty: any. Another incarnation of the
             address refuses with ``OtherIncarnation``.
     """

@@ -17,48 +17,40 @@ class PeerMonitor:
     """Watches the liveliness token of one peer.
 
     Args:
-        bus: Bus of the component that depends on the peer.
-        address: Address of the peer.
         gone_after_s: Seconds of the machine, with the own link up, after which an absent peer counts as gone.
     """
 
     def __init__(self, bus: Bus, address: str, *, gone_after_s: float = GONE_AFTER_S) -> None:
         self.address = address
         self._gone_after_s = gone_after_s
-        self._token, self._link, self._risen = False, True, 0
+        self.is_there = False
+        """True while the token stands."""
+        self.times_risen = 0
+        """How often the token has risen."""
+        self._link = True
         self._changed = asyncio.Event()
         self._declared = [bus.watch_link(self._link_changed), bus.watch_alive(address, self._token_changed)]
 
-    @property
-    def is_there(self) -> bool:
-        """True while the token stands."""
-        return self._token
-
-    @property
-    def times_risen(self) -> int:
-        """How often the token has risen."""
-        return self._risen
-
     async def wait_there(self) -> None:
         """Return when the token stands."""
-        while not self._token:
+        while not self.is_there:
             await self._changed.wait()
 
     async def wait_hidden(self) -> None:
         """Return when the token does not stand."""
-        while self._token:
+        while self.is_there:
             await self._changed.wait()
 
     async def wait_risen(self, times: int) -> None:
         """Return when the token has risen ``times`` times; the first counts."""
-        while self._risen < times:
+        while self.times_risen < times:
             await self._changed.wait()
 
     async def wait_gone(self) -> None:
         """Return when the token was missing for the whole of ``gone_after_s`` while the own link was up."""
         while True:
             changed = self._changed
-            if self._token or not self._link:
+            if self.is_there or not self._link:
                 await changed.wait()
                 continue
             try:
@@ -73,8 +65,8 @@ class PeerMonitor:
             declared.close()
 
     def _token_changed(self, _address: str, alive: bool) -> None:
-        self._token = alive
-        self._risen += alive
+        self.is_there = alive
+        self.times_risen += alive
         self._wake_waiting()
 
     def _link_changed(self, up: bool) -> None:

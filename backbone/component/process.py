@@ -82,11 +82,7 @@ def run_to_end(launch: Launch, begin: Callable[[], Coroutine[Any, Any, None]]) -
 
 
 def exit_code_of(error: BaseException, address: str) -> int:
-    """Log why a component ended and return the matching exit code.
-
-    Args:
-        error: The exception that ended it.
-    """
+    """Log why a component ended and return the matching exit code."""
     log = logging.getLogger(__name__)
     match error:
         case Refusal():
@@ -105,7 +101,6 @@ def refusal_in_log(lines: Iterable[str], address: str) -> Refusal | None:
 
     Args:
         lines: Lines of the log, oldest first.
-        address: Address of the component.
 
     Example:
         >>> line = "12:00 ERROR x: resource_pool/x ended, refused [a.b]: no scout is named 'y' (remedy: See status.)"

@@ -83,7 +83,6 @@ class SharedProcess:
         launch: Launch of the process itself; see ``Launch.process``.
         join: Returns a bus for a source; all these buses are neighbors.
         clock: The mission's clock, for all members.
-        pid: Pid of the process.
     """
 
     def __init__(self, launch: Launch, join: Callable[[str, Clock], Bus], clock: Clock, pid: int) -> None:

@@ -21,7 +21,6 @@ class StoryBook:
 
     Args:
         where: Address of the component that records the events.
-        clock: Stamps the events.
     """
 
     def __init__(self, where: str, clock: Clock) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import msgspec
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component
@@ -21,7 +22,6 @@ from backbone.component_database.messages import (
     Types,
 )
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import RECONNECT_S, Components, ListComponents
 from backbone.wire import Envelope, Message, UnknownMessage
 

@@ -60,13 +60,10 @@ class Spawn(Message, frozen=True):
     """Start one component here and answer when it is ready. Only the placer asks this.
 
     Attributes:
-        subsystem: Subsystem of the component.
         name: Unique in the mission.
-        type: Component type.
         class_path: ``package.module:Class``.
         parameters: Values for its ``Parameters``.
         requester: Address of the component's owner.
-        policy: Restart policy.
         ready_within_s: Silence, seconds of the machine, after which a start that is not ready has failed.
         pinned: True if it may run on this host only. A restarted placer learns this and the tags from the creator.
         tags: Tags that its host must have.
@@ -100,8 +97,6 @@ class EndProcess(Message, frozen=True):
     the process is killed, and the other members are restarted by their policies.
 
     Attributes:
-        name: The component.
-        reason: Reason, for the story.
         ask_s: Seconds of the machine from the request to SIGTERM.
         term_s: Seconds of the machine from SIGTERM to SIGKILL.
     """
@@ -139,7 +134,6 @@ class ProcessState(Message, frozen=True):
     Attributes:
         spawn: The order that started it.
         pid: Its process, 0 while it waits for a restart.
-        restarts: Number of its restarts.
         last_end: How it last ended, for people; empty if it never ended.
         silent_s: Seconds of the machine since the last heartbeat of its process; 0 while the heartbeat is in time.
         doing: Present step of a component that is not ready yet, for people.
@@ -165,12 +159,8 @@ class HostLoad(Message, frozen=True):
     """Load of a host. Each creator publishes it once a second and after every change of its processes.
 
     Attributes:
-        host: Name of the host.
-        tags: Tags of the host.
         cpu: Busy share of all cores, 0 to 1.
         memory: Used share of memory, 0 to 1.
-        cores: Number of cores.
-        components: Number of components this creator runs.
     """
 
     host: Mention
@@ -185,7 +175,6 @@ class ProcessFell(Message, frozen=True):
     """Published as an event when a component ended unexpectedly.
 
     Attributes:
-        name: The component.
         how: Exit code or signal, for people.
         restart_in_s: Pause before the restart; negative: no restart.
         last_lines: Last lines of its log.

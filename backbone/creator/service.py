@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import msgspec
 import psutil
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.heartbeat import read_vitals
@@ -37,7 +38,6 @@ from backbone.creator.process_keeper import Forks, ProcessKeeper, ReadVitals
 from backbone.creator.zygote import Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.wire import Envelope, Message, UnknownMessage
 
 LONGEST_CLASS_PATH = 200  # chosen: as much of a refused class path as a person reads

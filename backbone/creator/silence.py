@@ -33,12 +33,7 @@ class Silence:
     _looked_s: float = -1.0
 
     def look(self, vitals: Vitals, now_s: float) -> float:
-        """Add one reading of the process and return the duration of its silence.
-
-        Args:
-            vitals: The reading.
-            now_s: Seconds of the machine.
-        """
+        """Add one reading of the process and return the duration of its silence."""
         last, elapsed_s = self._last, now_s - self._looked_s
         self._last, self._looked_s = vitals, now_s
         if vitals.beats != last.beats:

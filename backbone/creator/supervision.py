@@ -82,13 +82,9 @@ class Supervised:
     """One supervised component; only ``Supervision`` changes it.
 
     Attributes:
-        name: The component.
-        policy: Restart policy.
         ready_within_s: Silence after which a start has failed.
         asked_by_signal: True for a hub, because its own end would cut off its answer on the bus.
-        phase: Its phase.
         pid: Its process, 0 while there is none.
-        restarts: Number of its restarts.
         last_end: How it last ended, for people; empty if it never ended.
         silent_s: Duration of a ready process's silence.
         absent_since_s: Time of its end or of the begin of its silence; negative while it is ready and responds.

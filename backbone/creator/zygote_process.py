@@ -81,7 +81,6 @@ class Exited(Message, frozen=True):
     """The component's whole process tree has ended.
 
     Attributes:
-        pid: Its process.
         returncode: Exit code, or the number of the signal that killed it, negative.
     """
 

@@ -8,8 +8,6 @@ from backbone.errors import Refusal
 from backbone.ranges import FEW, MANY, Duration, Mention, Share, Values
 from backbone.wire import Message
 
-ADDRESS = "backbone/dependency_database"
-
 
 class Resource(Message, frozen=True):
     """One physical resource, and the launch of its RC.

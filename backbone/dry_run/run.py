@@ -42,8 +42,6 @@ class Placed:
     """One component and its host.
 
     Attributes:
-        name: Its name.
-        type: Its component type.
         host: Its host; empty: no host is possible.
         reasons: The reasons of the choice or of the refusal, one line a host.
     """
@@ -59,7 +57,6 @@ class Claimed:
     """The request of one behavior's ARC and its outcome.
 
     Attributes:
-        arc: Name of the ARC.
         behavior: Name of its owner.
         priority: The owner's place in the tree, for people: ``mission:10/watch:3``.
         rcs: Its RCs; empty: it was refused.
@@ -93,7 +90,6 @@ class DryRun:
     """The result of a dry run.
 
     Attributes:
-        mission: Its name.
         placed: Its components in the order of their start.
         claimed: The requests of its behaviors in the order of the file.
         timetable: The slices of all ARCs.
@@ -125,7 +121,6 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     """Run a mission from its begin without starting a process.
 
     Args:
-        description: The mission.
         for_s: Mission seconds, at least 0.
     """
     placed = placements(description)

@@ -23,6 +23,7 @@ from typing import Any, ClassVar, Protocol
 import msgspec
 
 from backbone import run_files
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER
 from backbone.authentication import SECRET_NAME, secret_of
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
@@ -54,10 +55,8 @@ from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.log import AskLog, AskPeople, LogKeeper, PeopleKnown
 from backbone.mission_log.operators import OperatorAction, publish_action
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import LAUNCHER, Subsystem, address, component_of
-from backbone.placer.messages import ADDRESS as PLACER
+from backbone.naming import Subsystem, address, component_of
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
 from backbone.wire import Envelope, Message

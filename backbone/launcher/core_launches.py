@@ -9,12 +9,13 @@ from typing import Any
 
 import msgspec
 
+from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.component.launch import Launch
 from backbone.creator.messages import creator_name
 from backbone.creator.preload import arc_modules
 from backbone.mission.model import Host, MissionDescription
-from backbone.naming import LAUNCHER, Subsystem
+from backbone.naming import Subsystem
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, ComponentState
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.picture.health import LOOK_EVERY_S, SAY_EVERY_S, MissionHealth, health
 from backbone.picture.look import LOOK_TIME_S, look
@@ -22,8 +22,6 @@ class HealthWatch:
     """Examines the mission every ``LOOK_EVERY_S`` and publishes its health under the launcher's address.
 
     Args:
-        bus: Bus of the launcher.
-        clock: The mission's clock.
         changed: Called when ``absences`` changes.
         own: Returns the absences that the launcher reports as an owner.
     """
@@ -32,19 +30,15 @@ class HealthWatch:
         self, bus: Bus, clock: Clock, changed: Callable[[], None], own: Callable[[], list[Absence]] = list
     ) -> None:
         self._bus, self._clock, self._changed, self._own = bus, clock, changed, own
-        self._picture = MissionPicture(bus.mission, clock.now_s(), rate=clock.rate)
+        self.picture = MissionPicture(bus.mission, clock.now_s(), rate=clock.rate)
+        """The mission in the last round."""
         self._components: Mapping[str, ComponentState] = {}
         self._said: MissionHealth | None = None
         self._said_s = 0.0
 
     def absences(self) -> list[Absence]:
         """Return the absences that the watch found; other owners report theirs in their own states."""
-        return list(self._picture.missed)
-
-    @property
-    def picture(self) -> MissionPicture:
-        """The mission in the last round."""
-        return self._picture
+        return list(self.picture.missed)
 
     async def run(self) -> None:
         """Examine and publish until cancelled; a round that waits for an answer delays no publication."""
@@ -58,7 +52,7 @@ class HealthWatch:
     async def _look_again_and_again(self) -> None:
         while True:
             missed, now_s, rate = self.absences(), self._clock.now_s(), self._clock.rate
-            await look(self._bus, now_s, before=self._picture, rate=rate, schedule=False)
+            await look(self._bus, now_s, before=self.picture, rate=rate, schedule=False)
             if self.absences() != missed:
                 self._changed()
             await self._clock.sleep_s(LOOK_EVERY_S * self._clock.rate)
@@ -74,7 +68,7 @@ class HealthWatch:
     def _health(self) -> MissionHealth:
         # The launcher's own state in the list is one round old: its absences may have ended.
         others = {at: state for at, state in self._components.items() if at != self._bus.source}
-        missed = [*self._own(), *self._picture.missed]
+        missed = [*self._own(), *self.picture.missed]
         return health(others, missed, self._clock.now_s(), self._clock.rate)
 
     def _say(self, said: MissionHealth) -> None:

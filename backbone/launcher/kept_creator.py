@@ -10,11 +10,11 @@ from typing import Protocol
 import msgspec
 
 from backbone import run_files
+from backbone.addresses import COMPONENT_DATABASE
 from backbone.authentication import keep_secret
 from backbone.bus.interface import Bus, Clock
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence
-from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
 from backbone.component_database.messages import ComponentType, ListTypes, Types, UnknownType
 from backbone.creator.messages import TYPE, ProcessFell, ProcessState, RestartPolicy, creator_name
 from backbone.creator.preload import arc_modules
@@ -31,10 +31,8 @@ class Offered:
     """The offered machine, and the mission that may use it.
 
     Attributes:
-        mission: Name of the mission.
         endpoint: Endpoint of the mission's hub.
         host: Name of this machine in the mission.
-        tags: Tags of this machine.
         secret: Secret of the mission; empty: the hub asks for none.
     """
 
@@ -67,12 +65,8 @@ class KeepsCreator(Protocol):
 class KeptCreator:
     """The creator of this machine, with a zygote and a folder of its own; the mission's secret is in the folder.
 
-    Args:
-        launch: Launch of the offer.
-
     Attributes:
         on_fell: Called when the creator has ended unexpectedly.
-        on_changed: Called when ``absences()`` may have changed.
     """
 
     def __init__(self, launch: Launch, offered: Offered) -> None:

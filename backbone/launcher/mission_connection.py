@@ -11,11 +11,11 @@ import time
 from collections.abc import AsyncIterator
 
 from backbone import run_files
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
 from backbone.component.messages import AskTime, MissionTime
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 
 REPLY_TIME_S = 2.0  # chosen: a slow wireless link answers within this
 ASKED_TIMES = 5  # chosen: the quickest of a few answers is within a millisecond

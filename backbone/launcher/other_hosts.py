@@ -39,7 +39,6 @@ class OtherHosts:
     """The other machines of a mission, present or missing.
 
     Args:
-        description: The mission.
         now_s: Mission time from which on they count as missing.
     """
 

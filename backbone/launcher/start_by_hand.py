@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
+from backbone.addresses import DEPENDENCY_DATABASE
 from backbone.bus.interface import Bus
-from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import Refusal
 from backbone.placer.messages import Start

@@ -53,9 +53,7 @@ def check(root: Element, classes: Mapping[str, ClassFacts], report: Report) -> N
     """Report everything that does not fit.
 
     Args:
-        root: The mission.
         classes: Class path → facts of the class; parameters of other classes are not checked.
-        report: Collects the faults.
     """
     tables = Tables.of(root, classes)
     _check_hosts(tables, report)

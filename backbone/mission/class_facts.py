@@ -24,9 +24,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
     """A parameter of a class.
 
     Attributes:
-        name: Its name.
         schema: The JSON schema of its values, as msgspec derives it from the parameter's type.
-        doc: Its meaning.
     """
 
     name: str
@@ -87,7 +85,6 @@ class ClassFacts(msgspec.Struct, frozen=True):
     """Facts of a class.
 
     Attributes:
-        doc: Its documentation.
         parameters: What it can be given in a mission file.
         options: Driver → what can be given besides, while this driver is used; None: the class uses no driver.
         has_rules: Whether it has rules for its parameters besides their types; only the class itself can judge by them.
@@ -112,7 +109,6 @@ class Question(msgspec.Struct, frozen=True):
 
     Attributes:
         class_path: The class.
-        values: The parameters.
     """
 
     class_path: str

@@ -38,7 +38,6 @@ class Attribute:
     """A value and where its name stands.
 
     Attributes:
-        value: The value.
         place: Where its name stands.
         is_written: False if the file leaves it out, and this is its default.
     """

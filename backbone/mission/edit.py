@@ -63,8 +63,6 @@ def set_attribute(data: bytes, path: Path, name: str, value: str | None) -> byte
     """Return the text with another value; its quotes stay, and a new attribute stands where the schema has it.
 
     Args:
-        data: The text.
-        path: The element.
         name: The attribute.
         value: What it shall be; None: left out.
 
@@ -98,7 +96,6 @@ def add(data: bytes, parent: Path, new: NewElement, at: int | None = None) -> by
     """Return the text with one more element, on lines of its own if its neighbors stand on such.
 
     Args:
-        data: The text.
         parent: Where it goes in.
         new: The element.
         at: Its number among its siblings afterwards; None: the last of its tag, where the schema's order has it.
@@ -151,8 +148,6 @@ def move(data: bytes, path: Path, parent: Path, at: int) -> bytes:
     """Return the text with an element elsewhere, with all that stands in it, comments too.
 
     Args:
-        data: The text.
-        path: The element.
         parent: Where it goes in, as paths are before the change.
         at: Its number among its siblings afterwards.
 

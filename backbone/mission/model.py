@@ -28,8 +28,6 @@ class CoreServiceDescription(_Part):
     """A core service and where it runs.
 
     Attributes:
-        type: Component type.
-        host: Where.
         parameters: What the file sets of its parameters.
     """
 
@@ -42,8 +40,6 @@ class ComponentDescription(_Part):
     """A component the mission starts at its beginning, besides RCs and behaviors (the simulated world).
 
     Attributes:
-        type: Component type.
-        name: Its name.
         host: Where; empty: the placer decides.
         parameters: Values for the class's parameters.
         process: Name of the process it shares with others; empty: a process of its own.
@@ -91,7 +87,6 @@ class MissionDescription(_Part):
         hosts: Machines; the first runs the nameserver.
         core: Core services in the papers' order of start.
         types: Component types.
-        resources: Hardware.
         components: Further components to start, in this order, before the behaviors.
         behaviors: Roots of the behavior tree, children of the mission's own node.
         source: Path of the file.

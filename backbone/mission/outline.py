@@ -28,7 +28,6 @@ class Node:
         path: Where it stands.
         tag: Its tag.
         attributes: Its attributes in the order of the text.
-        children: Elements in it.
         line: Line of its tag, from 1.
         begin: First byte of its tag.
         content: First byte behind its tag.

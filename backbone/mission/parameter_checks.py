@@ -50,7 +50,6 @@ def check_class_parameters(element: Element, reserved: Collection[str], tables: 
         element: A resource, a behavior or the world.
         reserved: Names that the rest of the file gives; they are judged elsewhere.
         tables: The mission.
-        report: Where faults go.
     """
     kind = element.text("type")
     facts = tables.facts_of(kind)

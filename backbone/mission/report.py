@@ -64,18 +64,14 @@ class Report:
     """
 
     def __init__(self, file: str) -> None:
-        self._file = file
+        self.file = file
+        """The file, as it was named to the reader."""
         self._faults: list[Fault] = []
         self._hints_left = HINTS_AT_MOST
 
-    @property
-    def file(self) -> str:
-        """The file, as it was named to the reader."""
-        return self._file
-
     def fault(self, place: Place, message: str, remedy: str) -> None:
         """Add a fault."""
-        self._faults.append(Fault(self._file, place.line, place.column, message, remedy.rstrip(".")))
+        self._faults.append(Fault(self.file, place.line, place.column, message, remedy.rstrip(".")))
 
     def nearest(self, name: str, known: Collection[str]) -> str:
         """Return the known name nearest to a wrong one; empty if none is near, or once enough were looked for."""

@@ -26,10 +26,8 @@ class Tables:
     """Elements by name; of several with one name, the first.
 
     Attributes:
-        root: The mission.
         hosts: Machines.
         types: Component types.
-        resources: Hardware.
         by_type: Type → all resources of it, in the order of the file.
         world: The simulated world, if there is one.
         behaviors: Every node of the behavior tree, parents before their children.

@@ -43,7 +43,6 @@ def validated(root: Element, report: Report) -> MissionElement | None:
 
     Args:
         root: A tree of declared elements and attributes.
-        report: Where faults go.
     """
     mission = _judged(root, report)
     for parent in root:

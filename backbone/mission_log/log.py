@@ -161,11 +161,7 @@ def chosen(events: Iterable[StoryEvent], asked: AskLog) -> list[StoryEvent]:
 
 
 class LogKeeper:
-    """Subscribes to a mission's events and keeps them.
-
-    Args:
-        bus: Bus of the component that keeps the log.
-    """
+    """Subscribes to a mission's events and keeps them."""
 
     def __init__(self, bus: Bus) -> None:
         self.log = MissionLog()

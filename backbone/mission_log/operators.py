@@ -77,11 +77,8 @@ class OperatorActed(Message, frozen=True):
     """Published by the console or command through which a person acted, under ``Conversation.OPERATORS``.
 
     Attributes:
-        user: The person.
-        action: The action.
         subject: Name of the robot, component or alarm.
         detail: Manner, reason or outcome, for people.
-        at_s: Mission time.
     """
 
     user: Mention
@@ -106,7 +103,6 @@ class OperatorActed(Message, frozen=True):
 
         Args:
             where: Address of the console or command.
-            cause: Id of the message that led to it.
         """
         level = _LEVELS.get(self.action, LogLevel.NOTICE)
         return StoryEvent(self.at_s, where, self.sentence, self.subject, cause, level, self.user)
@@ -124,9 +120,6 @@ def publish_action(bus: Bus, clock: Clock, action: OperatorAction, subject: str,
     """Publish an action of the logged-in user to the mission.
 
     Args:
-        bus: Bus of the command.
-        clock: The mission's clock.
-        action: The action.
         subject: Name of the robot, component or alarm.
         detail: Manner, reason or outcome, for people.
     """

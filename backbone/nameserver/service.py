@@ -22,7 +22,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.bus.zenoh_bus import ZenohBus, hub_config
 from backbone.component.component import Component
 from backbone.component.launch import Launch
-from backbone.component.messages import AskState, ComponentState
+from backbone.component.messages import AskState, ComponentState, NameTaken, Register, Registered
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.nameserver.messages import (
@@ -31,9 +31,6 @@ from backbone.nameserver.messages import (
     Disappeared,
     ListComponents,
     NameserverQuestion,
-    NameTaken,
-    Register,
-    Registered,
     Resolve,
     Resolved,
 )

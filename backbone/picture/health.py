@@ -38,7 +38,6 @@ class MissionHealth(Message, frozen=True):
     """Health of a mission; the launcher publishes it on every change, and every ``SAY_EVERY_S`` as its heartbeat.
 
     Attributes:
-        word: The verdict.
         absent: Absent components: vital ones first, then by name.
     """
 
@@ -62,8 +61,6 @@ def health(
     Args:
         components: State of each registered component, by address.
         missed: Absences that the observer found: services that are not registered or did not answer.
-        now_s: Mission time.
-        rate: Mission seconds per second of the machine.
     """
     absent: dict[str, Absence] = {}
     for absence in (*missed, *(each for state in components.values() for each in state.absent)):

@@ -12,18 +12,16 @@ from typing import Any
 
 import msgspec
 
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.interface import Bus
 from backbone.component.messages import Absence, AskTime, MissionTime
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.creator.messages import ListProcesses, Processes, ProcessState
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
-from backbone.naming import LAUNCHER, component_of
+from backbone.naming import component_of
 from backbone.picture.mission import MissionPicture, misses
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.printable import printable_all
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
@@ -38,11 +36,8 @@ async def look(
     """Ask nameserver, RC manager, placer, launcher and creators, and return the picture of their answers.
 
     Args:
-        bus: To ask on.
-        now_s: Mission time.
         before: The picture to update: an absence keeps its begin, and if the nameserver does not answer the picture
             stays as it was, marked as stale. None: a new one.
-        rate: Mission seconds per second of the machine.
         schedule: False: only check that the RC manager answers.
 
     Raises:

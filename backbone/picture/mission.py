@@ -49,7 +49,6 @@ class MissionPicture:
     """A mission as an observer knows it.
 
     Attributes:
-        mission: Its name.
         at_s: Mission time of the last look.
         components: The present components, by address.
         processes: Reports of creators and launcher on their processes, by component name.
@@ -57,7 +56,6 @@ class MissionPicture:
         problems: Services that did not answer, and gaps of the picture.
         missed: Absences this observer found: services that did not answer, components that failed, hang or ended.
         stale_since_s: Mission time at which the rest of the picture was true; None: now.
-        rate: Mission seconds per second of the machine.
         log: The newest events, and the persons at the consoles.
     """
 
@@ -81,7 +79,6 @@ class MissionPicture:
         """Take a message in.
 
         Args:
-            said: The message.
             source: Address of the sender.
         """
         match said:
@@ -181,8 +178,6 @@ def misses(
     Args:
         components: The registered components.
         processes: The processes of launcher and creators.
-        now_s: Mission time.
-        rate: Mission seconds per second of the machine.
     """
     found = {
         component_of(c.address): Absence(component_of(c.address), c.since_s, c.feedback or "it failed", _RESTARTS)

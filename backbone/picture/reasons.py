@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import Absence, AskStory, ComponentState, Story, StoryEvent
 from backbone.component.story import LENGTH as STORY_LENGTH
@@ -16,16 +17,13 @@ from backbone.errors import LinkError, Refusal
 from backbone.mission_log.lines import event_json
 from backbone.mission_log.log import AskPeople, PeopleKnown
 from backbone.mission_log.people import People, screens_of
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
-from backbone.naming import LAUNCHER, component_of
+from backbone.naming import component_of
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
 from backbone.picture.words import RULES, absence_line, stop_line
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, NotPlaced, Placement
 from backbone.printable import printable_all
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.requests import RequestState, UnknownRequest
 from backbone.scheduling.views import Why

@@ -9,14 +9,11 @@ from backbone.errors import Refusal
 from backbone.ranges import FEW, MANY, Instant, Mention, NameOrNone, Pid, Text, Values
 from backbone.wire import Message
 
-ADDRESS = "backbone/placer"
-
 
 class Start(Message, frozen=True):
     """Start a component and answer when it is ready.
 
     Attributes:
-        type: Component type.
         name: Unique in the mission; empty: the placer chooses ``<type>-<n>``.
         parameters: Values for its ``Parameters``.
         host: The only possible host; empty: the placer chooses by tags and load.
@@ -36,9 +33,6 @@ class Started(Message, frozen=True):
     """Answer to ``Start``: the component is ready.
 
     Attributes:
-        address: Address of the component.
-        host: Its host.
-        pid: Its process.
         reasons: One line a host: why it was chosen or not.
     """
 
@@ -72,11 +66,7 @@ class Placement(Message, frozen=True):
     """Answer to ``AskPlacement``, and one entry of ``Placements``.
 
     Attributes:
-        name: The component.
-        type: Its type.
-        host: Its host.
         requester: Address of its owner.
-        since_s: Mission time of the decision.
         reasons: One line a host: why it was chosen or not.
     """
 

@@ -32,12 +32,10 @@ class CandidateHost:
 
     Attributes:
         name: Name in the mission file.
-        tags: Its tags.
         alive: True while its creator's token stands.
         components: Number of its components, starting ones included.
         cpu: Busy share of all cores, 0 to 1, as last published by its creator.
         memory: Used share of memory, 0 to 1.
-        cores: Number of cores.
     """
 
     name: str
@@ -79,10 +77,8 @@ def place(name: str, tags: Collection[str], pin: str, hosts: Iterable[CandidateH
     """Return the host for one more component.
 
     Args:
-        name: Name of the component, for the refusal.
         tags: Tags that the host must have.
         pin: The only possible host; empty: any.
-        hosts: All known hosts, in any order.
         colocation: Host of the other members of its process; empty: none.
 
     Raises:

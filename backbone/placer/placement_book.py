@@ -27,10 +27,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, Spawn
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem, address, did_you_mean
 from backbone.placer.messages import NotPlaced, Placement
 from backbone.placer.placement import CandidateHost, Choice, obstacle, place
@@ -53,7 +52,6 @@ class PlacementRecord:
     Attributes:
         spawn: The order to its creator.
         pin: The only possible host; empty: any.
-        phase: Its phase.
         host: The host on which it runs or starts; empty: none.
         pid: Its process; 0 if unknown.
         since_s: Mission time of the last decision about it.

@@ -16,12 +16,12 @@ from functools import partial
 from itertools import chain, repeat
 from typing import Any, assert_never
 
+from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.asking import ask_until_answered
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import Absence, ComponentState, LifeState
-from backbone.component_database.messages import ADDRESS as COMPONENT_DATABASE
 from backbone.component_database.messages import Admit, Admitted, ComponentType, Multiplicity
 from backbone.creator.messages import (
     CUT_OFF_ENDS_WITHIN_S,
@@ -43,7 +43,6 @@ from backbone.creator.messages import (
 from backbone.creator.messages import TYPE as CREATOR
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import (
     RECONNECT_S,
     Appeared,

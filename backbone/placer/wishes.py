@@ -15,13 +15,12 @@ import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import Absence
+from backbone.component.messages import Absence, NameTaken
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.creator.messages import START_MOST_S
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import NameTaken
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import AskPlacement, CreatorSilent, NotPlaced, Placement, Start, Started, StoppedMeanwhile
 
 log = logging.getLogger(__name__)
@@ -37,7 +36,6 @@ class Wish:
     """One wanted component; times are mission seconds.
 
     Attributes:
-        name: The component.
         missing_since_s: Mission time at which it was found missing; negative: it is placed, or is being started.
         cause: Why it is missing.
         started: True if it was ever placed.
@@ -85,10 +83,8 @@ async def keep_placed(
     """Place the component, and place it again whenever it is missing; return the reason of the order that stops it.
 
     Args:
-        bus: Bus of the owner.
         wish: The owner's wish for this component.
         order: Order that starts it.
-        address: Address of the component.
         on_placed: Called after each start, with True if the component ran already.
         on_changed: Called when ``wish.absence()`` may have changed.
         patience_s: Time in which a refused first start is repeated, seconds of the machine, because a host may be

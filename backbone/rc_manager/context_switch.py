@@ -54,8 +54,6 @@ class ContextSwitch:
     """Connects, disconnects and opens for the schedule manager.
 
     Args:
-        bus: Of the RC manager.
-        clock: The mission's time.
         note: Adds an event to the story of a subject.
         may_leave: Returns whether a switch may leave an RC that an ARC loses: it is down, or has no other holder.
     """

@@ -23,7 +23,6 @@ def contradiction(state: RcState, resource: Resource, now_s: float, given: int |
     Args:
         state: The RC's report.
         resource: Its declaration in the mission file.
-        now_s: Mission time.
         given: Largest epoch given for this RC so far; None if an earlier RC manager may have given larger ones.
     """
     if state.name != resource.name:

@@ -32,8 +32,6 @@ from backbone.ranges import (
 from backbone.scheduling.requests import Holder, Lease, PathNode, RcUse, SchedulingRequest
 from backbone.wire import Message
 
-ADDRESS = "backbone/rc_manager"
-
 RENEW_EVERY_S = 0.5  # chosen: three renewals may be lost
 EPOCHS_PER_S = 1000  # chosen: a restarted RC begins above all its earlier epochs, as no RC changes hands so often
 EPOCHS_AHEAD = 1_000_000  # chosen: clocks of two hosts differ by less than 1000 s
@@ -167,7 +165,6 @@ class Connect(Message, frozen=True):
     """Serve this ARC from now on.
 
     Attributes:
-        arc: Name of the ARC.
         epoch: Larger than every earlier epoch of this RC.
         lease_s: Seconds of mission time after which the hold ends unless renewed.
         use: The ARC's use of this RC.
@@ -215,8 +212,6 @@ class RcState(Message, frozen=True):
     """Answer to ``AskRc``: the state of this RC, which is the truth.
 
     Attributes:
-        name: The RC.
-        kind: Its type.
         sharable: True if several ARCs may hold it.
         capacity: Share of its time it can give.
         holders: Its present holders.
@@ -243,7 +238,6 @@ class Leases(Message, frozen=True):
     An RC that lost a hold renewed here, or that is listed as missing, publishes its ``RcState``.
 
     Attributes:
-        leases: All holds that are renewed.
         lease_s: For how long, seconds of mission time.
         missing: RCs that do not answer the RC manager.
     """

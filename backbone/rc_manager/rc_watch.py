@@ -11,14 +11,13 @@ import logging
 from collections.abc import Coroutine, Iterable
 from typing import Any, Protocol
 
+from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
-from backbone.component.messages import LogLevel
+from backbone.component.messages import LogLevel, NameTaken
 from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
 from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
 from backbone.rc_manager.credibility import contradiction

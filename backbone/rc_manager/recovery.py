@@ -12,11 +12,11 @@ import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.messages import ComponentState
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.context_switch import RC_REPLY_S
@@ -93,12 +93,7 @@ def rc_known(resource: Resource, state: RcState | None) -> RcKnown:
 
 
 class Recovery:
-    """Asks nameserver, RCs and ARCs.
-
-    Args:
-        bus: Of the RC manager.
-        clock: The mission's time.
-    """
+    """Asks nameserver, RCs and ARCs."""
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._bus, self._clock = bus, clock

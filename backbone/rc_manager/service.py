@@ -18,15 +18,14 @@ from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
 from typing import Any, assert_never
 
+from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.component.messages import LogLevel
-from backbone.dependency_database.messages import ADDRESS as DEPENDENCY_DATABASE
 from backbone.dependency_database.messages import AskResources, Resource, Resources
 from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
 from backbone.rc_manager.beats import Beats

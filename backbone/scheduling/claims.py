@@ -31,9 +31,7 @@ def scheduling_request(
     """Return the request of an ARC.
 
     Args:
-        arc: Its name.
         sets: The sets of RCs that would do, best first: kind → name.
-        owner: Address of its decision process.
         path: Names and priorities from the mission's root, or of the console alone.
         streams: Kind of RC → the ARC's streams there.
         minimum_runtime_s: Shortest useful time, seconds.

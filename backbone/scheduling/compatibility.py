@@ -28,7 +28,6 @@ class Compatibility:
         """Begin with no answers.
 
         Args:
-            rcs: All RCs by name.
             users: RC → the active ARCs that use it.
             admission: Test of the demand that a sharable RC can serve.
         """

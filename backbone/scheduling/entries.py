@@ -25,9 +25,7 @@ class RcEntry:
     """One RC as the schedule sees it.
 
     Attributes:
-        name: Its name.
         kind: Its type, for people.
-        sharable: True if several ARCs may hold it by streams.
         capacity: Part of its time it can give, 0 to 1.
         connect_s: Settling time.
         disconnect_s: Release time.
@@ -96,7 +94,6 @@ class ArcEntry:
         has_forced: True: a holder was preempted in the middle of a slice for it, since it was queued.
         retry_s: When it is queued again, after its gate stayed shut or it left too often; None: when it wants time.
         retry_why: Why not sooner.
-        turns: Slices so far.
         had_s: Run time so far, as the discipline ``time`` counts it; without the present run.
         raised: Levels by which it rose because it waited long (aging).
         swapped_out: Why it lost its RCs last; empty: never.

@@ -20,9 +20,7 @@ class RcKnown:
     """An RC exists; repeated after its restart.
 
     Attributes:
-        rc: Its name.
         kind: Its type, for people.
-        sharable: True if several ARCs may hold it.
         capacity: Share of its time it can give, 0 to 1.
         connect_s: Settling time.
         disconnect_s: Release time.
@@ -45,7 +43,6 @@ class RcWentDown:
     """The RC does not answer any more, or cannot be believed.
 
     Attributes:
-        rc: Its name.
         fault: Its contradiction; empty: it does not answer.
     """
 
@@ -105,7 +102,6 @@ class Departed:
     """An ARC withdrew or died.
 
     Attributes:
-        arc: The ARC.
         why: For the record: ``self``, ``owner``, ``dead``.
     """
 
@@ -158,7 +154,6 @@ class OpenFailed:
     """The ARC's RCs could not all be connected; all of them were disconnected again.
 
     Attributes:
-        arc: The ARC.
         rc: The RC that failed, empty if it was the ARC.
     """
 
@@ -205,7 +200,6 @@ class ConnectArc:
     """Connect all these RCs to the ARC, let them settle, open its gate; report ``Opened`` or ``OpenFailed``.
 
     Attributes:
-        arc: The ARC.
         epochs: RC → epoch; larger than all before.
         settle_s: Longest settling time of the set.
         until_s: End of the minimum run time if the grant came right after settling.
@@ -224,7 +218,6 @@ class RevokeArc:
     """Close the ARC's gate and disconnect its RCs; report ``Freed``.
 
     Attributes:
-        arc: The ARC.
         epochs: RC → epoch it held.
         why: ``slice``, ``higher``, ``rc``, ``self``, ``owner``, ``dead``, ``capacity``, ``failed``.
         by: ARC or RC that caused it; empty for ``self``.

@@ -32,7 +32,6 @@ class LargeGroupPlanner:
         """Begin with no candidates.
 
         Args:
-            table: Questions about the schedule.
             slack_s: By how much two reservations may overlap.
         """
         self._table = table
@@ -121,7 +120,6 @@ class LargeGroupPlanner:
         """Return from when its RCs are reserved for the ARC: when its holders end and other first ARCs have run.
 
         Args:
-            arc: The ARC.
             now_s: From when on.
             behind: ARCs on the chain so far: they do not wait for themselves, though being equal is not transitive.
         """

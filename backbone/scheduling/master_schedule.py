@@ -23,7 +23,6 @@ class MasterSchedule:
     """The plans for one state.
 
     Attributes:
-        state: The present state.
         table: Questions about it.
         whole: Plans groups whole; also hypothetical ones.
     """
@@ -40,7 +39,6 @@ class MasterSchedule:
         """Plan for this state.
 
         Args:
-            state: The present state.
             strict: No ARC starts while a higher usable one of its group waits.
             tolerance_s: By how much two reservations may overlap.
             exact_up_to: Groups of at most this size are planned whole.

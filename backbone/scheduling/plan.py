@@ -37,7 +37,6 @@ class Plan:
         """Plan for these ARCs.
 
         Args:
-            table: Questions about the schedule.
             order: Queued ARCs of the group, in order.
             group: Active ARCs.
             now_s: From when on.

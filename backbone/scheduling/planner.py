@@ -23,7 +23,6 @@ class Slot(NamedTuple):
     """The place the plan found for an ARC.
 
     Attributes:
-        arc: The ARC.
         start_s: When its RCs begin to settle; infinite: never, as things are.
         against: ARCs at a common RC that keep it from an earlier start.
     """

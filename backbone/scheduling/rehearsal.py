@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, assert_never
@@ -32,6 +32,8 @@ from backbone.scheduling.events import (
     WakeAt,
     Woken,
 )
+
+MOST_AT_ONCE = 1000  # chosen: far above the two connections of one ARC that any schedule needs at one instant
 
 Line = Mapping[str, Any]
 
@@ -82,6 +84,7 @@ class Rehearsal:
         self._agenda: list[tuple[float, int, Event]] = []
         self._serial = itertools.count()
         self._opening: dict[str, Opened] = {}
+        self._at_once: Counter[str] = Counter()
         self._wake_s: float | None = None
 
     @classmethod
@@ -99,7 +102,6 @@ class Rehearsal:
 
         Args:
             manager: A copy of the schedule manager for this rehearsal alone.
-            now_s: Mission time.
             under_way: Outcomes of the context switches that have begun, with their times.
             release_s: RC → its release time.
             wake_s: When the manager asked to be woken.
@@ -119,7 +121,11 @@ class Rehearsal:
         heapq.heappush(self._agenda, (time_s, next(self._serial), event))
 
     def tell(self, event: Event) -> None:
-        """Apply the event now."""
+        """Apply the event now.
+
+        Raises:
+            AssertionError: Time stands still: the manager connects one ARC ``MOST_AT_ONCE`` times at one instant.
+        """
         if isinstance(event, RcKnown):
             self._release_s[event.rc] = event.disconnect_s
         for instruction in self.manager.handle(event, self.now_s):
@@ -131,6 +137,7 @@ class Rehearsal:
                 case ConnectArc(arc=arc, settle_s=settle_s):
                     self._opening[arc] = Opened(arc)
                     self.connected[arc] = self.now_s
+                    self._require_progress(arc)
                     self.at(self.now_s + settle_s, self._opening[arc])
                 case RevokeArc(arc=arc, epochs=epochs, deadline_s=deadline_s):
                     self._opening.pop(arc, None)
@@ -153,7 +160,9 @@ class Rehearsal:
         next_s = self._next_s()
         if next_s is None or next_s > until_s:
             return False
-        self.now_s = max(self.now_s, next_s)
+        if next_s > self.now_s:
+            self.now_s = next_s
+            self._at_once.clear()
         if not self._agenda or self._agenda[0][0] > self.now_s:
             self._wake_s = None
             self.tell(Woken())
@@ -165,6 +174,12 @@ class Rehearsal:
             del self._opening[event.arc]
             self.tell(event)
         return True
+
+    def _require_progress(self, arc: str) -> None:
+        self._at_once[arc] += 1
+        if self._at_once[arc] == MOST_AT_ONCE:
+            last = "\n".join(str(dict(line)) for line in self.trace[-8:])
+            raise AssertionError(f"{arc} is connected {MOST_AT_ONCE} times at {self.now_s}; the last lines:\n{last}")
 
     def _next_s(self) -> float | None:
         agenda_s = self._agenda[0][0] if self._agenda else None
@@ -178,7 +193,6 @@ class Run:
     """One time an ARC had its RCs.
 
     Attributes:
-        arc: The ARC.
         uses: RC → share of its time, 0 to 1; an exclusive use is 1.
         connect_s: When its RCs began to settle.
         grant_s: When it was granted; None: that never happened.

@@ -66,8 +66,6 @@ class SchedulingRequest(Message, frozen=True):
     """An ARC's request for run time (RAM 2002, "The RC Scheduler").
 
     Attributes:
-        arc: Name of the ARC.
-        owner: Address of its decision process.
         path: From the mission's root (or the console itself) to the decision process.
         console: True if the owner is a console: its path is a sibling of the mission's root.
         alternatives: Sets of RCs that would do, best first: RC name → use.
@@ -130,7 +128,6 @@ class Lease(Message, frozen=True):
     """One renewed hold.
 
     Attributes:
-        rc: The RC.
         arc: Its holder.
         epoch: Of the connection.
         rank: Place by user priority among the present holders of a sharable RC, 0 first; negative: unchanged. It

@@ -93,7 +93,6 @@ class ScheduleManager:
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
-            mission_priority: Its number among the consoles.
             goes_on: True if the trace goes on after that of an earlier RC manager.
             planner: Plans all groups; None: those of this package do.
         """
@@ -122,10 +121,6 @@ class ScheduleManager:
         """Apply an event and decide.
 
         An event about an unknown ARC or RC, or an outdated event, changes nothing.
-
-        Args:
-            event: The event.
-            now_s: Mission time of the decision.
 
         Returns:
             Instructions, to be carried out in this order.

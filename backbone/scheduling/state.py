@@ -34,7 +34,6 @@ class ScheduleState:
     """What is so now.
 
     Attributes:
-        rcs: All RCs by name.
         arcs: All ARCs that asked, by name, in the order of their requests.
         groups: The groups of the active ARCs.
         compatibility: Which ARCs can hold their RCs together.
@@ -154,7 +153,6 @@ class ScheduleState:
             place: Names from the root to its owner.
             path: The same with their numbers.
             longest_s: Its slices may last so long even if it asks for less.
-            now_s: Time of the decision.
         """
         rcs = [self.rcs[rc] for rc in uses]
         shares = tuple(rc.name for rc in rcs if rc.sharable and uses[rc.name].streams)

@@ -28,7 +28,6 @@ class Table:
     """Questions about one state; nothing changes.
 
     Attributes:
-        state: The present state.
         strict: No ARC starts while a higher usable one of its group waits.
         fits: See ``Compatibility.fits``.
         clash: See ``Compatibility.clash``.
@@ -40,7 +39,6 @@ class Table:
         """Ask this state.
 
         Args:
-            state: The present state.
             strict: No ARC starts while a higher usable one of its group waits.
         """
         self.state = state

@@ -38,9 +38,7 @@ class Transitions:
     """Changes the state and collects the instructions for the loop.
 
     Attributes:
-        state: The present state.
         trace: Writes the lines.
-        now_s: Time of the decision.
         instructions: The decision's instructions so far, in order.
     """
 

@@ -13,10 +13,7 @@ class RcView(Message, frozen=True):
     """One RC in the master schedule.
 
     Attributes:
-        rc: Its name.
-        kind: Its type.
         state: ``up`` or ``down``.
-        sharable: True if several ARCs may hold it.
         capacity: Share of its time it can give.
         holders: Its holders, with epochs and begins.
         last_epoch: Largest epoch given so far.
@@ -41,10 +38,7 @@ class RequestView(Message, frozen=True):
     """One request in the master schedule.
 
     Attributes:
-        arc: The ARC.
-        owner: Its decision process.
         state: State of the request.
-        rcs: Its RCs.
         since_s: Mission time at which it entered that state.
         until_s: End of its slice; negative if it holds nothing.
         expected_start_s: Predicted grant; negative if it runs or none can be predicted.
@@ -52,7 +46,6 @@ class RequestView(Message, frozen=True):
         blockers: ARCs that block it directly; ``why`` names all that would have to be revoked.
         minimum_runtime_s: As asked for.
         priority: Its priority path, for people: ``mission:10/surveillance:5/watch-scout1:3``.
-        turns: Slices so far.
         rule: Rule of SCHEDULING.md that decides it.
         would_change: The event that would end this, for people.
         raised: Levels by which it rose because it waits long.
@@ -110,8 +103,6 @@ class RequestAttributes(Message, frozen=True):
     """The request of one ARC, as it counts now.
 
     Attributes:
-        arc: The ARC.
-        owner: Address of its decision process.
         state: State of the request.
         uses: RC → its use.
         minimum_runtime_s: Shortest slice.

@@ -36,7 +36,6 @@ class WholeGroupPlanner:
         """Begin with no groups to examine.
 
         Args:
-            table: Questions about the schedule.
             slack_s: By how much two reservations may overlap. Hand-over takes time: without it an ARC never fits a
                 gap that is exactly as long as its slice.
         """

@@ -114,8 +114,10 @@ class DarkSearch:
 
     def __init__(self, *, dark_level: float, leg_m: float, speed_m_s: float, looks: int) -> None:
         self._dark_level, self._leg_m, self._speed_m_s, self._most_looks = dark_level, leg_m, speed_m_s, looks
-        self._stage = SearchStage.LOOK
-        self._looks = 0
+        self.stage = SearchStage.LOOK
+        """The stage of the search."""
+        self.looks = 0
+        """Number of finished looks around."""
         self._left = 0.0  # remaining radians or meters of the stage
         self._turned_rad = 0.0  # since the look around began
         self._seen: list[tuple[float, float, float]] = []
@@ -128,19 +130,9 @@ class DarkSearch:
         self._begin_look()
 
     @property
-    def stage(self) -> SearchStage:
-        """The stage of the search."""
-        return self._stage
-
-    @property
-    def looks(self) -> int:
-        """Number of finished looks around."""
-        return self._looks
-
-    @property
     def is_final(self) -> bool:
         """True when it is hidden, or has given up."""
-        return self._stage in (SearchStage.HIDDEN, SearchStage.FAILED)
+        return self.stage in (SearchStage.HIDDEN, SearchStage.FAILED)
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next pictures show whether it was moved meanwhile."""
@@ -181,11 +173,11 @@ class DarkSearch:
         turned_rad, gone_m = self._last.turn_rad_s * passed_s, abs(self._last.forward_m_s) * passed_s
         self._turned_rad += turned_rad
         self._dark_pictures = self._dark_pictures + 1 if seen.ground < self._dark_level else 0
-        match self._stage:
+        match self.stage:
             case SearchStage.LOOK:
                 self._seen.append((self._turned_rad, seen.ahead, seen.ground))
                 if self._turned_rad >= 2 * math.pi:
-                    self._looks += 1
+                    self.looks += 1
                     self._conclude()
             case SearchStage.TURN | SearchStage.FACE_OUT:
                 before, self._left = self._left, self._left - turned_rad
@@ -214,16 +206,16 @@ class DarkSearch:
         if sum(is_dark) >= ALL_AROUND * len(is_dark):
             brightest = sectors(self._seen, brightest=True)[0]
             self._enter(SearchStage.FACE_OUT, turned(brightest - self._turned_rad))
-        elif self._looks == self._most_looks:
+        elif self.looks == self._most_looks:
             self._enter(SearchStage.FAILED, 0.0)
         else:
             barred = self._barred_rad
             ways = [way for way in sectors(self._seen) if barred is None or abs(turned(way - barred)) > BARRED_RAD]
-            way = ways[(self._looks - 1) % CHOICES]
+            way = ways[(self.looks - 1) % CHOICES]
             self._enter(SearchStage.TURN, turned(way - self._turned_rad))
 
     def _after_turn(self) -> None:
-        if self._stage is SearchStage.FACE_OUT:
+        if self.stage is SearchStage.FACE_OUT:
             self._enter(SearchStage.HIDDEN, 0.0)
         else:
             self._enter(SearchStage.GO, self._leg_m)
@@ -234,10 +226,10 @@ class DarkSearch:
         self._enter(SearchStage.LOOK, 0.0)
 
     def _enter(self, stage: SearchStage, left: float) -> None:
-        self._stage, self._left, self._dark_pictures = stage, left, 0
+        self.stage, self._left, self._dark_pictures = stage, left, 0
 
     def _motion(self) -> Motion:
-        match self._stage:
+        match self.stage:
             case SearchStage.LOOK:
                 return Motion(0.0, TURN_RAD_S)
             case SearchStage.TURN | SearchStage.FACE_OUT:

@@ -44,9 +44,6 @@ class Driver(Behavior[D]):
 
         When: from each ``resumed`` on; cancelled before the end of the grant, and begun again later.
         What: decide, ``move``, sleep ``DECIDE_EVERY_S``, in a loop. Not: keep progress in local variables.
-
-        Args:
-            robot: Name of the granted robot.
         """
         raise NotImplementedError
 
@@ -70,7 +67,6 @@ class Driver(Behavior[D]):
 
         Args:
             localizer: Name or address of the tracking component.
-            robot: Name of the robot.
 
         Raises:
             Refusal: The localizer does not know the robot, or is no localizer.

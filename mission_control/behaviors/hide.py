@@ -57,15 +57,11 @@ class Hide(Driver[HideParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._search = self._plan()
+        self.search = self._plan()
+        """The state of the search."""
         self._motion = STILL
         self._fresh = asyncio.Event()
         self._unusable: UnusablePicture | None = None
-
-    @property
-    def search(self) -> DarkSearch:
-        """The state of the search; read only."""
-        return self._search
 
     def see(self, frame: Frame) -> None:
         """Decide from this picture; ``drive_on`` carries it out."""
@@ -74,39 +70,39 @@ class Hide(Driver[HideParameters]):
             self._unusable = UnusablePicture(f"{frame.rc} delivers {frame.width_px} by {frame.height_px} pixels")
             return
         pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
-        self._motion = self._search.decide(glimpse(pixels), frame.captured_s)
+        self._motion = self.search.decide(glimpse(pixels), frame.captured_s)
 
     async def drive_on(self, robot: str) -> None:
         """Carry out the decision of each picture; see ``Driver.drive_on``."""
-        while not self._search.is_final:
-            self.report(f"{robot} {self._search.stage}, {self._seen()}")
+        while not self.search.is_final:
+            self.report(f"{robot} {self.search.stage}, {self._seen()}")
             await self._fresh.wait()
             self._fresh.clear()
             if self._unusable is not None:
                 raise self._unusable
             await self.move(self._motion)
         await self.held.halt()
-        is_hidden = self._search.stage is SearchStage.HIDDEN
-        self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self._search.looks})
+        is_hidden = self.search.stage is SearchStage.HIDDEN
+        self.finish(BehaviorStatus.SUCCESS if is_hidden else BehaviorStatus.FAILURE, {"looks": self.search.looks})
 
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the views; the next pictures show whether the robot still stands at its place."""
-        self._search.interrupt()
+        self.search.interrupt()
         self._motion = STILL
         self._fresh.clear()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters."""
-        self._search = self._plan()
+        self.search = self._plan()
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters and the looks around."""
-        return {**super().statistics(), "looks": self._search.looks}
+        return {**super().statistics(), "looks": self.search.looks}
 
     def _plan(self) -> DarkSearch:
         given = self.parameters
         return DarkSearch(dark_level=given.dark_level, leg_m=given.leg_m, speed_m_s=given.speed_m_s, looks=given.looks)
 
     def _seen(self) -> str:
-        return f"{self._search.looks} looks around until now"
+        return f"{self.search.looks} looks around until now"

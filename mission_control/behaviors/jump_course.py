@@ -86,7 +86,6 @@ class JumpCourse:
     """The state of a jump over an obstacle.
 
     Args:
-        obstacle: The obstacle.
         attempts: Number of jumps after which it gives up.
         speed_m_s: Speed on straight ways.
         onward_m: Distance to drive beyond the obstacle.
@@ -95,27 +94,19 @@ class JumpCourse:
     def __init__(self, obstacle: Obstacle, *, attempts: int, speed_m_s: float, onward_m: float) -> None:
         self._obstacle, self._attempts = obstacle, attempts
         self._speed_m_s, self._goal_m = speed_m_s, obstacle.depth_m + max(onward_m, BEYOND_M)
-        self._stage = JumpStage.RUN_UP
-        self._jumps = 0
+        self.stage = JumpStage.RUN_UP
+        """The stage of the jump."""
+        self.jumps = 0
+        """Number of jumps that the robot obeyed."""
         self._jumped_s = -math.inf
         self._is_seen_landing = False
         self._watchdog = Watchdog(PATIENCE_S)
         self._freeing: Maneuver | None = None
 
     @property
-    def stage(self) -> JumpStage:
-        """The stage of the jump."""
-        return self._stage
-
-    @property
-    def jumps(self) -> int:
-        """Number of jumps that the robot obeyed."""
-        return self._jumps
-
-    @property
     def is_final(self) -> bool:
         """True when the robot is over the obstacle, or the course has failed."""
-        return self._stage in (JumpStage.OVER, JumpStage.FAILED)
+        return self.stage in (JumpStage.OVER, JumpStage.FAILED)
 
     def airborne_s(self, now_s: float) -> float:
         """Return the time for which the robot must still get no command, 0: none."""
@@ -125,36 +116,35 @@ class JumpCourse:
         """Record the loss of the robot; the next decision depends only on its position then."""
         self._freeing, self._is_seen_landing = None, False
         self._watchdog.rest()
-        if self._stage is not JumpStage.AIRBORNE and not self.is_final:
-            self._stage = JumpStage.RUN_UP
+        if self.stage is not JumpStage.AIRBORNE and not self.is_final:
+            self.stage = JumpStage.RUN_UP
 
     def jumped(self) -> None:
         """Record that the robot obeyed the last ``Act.JUMP``."""
-        self._jumps += 1
+        self.jumps += 1
 
     def decide(self, position: Position, now_s: float) -> Motion | Act:
         """Return the next motion or action.
 
         Args:
-            position: Present position of the robot.
             now_s: Mission time; it never decreases.
         """
         if self.is_final or self.airborne_s(now_s) > 0:
             return Act.WAIT
-        if self._stage is JumpStage.AIRBORNE:
+        if self.stage is JumpStage.AIRBORNE:
             self._land(position)
         if self._freeing is not None:
             motion = self._freeing.motion(now_s)
             if motion is not None:
                 return motion
             self._freeing = None
-        if self._stage is not JumpStage.ONWARD and self._is_beyond(position):
+        if self.stage is not JumpStage.ONWARD and self._is_beyond(position):
             self._enter(JumpStage.ONWARD)
         return self._go_on(position, now_s)
 
     def _go_on(self, position: Position, now_s: float) -> Motion | Act:
         obstacle = self._obstacle
-        match self._stage:
+        match self.stage:
             case JumpStage.OVER | JumpStage.FAILED:
                 return Act.WAIT
             case JumpStage.ONWARD:
@@ -189,13 +179,13 @@ class JumpCourse:
         if self._is_beyond(position):
             self._enter(JumpStage.ONWARD)
         else:
-            self._enter(JumpStage.FAILED if self._jumps >= self._attempts else JumpStage.RUN_UP)
+            self._enter(JumpStage.FAILED if self.jumps >= self._attempts else JumpStage.RUN_UP)
 
     def _is_beyond(self, position: Position) -> bool:
         return self._obstacle.passed_m(position) >= self._obstacle.depth_m + BEYOND_M
 
     def _enter(self, stage: JumpStage) -> None:
-        self._stage = stage
+        self.stage = stage
         self._watchdog.rest()
 
     def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:

@@ -66,50 +66,46 @@ class JumpOver(Driver[JumpOverParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._course = self._plan()
-
-    @property
-    def course(self) -> JumpCourse:
-        """The state of the course; read only."""
-        return self._course
+        self.course = self._plan()
+        """The state of the course."""
 
     async def drive_on(self, robot: str) -> None:
         """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
         while True:
             position = await self.locate(self.parameters.localizer, robot)
-            match self._course.decide(position, self.clock.now_s()):
+            match self.course.decide(position, self.clock.now_s()):
                 case Motion() as motion:
                     await self.move(motion)
                 case Act.JUMP:
                     await self.held.jump()
-                    self._course.jumped()
-                    self.story.note(robot, f"jumps, number {self._course.jumps}")
+                    self.course.jumped()
+                    self.story.note(robot, f"jumps, number {self.course.jumps}")
                 case Act.WAIT:
                     pass
-            self.report(f"{robot} {self._course.stage}, {self._course.jumps} jumps")
-            if self._course.is_final:
+            self.report(f"{robot} {self.course.stage}, {self.course.jumps} jumps")
+            if self.course.is_final:
                 break
             await self.clock.sleep_s(DECIDE_EVERY_S)
         await self.held.halt()
-        is_over = self._course.stage is JumpStage.OVER
-        self.finish(BehaviorStatus.SUCCESS if is_over else BehaviorStatus.FAILURE, {"jumps": self._course.jumps})
+        is_over = self.course.stage is JumpStage.OVER
+        self.finish(BehaviorStatus.SUCCESS if is_over else BehaviorStatus.FAILURE, {"jumps": self.course.jumps})
 
     def not_now(self) -> float:
         """Return the time until the robot has landed; see ``Behavior.not_now``."""
-        return self._course.airborne_s(self.clock.now_s())
+        return self.course.airborne_s(self.clock.now_s())
 
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state; the next decision depends on the robot's position then."""
-        self._course.interrupt()
-        self.report(f"suspended: {suspended_because(reason, by)}; {self._course.jumps} jumps until now")
+        self.course.interrupt()
+        self.report(f"suspended: {suspended_because(reason, by)}; {self.course.jumps} jumps until now")
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters."""
-        self._course = self._plan()
+        self.course = self._plan()
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters and the jumps."""
-        return {**super().statistics(), "jumps": self._course.jumps}
+        return {**super().statistics(), "jumps": self.course.jumps}
 
     def _plan(self) -> JumpCourse:
         given = self.parameters

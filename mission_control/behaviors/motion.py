@@ -102,8 +102,6 @@ def head_for(position: Position, place: FloorPoint, speed_m_s: float) -> Motion:
     It turns on the spot while the place is far from straight ahead, and slows down before it arrives.
 
     Args:
-        position: Position of the robot.
-        place: Its goal.
         speed_m_s: Speed on a straight way, above 0; ``MOST_M_S`` at most.
     """
     bearing_rad = place.bearing_rad(position)

@@ -63,20 +63,16 @@ class Patrol(Driver[PatrolParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._route = self._plan()
+        self.route = self._plan()
+        """The state of the route."""
         self._published = 0
-
-    @property
-    def route(self) -> PatrolRoute:
-        """The state of the route; read only."""
-        return self._route
 
     async def drive_on(self, robot: str) -> None:
         """Decide ten times a second from the robot's position; see ``Driver.drive_on``."""
         self._say(robot)
-        while not self._route.is_over:
+        while not self.route.is_over:
             position = await self.locate(self.parameters.localizer, robot)
-            motion = self._route.decide(position, self.clock.now_s())
+            motion = self.route.decide(position, self.clock.now_s())
             self._publish(robot)
             await self.move(motion)
             await self.clock.sleep_s(DECIDE_EVERY_S)
@@ -85,16 +81,16 @@ class Patrol(Driver[PatrolParameters]):
 
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state; later continue from the robot's position then."""
-        self._route.interrupt()
+        self.route.interrupt()
         self.report(f"suspended: {suspended_because(reason, by)}; {self._seen()}")
 
     def parameters_changed(self) -> None:
         """Begin a new patrol with the new parameters; way points of the old one stay published."""
-        self._route, self._published = self._plan(), 0
+        self.route, self._published = self._plan(), 0
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, the way points reached, and how often the robot was shaken free."""
-        return {**super().statistics(), "waypoints_reached": self._route.reached, "shaken_free": self._route.freed}
+        return {**super().statistics(), "waypoints_reached": self.route.reached, "shaken_free": self.route.freed}
 
     def _plan(self) -> PatrolRoute:
         given = self.parameters
@@ -108,9 +104,9 @@ class Patrol(Driver[PatrolParameters]):
 
     def _publish(self, robot: str) -> None:
         """Publish each way point that was reached since the last call."""
-        if self._route.reached == self._published:
+        if self.route.reached == self._published:
             return
-        for visit in self._route.visits_since(self._published):
+        for visit in self.route.visits_since(self._published):
             event = WaypointReached(visit.at_s, robot, visit.number, visit.waypoint)
             self.bus.publish(self.address, Conversation.EVENTS, event)
             self.story.note(robot, f"is at way point {visit.waypoint}")
@@ -120,10 +116,10 @@ class Patrol(Driver[PatrolParameters]):
 
     def _found(self, last: Visit | None = None) -> dict[str, float]:
         since = {} if last is None else {"last_waypoint": last.waypoint, "last_at_s": last.at_s}
-        return {"waypoints_reached": self._route.reached, **since}
+        return {"waypoints_reached": self.route.reached, **since}
 
     def _seen(self) -> str:
-        return f"{self._route.reached} way points reached, next is {self._route.next_waypoint}"
+        return f"{self.route.reached} way points reached, next is {self.route.next_waypoint}"
 
     def _say(self, robot: str) -> None:
         self.report(f"patrols with {robot}: {self._seen()}")

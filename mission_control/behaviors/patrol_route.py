@@ -38,7 +38,6 @@ class Visit:
     Attributes:
         number: Counts from 1 over all rounds.
         waypoint: Number of the way point, from 0.
-        at_s: Mission time.
     """
 
     number: int
@@ -64,7 +63,10 @@ class PatrolRoute:
         self._last = rounds * len(self._places) if rounds else math.inf
         self._speed_m_s, self._within_m, self._rest_s = speed_m_s, reached_within_m, rest_s
         self._visits: deque[Visit] = deque(maxlen=REMEMBERED)
-        self._reached, self._freed = 0, 0
+        self.reached = 0
+        """Number of arrivals, over all rounds."""
+        self.freed = 0
+        """Number of times that a stuck robot was shaken free."""
         self._resting_s = 0.0  # remaining rest at the last way point
         self._decided_s: float | None = None
         self._watchdog = Watchdog(PATIENCE_S)
@@ -80,24 +82,14 @@ class PatrolRoute:
         return tuple(visit for visit in self._visits if visit.number > number)
 
     @property
-    def reached(self) -> int:
-        """Number of arrivals, over all rounds."""
-        return self._reached
-
-    @property
-    def freed(self) -> int:
-        """Number of times that a stuck robot was shaken free."""
-        return self._freed
-
-    @property
     def next_waypoint(self) -> int:
         """Number of the next way point, from 0."""
-        return self._reached % len(self._places)
+        return self.reached % len(self._places)
 
     @property
     def is_over(self) -> bool:
         """True after the rest at the last way point of the last round."""
-        return self._reached >= self._last and self._resting_s <= 0
+        return self.reached >= self._last and self._resting_s <= 0
 
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision continues from its position then."""
@@ -108,13 +100,12 @@ class PatrolRoute:
         """Return the next motion; record a way point that is reached.
 
         Args:
-            position: Present position of the robot.
             now_s: Mission time; it never decreases.
         """
         passed_s = 0.0 if self._decided_s is None else min(now_s - self._decided_s, LONGEST_STEP_S)
         self._decided_s = now_s
         if self._resting_s > 0:
-            here = self._places[(self._reached - 1) % len(self._places)]
+            here = self._places[(self.reached - 1) % len(self._places)]
             if here.distance_m(position) > BACK_AT * self._within_m:
                 return self._go(here, position, now_s)
             self._resting_s -= passed_s
@@ -125,8 +116,8 @@ class PatrolRoute:
         goal = self._places[self.next_waypoint]
         if goal.distance_m(position) > self._within_m:
             return self._go(goal, position, now_s)
-        self._visits.append(Visit(self._reached + 1, self.next_waypoint, now_s))
-        self._reached += 1
+        self._visits.append(Visit(self.reached + 1, self.next_waypoint, now_s))
+        self.reached += 1
         self._resting_s = self._rest_s
         self._watchdog.rest()
         return STILL if self._rest_s or self.is_over else self._go(self._places[self.next_waypoint], position, now_s)
@@ -134,7 +125,7 @@ class PatrolRoute:
     def _go(self, goal: FloorPoint, position: Position, now_s: float) -> Motion:
         if self._freeing is None and self._watchdog.is_stuck(goal.distance_m(position), now_s):
             self._freeing = shake_free()
-            self._freed += 1
+            self.freed += 1
         if self._freeing is not None:
             motion = self._freeing.motion(now_s)
             if motion is not None:

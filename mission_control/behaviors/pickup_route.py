@@ -34,48 +34,39 @@ class PickupRoute:
 
     def __init__(self, near: FloorPoint, *, speed_m_s: float, attempts: int) -> None:
         self._near, self._speed_m_s, self._attempts = near, speed_m_s, attempts
-        self._stage = PickupStage.UNKNOWN
-        self._in_vain = 0
+        self.stage = PickupStage.UNKNOWN
+        """How the robot navigates."""
+        self.in_vain = 0
+        """Number of vain searches for the mark."""
         self._watchdog = Watchdog(PATIENCE_S)
         self._freeing: Maneuver | None = None
 
-    @property
-    def stage(self) -> PickupStage:
-        """How the robot navigates."""
-        return self._stage
-
-    @property
-    def in_vain(self) -> int:
-        """Number of vain searches for the mark."""
-        return self._in_vain
-
     def interrupt(self) -> None:
         """Record the loss of the robot; the next decision depends on its position then."""
-        if self._stage is not PickupStage.FAILED:
-            self._stage = PickupStage.UNKNOWN
+        if self.stage is not PickupStage.FAILED:
+            self.stage = PickupStage.UNKNOWN
         self._freeing = None
         self._watchdog.rest()
 
     def not_found(self) -> None:
         """Record a vain search all around."""
-        self._in_vain += 1
-        self._stage = PickupStage.FAILED if self._in_vain >= self._attempts else PickupStage.TRAVEL
+        self.in_vain += 1
+        self.stage = PickupStage.FAILED if self.in_vain >= self._attempts else PickupStage.TRAVEL
         self._watchdog.rest()
 
     def decide(self, position: Position, now_s: float) -> Motion:
         """Return the next motion; called only in the stages ``UNKNOWN`` and ``TRAVEL``.
 
         Args:
-            position: Present position of the robot.
             now_s: Mission time; it never decreases.
         """
         distance_m = self._near.distance_m(position)
-        if self._stage is PickupStage.UNKNOWN:
-            self._stage = PickupStage.TRAVEL if distance_m > AWAY_M else PickupStage.BY_SIGHT
-        if self._stage is not PickupStage.TRAVEL:
+        if self.stage is PickupStage.UNKNOWN:
+            self.stage = PickupStage.TRAVEL if distance_m > AWAY_M else PickupStage.BY_SIGHT
+        if self.stage is not PickupStage.TRAVEL:
             return Motion()
         if distance_m <= NEAR_M:
-            self._stage = PickupStage.BY_SIGHT
+            self.stage = PickupStage.BY_SIGHT
             return Motion()
         if self._freeing is None and self._watchdog.is_stuck(distance_m, now_s):
             self._freeing = shake_free()

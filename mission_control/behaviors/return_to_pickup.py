@@ -59,42 +59,38 @@ class ReturnToPickup(Servo[PickupParameters]):
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self._route = self._way()
-
-    @property
-    def route(self) -> PickupRoute:
-        """The state of the route; read only."""
-        return self._route
+        self.route = self._way()
+        """The state of the route."""
 
     def see(self, frame: Frame) -> None:
         """Search and track the mark, while the robot navigates by sight."""
-        if self._route.stage is PickupStage.BY_SIGHT:
+        if self.route.stage is PickupStage.BY_SIGHT:
             super().see(frame)
 
     async def drive_on(self, robot: str) -> None:
         """Drive to the place ``near``, then by sight; see ``Driver.drive_on``."""
-        while self._route.stage is not PickupStage.FAILED:
-            if self._route.stage is PickupStage.BY_SIGHT:
+        while self.route.stage is not PickupStage.FAILED:
+            if self.route.stage is PickupStage.BY_SIGHT:
                 if await self._go_by_sight(robot):
                     return
             else:
                 await self._travel(robot)
         await self.held.halt()
-        self.give_up(TargetNotFound(f"{robot} looked for the mark {self._route.in_vain} times"))
+        self.give_up(TargetNotFound(f"{robot} looked for the mark {self.route.in_vain} times"))
 
     async def suspended(self, reason: str, by: str) -> None:
         """Keep the state of the search; see ``Behavior.suspended``."""
-        self._route.interrupt()
+        self.route.interrupt()
         await super().suspended(reason, by)
 
     def parameters_changed(self) -> None:
         """Begin again with the new parameters."""
-        self._route = self._way()
+        self.route = self._way()
         super().parameters_changed()
 
     def statistics(self) -> dict[str, float]:
         """Return the base's counters, and the vain searches."""
-        return {**super().statistics(), "searched_in_vain": self._route.in_vain}
+        return {**super().statistics(), "searched_in_vain": self.route.in_vain}
 
     def _way(self) -> PickupRoute:
         given = self.parameters
@@ -103,9 +99,9 @@ class ReturnToPickup(Servo[PickupParameters]):
 
     async def _travel(self, robot: str) -> None:
         position = await self.locate(self.parameters.localizer, robot)
-        await self.move(self._route.decide(position, self.clock.now_s()))
-        self.report(f"{robot} {self._route.stage}")
-        if self._route.stage is PickupStage.BY_SIGHT:
+        await self.move(self.route.decide(position, self.clock.now_s()))
+        self.report(f"{robot} {self.route.stage}")
+        if self.route.stage is PickupStage.BY_SIGHT:
             self.look_anew()
         else:
             await self.clock.sleep_s(DECIDE_EVERY_S)
@@ -114,7 +110,7 @@ class ReturnToPickup(Servo[PickupParameters]):
         """Carry out the decision of the next picture; return True at the mark."""
         step = await self.next_step()
         if self.has_searched(self.parameters.search_turns):
-            self._route.not_found()
+            self.route.not_found()
             self.search_anew()
             return False
         await self.follow(robot, step)

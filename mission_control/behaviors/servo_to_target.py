@@ -80,18 +80,14 @@ class Servo(Driver[S]):
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
         self._servo = self._plan()
-        self._step: ServoStep | None = None
+        self.step: ServoStep | None = None
+        """The decision of the last picture."""
         self._seen_s: float | None = None
         self._fresh = asyncio.Event()
         self._unusable: UnusablePicture | None = None
         self._acquisitions = 0
         self._counted_rad = 0.0
         self._phase = TrackingPhase.ACQUIRING
-
-    @property
-    def step(self) -> ServoStep | None:
-        """The decision of the last picture; read only."""
-        return self._step
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera
         """Acquire the target again; see ``Behavior.resumed``."""
@@ -105,8 +101,8 @@ class Servo(Driver[S]):
             return
         pixels = np.frombuffer(frame.pixels, np.uint8).reshape(frame.height_px, frame.width_px)
         elapsed_s = 0.0 if self._seen_s is None else max(0.0, frame.captured_s - self._seen_s)
-        self._step, self._seen_s = self._servo.see(pixels, elapsed_s), frame.captured_s
-        self._note_phase(frame.robot, self._step)
+        self.step, self._seen_s = self._servo.see(pixels, elapsed_s), frame.captured_s
+        self._note_phase(frame.robot, self.step)
 
     def not_now(self) -> float:
         """Return the time that settling before the target needs; see ``Behavior.not_now``."""
@@ -129,7 +125,7 @@ class Servo(Driver[S]):
     def look_anew(self) -> None:
         """Begin again with acquisition: the robot stands still, perhaps elsewhere."""
         self._servo.resumed()
-        self._step, self._seen_s, self._phase = None, None, TrackingPhase.ACQUIRING
+        self.step, self._seen_s, self._phase = None, None, TrackingPhase.ACQUIRING
         self._fresh.clear()
 
     async def next_step(self) -> ServoStep:
@@ -142,8 +138,8 @@ class Servo(Driver[S]):
         self._fresh.clear()
         if self._unusable is not None:
             raise self._unusable
-        assert self._step is not None  # noqa: S101  a picture that is fresh was seen
-        return self._step
+        assert self.step is not None  # noqa: S101  a picture that is fresh was seen
+        return self.step
 
     async def follow(self, robot: str, step: ServoStep) -> None:
         """Send the command of a picture's decision, and report it."""
@@ -161,7 +157,7 @@ class Servo(Driver[S]):
 
     def arrived(self) -> None:
         """Succeed; the report contains the robot's pose before the target."""
-        pose = self._step.pose if self._step is not None else None
+        pose = self.step.pose if self.step is not None else None
         at: dict[str, Any] = {"approaches": self._servo.approaches}
         if pose is not None:
             at |= {"ahead_m": pose.ahead_m, "left_m": pose.left_m, "heading_rad": pose.heading_rad}

@@ -184,7 +184,8 @@ class MotionDetector:
 
     def __init__(self, *, filters_rows: bool = True) -> None:
         self._filters_rows = filters_rows
-        self._stages: Stages | None = None
+        self.stages: Stages | None = None
+        """The pictures on the way to the last judgment, None before the second picture."""
         self._average: NDArray[np.float32] | None = None
         self._fresh: list[NDArray[np.float32]] = []
         self._is_settling = True
@@ -202,11 +203,6 @@ class MotionDetector:
     def votes(self) -> Sequence[bool]:
         """Whether each of the last ``VOTERS`` judged pictures since the swap had a region, newest last."""
         return self._votes
-
-    @property
-    def stages(self) -> Stages | None:
-        """The pictures on the way to the last judgment, None before the second picture."""
-        return self._stages
 
     def look(self, frame: NDArray[np.uint8]) -> Blob | None:
         """Return where something moves, or None.
@@ -232,7 +228,7 @@ class MotionDetector:
             return None
         changed = changed_pixels(self._average, picture)
         torn = torn_rows(changed) if self._filters_rows else np.zeros(len(changed), np.bool_)
-        self._stages = Stages(picture, self._average, changed, np.zeros_like(changed))
+        self.stages = Stages(picture, self._average, changed, np.zeros_like(changed))
         if torn.mean() > ROWS_SHARE or (self._filters_rows and edges_moved(self._average, picture) > EDGES_SHARE):
             self.rejected += 1
             self._rejected_in_turn += 1
@@ -241,9 +237,9 @@ class MotionDetector:
             return None
         self._rejected_in_turn = 0
         sound = np.repeat(~torn[:, np.newaxis], picture.shape[1], axis=1)
-        self._stages = Stages(picture, self._average, changed, changed & sound)
+        self.stages = Stages(picture, self._average, changed, changed & sound)
         cv2.accumulateWeighted(picture, self._average, SLOW_WEIGHT, mask=sound.astype(np.uint8))
-        blob = largest_blob(self._stages.kept, drop_streaks=self._filters_rows)
+        blob = largest_blob(self.stages.kept, drop_streaks=self._filters_rows)
         self._votes.append(blob is not None)
         return blob if sum(self._votes) >= VOTES else None
 

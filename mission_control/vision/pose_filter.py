@@ -23,11 +23,7 @@ WORSE = 12.0  # chosen: in squared pixel errors; the other side is then given up
 
 
 class PoseFilter:
-    """The robot's pose, from all sightings so far.
-
-    Args:
-        camera: Camera of the robot.
-    """
+    """The robot's pose, from all sightings so far."""
 
     def __init__(self, camera: CameraModel = SCOUT_CAMERA) -> None:
         self._camera = camera

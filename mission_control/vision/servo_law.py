@@ -161,7 +161,8 @@ class Approach:
 
     def __init__(self, stop_m: float = STOP_M) -> None:
         self._stop_m = stop_m
-        self._stage = Stage.SEARCHING
+        self.stage = Stage.SEARCHING
+        """Where the approach is."""
         self._next_stage = Stage.FORWARD
         self._last = HALT
         self._side = 1.0
@@ -171,11 +172,6 @@ class Approach:
         self._back_to_m = FARTHEST_BACK_M
         self.approaches = 0
         self.searched_rad = 0.0
-
-    @property
-    def stage(self) -> Stage:
-        """Where the approach is."""
-        return self._stage
 
     def resumed(self) -> None:
         """Look for the target again; the robot stands still, perhaps elsewhere."""
@@ -198,15 +194,15 @@ class Approach:
         self._side = 1.0 if pose.bearing_rad >= 0 else -1.0
         self._count_steady()
         self._advance(pose)
-        self._last = steer(pose, self._stage, self._last, elapsed_s, self._stop_m)
+        self._last = steer(pose, self.stage, self._last, elapsed_s, self._stop_m)
         return self._last
 
     def _blind(self, phase: TrackingPhase, elapsed_s: float) -> Command:
         """Stop; after a while without the target, turn step by step and look."""
         self._steady_frames = 0
         self._unseen_s += elapsed_s
-        if self._stage is not Stage.SEARCHING:
-            if self._unseen_s >= HOLD_S and phase is TrackingPhase.ACQUIRING and self._stage is not Stage.ARRIVED:
+        if self.stage is not Stage.SEARCHING:
+            if self._unseen_s >= HOLD_S and phase is TrackingPhase.ACQUIRING and self.stage is not Stage.ARRIVED:
                 self._search()
             return slewed(HALT, self._last, elapsed_s)
         turning_s = SEARCH_STEP_RAD / SEARCH_TURN_RAD_S
@@ -220,7 +216,7 @@ class Approach:
         self._steady_frames = self._steady_frames + 1 if is_still else 0
 
     def _advance(self, pose: TargetPose) -> None:
-        match self._stage:
+        match self.stage:
             case Stage.SEARCHING:
                 if self._steady_frames >= STEADY_FRAMES:
                     self.searched_rad = 0.0
@@ -245,12 +241,12 @@ class Approach:
             self._enter(Stage.BACKING)
 
     def _search(self) -> None:
-        if self._stage in (Stage.FORWARD, Stage.BACKING):
-            self._next_stage = self._stage
-        elif self._stage is not Stage.SEARCHING:
+        if self.stage in (Stage.FORWARD, Stage.BACKING):
+            self._next_stage = self.stage
+        elif self.stage is not Stage.SEARCHING:
             self._next_stage = Stage.FORWARD
         self._unseen_s = 0.0
         self._enter(Stage.SEARCHING)
 
     def _enter(self, stage: Stage) -> None:
-        self._stage, self._since_s, self._steady_frames = stage, 0.0, 0
+        self.stage, self._since_s, self._steady_frames = stage, 0.0, 0

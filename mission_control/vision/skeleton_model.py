@@ -238,7 +238,6 @@ def centred(frame: Picture, blobs_px: Floats, middle_level: float) -> Floats:
     apart when a row is torn.
 
     Args:
-        frame: The picture.
         blobs_px: Roughly where the discs are.
         middle_level: Pixels below it are dark, the more the darker.
 

@@ -62,13 +62,9 @@ class TargetTracker:
     """Looks at one camera's pictures, one after the other; begins with acquisition."""
 
     def __init__(self) -> None:
-        self._model: TargetModel | None = None
-        self._frames_left = 0
-
-    @property
-    def model(self) -> TargetModel | None:
+        self.model: TargetModel | None = None
         """Subimage and skeleton of the target as last seen, for a look at what the tracker goes by."""
-        return self._model
+        self._frames_left = 0
 
     def look(self, frame: Picture) -> Track:
         """Return where the target is in the next picture.
@@ -81,15 +77,15 @@ class TargetTracker:
         """
         if frame.ndim != 2 or frame.dtype != np.uint8:
             raise ValueError(f"a grey picture has shape (height, width) and bytes, not {frame.shape} of {frame.dtype}")
-        if self._model is None:
+        if self.model is None:
             return self._acquire(frame)
-        sighting = track_skeleton(frame, self._model)
+        sighting = track_skeleton(frame, self.model)
         if sighting is not None:
-            return self._found(frame, self._model, sighting)
+            return self._found(frame, self.model, sighting)
         # Only now: the whole picture costs many times the skeleton.
-        match, sighting = search_subimage(frame, self._model)
+        match, sighting = search_subimage(frame, self.model)
         if sighting is not None:
-            return self._found(frame, self._model, sighting)
+            return self._found(frame, self.model, sighting)
         self._frames_left -= 1
         if self._frames_left > 0:
             return Track(TrackingPhase.SEARCHING, None, match)
@@ -98,18 +94,18 @@ class TargetTracker:
 
     def forget(self) -> None:
         """Begin again with acquisition, because the robot may have been moved."""
-        self._model = None
+        self.model = None
 
     def _acquire(self, frame: Picture) -> Track:
         sighting = acquire(frame)
         if sighting is None:
             return Track(TrackingPhase.ACQUIRING, None, 0.0)
-        self._model = TargetModel.seen(frame, sighting.blobs_px)
+        self.model = TargetModel.seen(frame, sighting.blobs_px)
         self._frames_left = SEARCH_FRAMES
         return Track(TrackingPhase.TRACKING, sighting, sighting.match)
 
     def _found(self, frame: Picture, model: TargetModel, sighting: Sighting) -> Track:
-        self._model = model.updated(frame, sighting.blobs_px)
+        self.model = model.updated(frame, sighting.blobs_px)
         self._frames_left = SEARCH_FRAMES
         return Track(TrackingPhase.TRACKING, sighting, sighting.match)
 

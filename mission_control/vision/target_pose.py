@@ -132,7 +132,6 @@ def estimate_poses(sighting: Sighting, camera: CameraModel = SCOUT_CAMERA) -> li
 
     Args:
         sighting: Where its discs are.
-        camera: Of the robot.
 
     Returns:
         One or two poses; two if it could be seen from either side of the zero-angle line.  None if no
@@ -152,7 +151,6 @@ def refine_pose(sighting: Sighting, before: TargetPose, camera: CameraModel = SC
     Args:
         sighting: Where its discs are.
         before: The pose expected without the sighting, see ``TargetPose.moved``.
-        camera: Of the robot.
     """
     start = np.array([before.ahead_m, before.left_m, before.heading_rad, before.pitch_rad])
     information: Floats = np.linalg.inv(before.covariance).astype(np.float64)
@@ -201,7 +199,6 @@ def _fit(blobs_px: Floats, camera: CameraModel, start: Floats, information: Floa
 
     Args:
         blobs_px: Seen.
-        camera: Of the robot.
         start: (ahead, left, heading, pitch); also the expected pose, as far as ``information`` says.
         information: Inverse covariance of the expected pose; None expects nothing but a small pitch.
     """

@@ -40,7 +40,6 @@ class VisualServo:
     """Brings a robot to its place before the landmark.
 
     Args:
-        camera: Of the robot.
         stop_m: Distance of the place from the board, along the zero-angle line.
         latency_s: From a frame's capture until its command turns the wheels.
 
@@ -55,7 +54,8 @@ class VisualServo:
             raise ValueError(f"stop {NEAREST_STOP_M} to {FARTHEST_STOP_M} m before the board, not {stop_m} m")
         if not 0 <= latency_s < LONGEST_GAP_S:
             raise ValueError(f"a latency of {latency_s} s is not within 0 to {LONGEST_GAP_S} s")
-        self._tracker = TargetTracker()
+        self.tracker = TargetTracker()
+        """For a look at its models."""
         self._filter = PoseFilter(camera)
         self._approach = Approach(stop_m)
         self._latency_s = latency_s
@@ -78,11 +78,6 @@ class VisualServo:
         """The robot's turn since it last saw the target; after a full turn the target is not there."""
         return self._approach.searched_rad
 
-    @property
-    def tracker(self) -> TargetTracker:
-        """For a look at its models."""
-        return self._tracker
-
     def see(self, frame: Picture, elapsed_s: float) -> ServoStep:
         """Return the decision of this picture.
 
@@ -99,7 +94,7 @@ class VisualServo:
             # The time between two grants counts neither as search nor as motion.
             self._is_fresh, elapsed_s = False, 0.0
         self._dead_reckon(elapsed_s)
-        track = self._tracker.look(frame)
+        track = self.tracker.look(frame)
         pose = None if track.sighting is None else self._filter.saw(track.sighting)
         command = self._approach.step(track.phase, pose, min(elapsed_s, LONGEST_GAP_S))
         self._sent.append((self._now_s + self._latency_s, command))
@@ -107,7 +102,7 @@ class VisualServo:
 
     def resumed(self) -> None:
         """Begin again with acquisition, the robot standing still; how often it approached is kept."""
-        self._tracker.forget()
+        self.tracker.forget()
         self._filter.forget()
         self._approach.resumed()
         self._sent.clear()

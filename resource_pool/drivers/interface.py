@@ -28,14 +28,18 @@ class UnknownDriver(Refusal):
     remedy = "Name a built-in driver, or a class as package.module:Class."
 
 
+class HardwareFault(Refusal):
+    """The hardware did not obey; the RC reports itself down."""
+
+    code = "rc.hardware"
+    remedy = "Check cable, power and driver of the resource."
+
+
 @dataclass(frozen=True)
 class DriverSite:
     """A driver's interface to its RC.
 
     Attributes:
-        resource: Name of the resource.
-        bus: Bus, for drivers of simulated hardware.
-        clock: The mission's clock.
         parameters: The RC's parameters; the driver's own are in ``options``, checked by its ``options_type``.
         tell: Publishes one line to the mission's log.
         fail: Ends the RC because of this bug or fault; its creator restarts it, and it opens the device again.

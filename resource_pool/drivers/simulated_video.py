@@ -26,7 +26,7 @@ from backbone.keys import Conversation
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated import meet_world, world_of
-from resource_pool.messages import WorldModel, WorldState
+from resource_pool.drivers.world_messages import WorldModel, WorldState
 from scout_model.gl_probe import GlSupport, prepare, probe, probe_once
 
 CAMERAS_KEPT = 2  # chosen: one experiment, or two by turns; 20 MB each

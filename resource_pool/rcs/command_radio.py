@@ -26,13 +26,11 @@ from backbone.errors import Refusal
 from backbone.naming import Subsystem, address, component_of
 from backbone.rc_manager.messages import StaleEpoch
 from backbone.wire import Envelope, Message
-from resource_pool.drivers.interface import RadioDriver
+from resource_pool.drivers.interface import HardwareFault, RadioDriver
 from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     DEFAULT_DRIVE_USAGE,
-    GivenBeforeStop,
-    HardwareFault,
     ImpossibleUse,
     LoadPacket,
     NoTurnSoon,
@@ -40,6 +38,7 @@ from resource_pool.messages import (
 )
 from resource_pool.packet_schedule import Packet, PacketSchedule, Sending
 from resource_pool.resource_controller import RcParameters, ResourceController
+from resource_pool.stop_messages import GivenBeforeStop
 
 log = logging.getLogger(__name__)
 

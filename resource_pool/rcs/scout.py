@@ -29,23 +29,18 @@ from resource_pool.holds import Hold
 from resource_pool.messages import (
     COMMAND_TIMEOUT_S,
     Applied,
-    AskStop,
     CommandScout,
     Drive,
-    EmergencyQuestion,
-    EmergencyStop,
-    GivenBeforeStop,
     Halt,
     Jump,
-    LiftStop,
     LoadPacket,
     NotFromYou,
     PacketLoaded,
-    StopState,
     SwitchTransmitter,
 )
 from resource_pool.resource_controller import RcParameters, ResourceController
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop, EmergencyQuestion, EmergencyStop, GivenBeforeStop, LiftStop, StopState
 
 log = logging.getLogger(__name__)
 

@@ -26,6 +26,7 @@ from lxml import etree
 from running_mission import MISSION_XML, RunningMission, mission_up, runtime_directory
 
 from backbone import run_files
+from backbone.addresses import NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -34,18 +35,15 @@ from backbone.component.messages import AskStatistics, AskStory, Statistics, Sto
 from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.mission.reader import read_mission
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents
 from backbone.naming import Subsystem
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, Start, Started, StopComponent
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskRc, AskSchedule, AskWhy, RcState
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why
 from backbone.wire import Envelope
 from resource_pool.arc_client import Suspended
-from resource_pool.messages import RadioPacket
+from resource_pool.drivers.world_messages import RadioPacket
 from scout_model import radio_link
 from ui_console.model.driving import DriveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, said

@@ -27,12 +27,13 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.rc_manager.messages import AskRc, RcState, StaleEpoch
 from mission_control.messages import AskBehavior, BehaviorState
-from resource_pool.messages import Applied, AskPose, CommandScout, Drive, Pose
+from resource_pool.drivers.world_messages import AskPose, Pose
+from resource_pool.messages import Applied, CommandScout, Drive
 from ui_console.model.driving import DriveWish
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.session.teleoperation import Teleoperation
 
-pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.processes, pytest.mark.alone, pytest.mark.timeout(300)]  # it measures milliseconds
 
 DRIVEN_WITHIN_S = 0.150
 GIVEN_BACK_WITHIN_S = 1.0

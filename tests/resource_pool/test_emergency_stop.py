@@ -35,18 +35,16 @@ from resource_pool.messages import (
     Applied,
     CommandScout,
     Drive,
-    GivenBeforeStop,
     Jump,
     LoadPacket,
     NotFromYou,
     NoTurnSoon,
-    OtherStop,
     PacketLoaded,
-    Stopper,
 )
 from resource_pool.rcs.scout import Scout
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import GivenBeforeStop, OtherStop, Stopper
 from scout_model.radio_link import encode_drive, encode_halt, encode_jump, encode_transmitter_on
 
 RCS = ["scout1", "scout2", "radio"]

@@ -15,7 +15,7 @@ from backbone.keys import Conversation
 from backbone.wire import Envelope
 from resource_pool.drivers.interface import DriverSite, Picture
 from resource_pool.drivers.simulated_video import GrabberOptions, SimulatedFramegrabber
-from resource_pool.messages import AskWorld, WorldModel, WorldState
+from resource_pool.drivers.world_messages import AskWorld, WorldModel, WorldState
 from scout_model.description import ScoutPlace, WorldDescription
 from scout_model.world import World
 

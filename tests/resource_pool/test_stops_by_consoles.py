@@ -17,13 +17,13 @@ import pytest
 from cut_network import CutNetwork
 from pool_on_local_network import ARC_CLASSES, Pool, a_pool
 
+from backbone.addresses import PLACER
 from backbone.bus.clock import run_virtual
 from backbone.component.launch import Launch
 from backbone.creator.messages import EndedBy
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem, address
-from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Ended, NotPlaced, PlacerQuestion, Start, Started, StopComponent
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, watch_stops

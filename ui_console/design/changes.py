@@ -120,7 +120,7 @@ def _property(draft: Draft, change: SetProperty) -> Property:
     for one in properties(draft.mission, node, {}):
         if (one.name, one.is_parameter) == (change.name, change.is_parameter):
             return one
-    return Property(change.name, None, None, is_required=False, is_parameter=change.is_parameter, doc="")
+    return Property(change.name, None, None, is_missing=False, is_parameter=change.is_parameter, doc="")
 
 
 def _place(draft: Draft, path: Path, parent: Path, before: int | None) -> int:

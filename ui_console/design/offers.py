@@ -9,6 +9,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import msgspec
+
 from backbone.mission.declaration.vocabulary import vocabulary
 from backbone.mission.edit import NewElement, Node, Path
 from backbone.mission.report import listed, quoted
@@ -30,8 +32,7 @@ MINIMUM_RUNTIME_S = "5"  # RAM 2002, "Experiments": slices of five seconds
 _POINT = re.compile(r"([^\s,]+),([^\s,]+)")
 
 
-@dataclass(frozen=True, slots=True)
-class Prompt:
+class Prompt(msgspec.Struct, frozen=True):
     """A question of an offer.
 
     Attributes:

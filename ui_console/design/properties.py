@@ -6,7 +6,8 @@ Pure. Meanings and defaults are the schema's and, for parameters, the class's ow
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+import msgspec
 
 from backbone.mission.class_facts import ClassFacts
 from backbone.mission.declaration.vocabulary import vocabulary
@@ -19,15 +20,14 @@ WITH_NAMES = ("host", "type", "resource", "world", "behavior", "target", "scout"
 """Tags whose names other elements refer to; to set one is to rename."""
 
 
-@dataclass(frozen=True, slots=True)
-class Property:
+class Property(msgspec.Struct, frozen=True):
     """One attribute or parameter.
 
     Attributes:
         name: Its name.
         value: Its text; None: it is not written.
         default: Its value if it is not written; None: it has none.
-        is_required: True: it must be written.
+        is_missing: True: it must be written, and is not.
         is_parameter: True: it is a parameter.
         doc: Its meaning and range.
         choices: Sensible values, if they can be listed.
@@ -36,15 +36,10 @@ class Property:
     name: str
     value: str | None
     default: str | None
-    is_required: bool
+    is_missing: bool
     is_parameter: bool
     doc: str
     choices: tuple[str, ...] = ()
-
-    @property
-    def is_missing(self) -> bool:
-        """True if it must be written, and is not."""
-        return self.is_required and self.value is None
 
     def command(self, path: Path, tag: str, value: str) -> Command:
         """Return the command that sets it; an empty text leaves it out."""
@@ -71,7 +66,7 @@ def properties(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> li
             name,
             node.attributes.get(name),
             one.default,
-            one.required,
+            one.required and name not in node.attributes,
             is_parameter=False,
             doc=one.documentation,
             choices=choices(mission, node, name, one.words),
@@ -120,7 +115,7 @@ def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> l
             one.name,
             given.get(one.name),
             one.default.strip('"') or None,
-            not one.default,
+            is_missing=not one.default and one.name not in given,
             is_parameter=True,
             doc=" ".join(part for part in (one.doc, f"({one.summary})") if part),
             choices=one.words,
@@ -130,7 +125,7 @@ def _parameters(mission: Node, node: Node, facts: Mapping[str, ClassFacts]) -> l
     names = {one.name for one in known}
     doc = "Its class has no such parameter." if known else "Not looked up."
     return found + [
-        Property(name, value, None, is_required=False, is_parameter=True, doc=doc)
+        Property(name, value, None, is_missing=False, is_parameter=True, doc=doc)
         for name, value in given.items()
         if name not in names
     ]

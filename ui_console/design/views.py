@@ -17,8 +17,8 @@ from backbone.scheduling.rehearsal import Run
 from backbone.spoken import counted
 from ui_console.design.catalogue import Role, TypeEntry, description, entries
 from ui_console.design.draft import Draft
-from ui_console.design.offers import Offer, offers
-from ui_console.design.properties import class_of, properties
+from ui_console.design.offers import Offer, Prompt, offers
+from ui_console.design.properties import Property, class_of, properties
 
 ROLES_ADDED = (Role.BEHAVIOR, Role.ARC, Role.RESOURCE)
 GROUPS = {Role.BEHAVIOR: "behaviors", Role.ARC: "ARCs", Role.RESOURCE: "resources"}
@@ -111,34 +111,12 @@ class PaletteRow(msgspec.Struct, frozen=True):
     doc: tuple[str, ...]
 
 
-class AskedView(msgspec.Struct, frozen=True):
-    """A question of an offer, as ``offers.Prompt``."""
-
-    name: str
-    doc: str
-    proposed: str
-    choices: tuple[str, ...]
-    is_required: bool
-
-
 class OfferView(msgspec.Struct, frozen=True):
     """A possible addition here, or to an ancestor."""
 
     label: str
     doc: str
-    asks: tuple[AskedView, ...]
-
-
-class PropertyView(msgspec.Struct, frozen=True):
-    """An attribute or parameter, as ``properties.Property``."""
-
-    name: str
-    value: str | None
-    default: str | None
-    is_missing: bool
-    is_parameter: bool
-    doc: str
-    choices: tuple[str, ...]
+    asks: tuple[Prompt, ...]
 
 
 class ElementView(msgspec.Struct, frozen=True):
@@ -161,7 +139,7 @@ class ElementView(msgspec.Struct, frozen=True):
     line: int
     doc: str
     type_doc: tuple[str, ...]
-    properties: tuple[PropertyView, ...]
+    properties: tuple[Property, ...]
     offers: tuple[OfferView, ...]
 
 
@@ -299,11 +277,6 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
     mission = draft.mission
     node = mission.at(path)
     rule = vocabulary().get(node.tag)
-    found = properties(mission, node, facts)
-    told = [
-        PropertyView(one.name, one.value, one.default, one.is_missing, one.is_parameter, one.doc, one.choices)
-        for one in found
-    ]
     known = facts.get(class_of(mission, node)) if node.text("type") else None
     docs = {_label(one): facts[one.class_path].doc for one in entries(mission) if one.class_path in facts}
     return ElementView(
@@ -313,7 +286,7 @@ def element_view(draft: Draft, path: Path, facts: Mapping[str, ClassFacts]) -> E
         node.line,
         "" if rule is None else rule.documentation,
         () if known is None else tuple(known.doc.splitlines()),
-        tuple(told),
+        tuple(properties(mission, node, facts)),
         tuple(offer_view(offer, docs.get(offer.label, "")) for offer in offers(mission, path)),
     )
 
@@ -325,8 +298,7 @@ def offer_view(offer: Offer, class_doc: str = "") -> OfferView:
         offer: The offer.
         class_doc: Documentation of its type's class, of which the first line is shown; empty: not known.
     """
-    asks = tuple(AskedView(one.name, one.doc, one.proposed, one.choices, one.is_required) for one in offer.asks)
-    return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, asks)
+    return OfferView(offer.label, class_doc.partition("\n")[0] or offer.doc, offer.asks)
 
 
 def rehearsal_view(dry: DryRun) -> RehearsalView:

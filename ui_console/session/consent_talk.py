@@ -10,12 +10,12 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any
 
+from backbone.addresses import RC_MANAGER
 from backbone.component.messages import LogLevel
 from backbone.errors import LinkError, NoResponder, Refusal
 from backbone.mission_log.operators import OperatorAction
 from backbone.mission_log.people import is_console
 from backbone.naming import component_of
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from ui_console.model.consent import (

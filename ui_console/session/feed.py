@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Any
 
+from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
 from backbone.component.messages import (
     AskParameters,
@@ -34,13 +35,11 @@ from backbone.errors import LinkError, Refusal
 from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, AskPeople, Log, PeopleKnown
 from backbone.mission_log.operators import OperatorActed
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Components, Disappeared, ListComponents, Resolve, Resolved
-from backbone.naming import LAUNCHER, Subsystem, component_of
+from backbone.naming import Subsystem, component_of
 from backbone.picture.health import MissionHealth
 from backbone.picture.mission import LOG_KEPT
 from backbone.picture.reasons import reasons_for
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
 from backbone.wire import Envelope

@@ -11,10 +11,10 @@ from collections.abc import Awaitable, Callable
 from enum import StrEnum
 from typing import Any
 
+from backbone.addresses import RC_MANAGER
 from backbone.errors import LinkError, Refusal
 from backbone.mission_log.people import is_console
 from backbone.ranges import Instant, Mention
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message

@@ -7,8 +7,8 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
+from backbone.addresses import RC_MANAGER
 from backbone.errors import LinkError, Refusal
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.views import Why
 from ui_console.model.events import Heard

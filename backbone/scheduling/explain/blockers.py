@@ -58,8 +58,6 @@ class Blockers:
         If an RC of it is down or has too little capacity: the blockers once the RC is up and has enough.
 
         Args:
-            arc: A waiting ARC.
-            now_s: Time of the question.
             grace_s: Time a decision process has to stop cleanly at the end of a slice.
 
         Returns:

@@ -40,7 +40,6 @@ class StartPrediction:
 
         Args:
             slots: Places of all queued ARCs of a group, in order.
-            now_s: Time of the question.
         """
         starts_s: dict[ArcEntry, float] = {}
         for slot in sorted(slots, key=lambda slot: slot.start_s):  # an ARC starts later than those it waits for

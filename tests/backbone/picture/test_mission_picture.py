@@ -8,20 +8,18 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.local_bus import LocalNetwork
 from backbone.component.messages import Absence, AskTime, ComponentState, LifeState, MissionTime, StandingStop
 from backbone.creator.messages import ListProcesses, Processes, ProcessState, Spawn
 from backbone.errors import LinkError
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, Disappeared, ListComponents
-from backbone.naming import LAUNCHER, Subsystem
+from backbone.naming import Subsystem
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, misses
 from backbone.picture.screen import live_screen, screen
-from backbone.placer.messages import ADDRESS as PLACER
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message

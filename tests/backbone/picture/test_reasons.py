@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from backbone.addresses import NAMESERVER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.bus.interface import Bus, current_cause
 from backbone.bus.local_bus import LocalNetwork
@@ -20,7 +21,6 @@ from backbone.component.messages import (
 )
 from backbone.component.story import StoryBook, is_about
 from backbone.errors import LinkError
-from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Components, ListComponents, Resolve, Resolved, UnknownName
 from backbone.picture.reasons import AskedName, Reasons, Told, reasons_for, story_of
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.component.messages import NameTaken
 from backbone.component_database.messages import ComponentType, Multiplicity, MultiplicityExceeded
 from backbone.creator.messages import HostLoad, ProcessState, RestartPolicy, Spawn
-from backbone.nameserver.messages import NameTaken
 from backbone.naming import Subsystem
 from backbone.placer.messages import NoHost, NotPlaced
 from backbone.placer.placement_book import (

@@ -88,6 +88,12 @@ FAULTS = [
     Planted("an ARC that could not open is not asked again", "schedule_manager.py", "        self._arcs.retry()\n", ""),
     Planted("slack eats a short slice", "plan.py", "min(self._slack_s, arc.minimum_s / 2)", "self._slack_s"),
     Planted(
+        "slack eats a short slice in a large group",
+        "large_group.py",
+        "min(self._slack_s, arc.minimum_s / 2)",
+        "self._slack_s",
+    ),
+    Planted(
         "a lower ARC overlaps what a higher one reserved", "plan.py", "if rank(other.path, arc.path) > 0:", "if False:"
     ),
     Planted(

@@ -36,6 +36,7 @@ from backbone.scheduling.schedule_manager import ScheduleManager
 MISSION = "watch"
 TOLERANCE_S = 1e-6
 REPAIR_S = 3.0
+MOST_AT_ONCE = 3_000  # chosen: some ten times the events that the largest of these missions has at one instant
 
 
 def unit(name: str, connect_s: float = 0.0, disconnect_s: float = 0.0, *, up: bool = True) -> RcKnown:
@@ -154,12 +155,19 @@ class Bench:
         self.manager.check()
 
     def run(self, until_s: float) -> Bench:
-        """Let time pass; everything due at the last instant still happens."""
+        """Let time pass; everything due at the last instant still happens.
+
+        Raises:
+            AssertionError: Time stands still: a livelock.
+        """
+        at_once = 0
         while True:
             times_s = [self._agenda[0][0]] if self._agenda else []
             times_s += [self._wake_s] if self._wake_s is not None else []
             if not times_s or min(times_s) > until_s:
                 break
+            at_once = at_once + 1 if min(times_s) <= self.now_s else 0
+            assert at_once < MOST_AT_ONCE, f"time stands still at {self.now_s}; the last lines: {self.trace[-8:]}"
             self.now_s = max(self.now_s, min(times_s))
             if self._agenda and self._agenda[0][0] <= self.now_s:
                 event = heapq.heappop(self._agenda)[2]

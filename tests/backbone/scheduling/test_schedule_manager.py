@@ -559,24 +559,6 @@ def test_under_the_discipline_time_equals_that_ask_for_the_same_take_turns(jitte
         assert max(end_s - start_s for start_s, end_s in bench.runs(arc) if end_s) < 2.6
 
 
-def test_with_aging_a_lower_one_that_waited_long_gets_one_whole_slice():
-    """After 10 s it is as high as the other, whose slice is over."""
-    bench = Bench(manager(aging_s=10.0), unit("v"))
-    bench.tell(ask("high", "v", priority=2))
-    bench.tell(ask("low", "v", priority=1))
-    bench.run(50.0)
-    assert bench.runs("low") == [(10.0, 15.0), (25.0, 30.0), (40.0, 45.0)]
-    assert bench.runs("high")[1] == (15.0, 25.0)
-
-
-def test_aging_outwaits_no_console():
-    bench = Bench(manager(aging_s=1.0), unit("v"))
-    bench.tell(ask("human", "v", priority=9, console=True))
-    bench.tell(ask("low", "v"))
-    bench.run(100.0)
-    assert bench.runs("low") == []
-
-
 def test_slices_end_on_the_grid():
     bench = Bench(manager(grid_s=4.0), unit("v"), unit("w"))
     bench.at(0.5, ask("a", "v", run_s=3.0))

@@ -18,8 +18,8 @@ from backbone.mission.model import MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.placer.messages import Start
 from backbone.wire import Message
-from resource_pool.messages import AskPose, Pose
-from resource_pool.simulation.whole_mission import RunningMission, mission_in_one_process
+from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
+from resource_pool.drivers.world_messages import AskPose, Pose
 from ui_console.model.driving import DriveWish
 from ui_console.session.teleoperation import Teleoperation
 

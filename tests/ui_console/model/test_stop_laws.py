@@ -14,9 +14,9 @@ from functools import partial
 from typing import assert_never
 
 from resource_pool.arc_client import EmergencyStopped, StopState
-from resource_pool.messages import OtherStop
 from resource_pool.stop_knowledge import StopKnowledge
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import OtherStop
 from ui_console.model.consent import ConsentDesk, Sought, Topic
 from ui_console.model.driving import STICK_LASTS_S, DeadMan, DriveWish
 from ui_console.model.lifting import AskFirst, LiftNow, NotThatStop, decide_lift

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from fake_resource_pool import FakePlacer
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.keys import Conversation
 from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import RequestView, Schedule

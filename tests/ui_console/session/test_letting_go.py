@@ -18,11 +18,11 @@ from backbone.keys import Conversation
 from backbone.naming import Subsystem
 from backbone.wire import Envelope, Message
 from resource_pool.arc_client import EmergencyStopped
-from resource_pool.messages import AskStop, EmergencyStop, LiftStop
 from resource_pool.messages import Drive as ArcDrive
 from resource_pool.messages import Halt as ArcHalt
 from resource_pool.messages import Jump as ArcJump
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import KEYS_LET_GO_S, STICK_LASTS_S, DeadMan, DriveWish, HaltWish, drive_towards
 from ui_console.session.scripted import ScriptDriver

@@ -11,13 +11,13 @@ from fake_resource_pool import FakePlacer
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import VirtualClock, run_virtual
 from backbone.component.component import Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import ComponentState
 from backbone.nameserver.messages import Components
 from backbone.naming import Subsystem
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.rc_manager.messages import AskSchedule, AskWhy
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import Schedule, Why

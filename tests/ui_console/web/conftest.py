@@ -10,8 +10,8 @@ import pytest
 from fake_resource_pool import FakePlacer
 from web_stage import MISSION, RIGHTS, WITHIN_S, Stage
 
+from backbone.addresses import RC_MANAGER
 from backbone.bus.clock import MissionClock
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from ui_console.web.login import Authenticator
 from ui_console.web.server import WebServer
 

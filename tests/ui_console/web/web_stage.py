@@ -14,20 +14,20 @@ from fake_resource_pool import FakeArc, FakePlacer
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from backbone.addresses import LAUNCHER, RC_MANAGER
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
 from backbone.component.launch import Launch
 from backbone.component.messages import StoryEvent
 from backbone.keys import Conversation
 from backbone.mission_log.log import AskLog, AskPeople, MissionLog, PeopleKnown
-from backbone.naming import LAUNCHER, Subsystem, address
-from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
+from backbone.naming import Subsystem, address
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.requests import Holder, RequestState
 from backbone.scheduling.views import RcView, RequestView, Schedule
 from backbone.wire import Envelope, Message
-from resource_pool.messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
 from resource_pool.stop_latch import StopLatch
+from resource_pool.stop_messages import EmergencyQuestion, EmergencyStop, EmergencyStopped, LiftStop
 from ui_console.web.hub import WebHub
 from ui_console.web.login import TokenRights
 

@@ -4,13 +4,13 @@ import { makeInput } from "./design_dialogs.js";
 import { keyOf } from "./design_tree.js";
 import { find, keepingFocus, make, makeButton } from "./dom.js";
 
-/** @import { ElementView, ProblemRow, PropertyView } from "./design_messages.d.ts" */
+/** @import { ElementView, ProblemRow, Property } from "./design_messages.d.ts" */
 /** @import { Input, Path } from "./design_types.d.ts" */
 
 /**
  * Where a property of an element is written: what is set, and what was said last and is not done yet.
  *
- * @typedef {{ path: Path, property: PropertyView, input: Input, refused: HTMLElement, is: string,
+ * @typedef {{ path: Path, property: Property, input: Input, refused: HTMLElement, is: string,
  *   said: string | null }} Field
  */
 
@@ -21,7 +21,7 @@ import { find, keepingFocus, make, makeButton } from "./dom.js";
 export class Details {
   /**
    * @param {{ form: HTMLFormElement,
-   *   set: (path: Path, property: PropertyView, value: string) => void }} given
+   *   set: (path: Path, property: Property, value: string) => void }} given
    */
   constructor({ form, set }) {
     this.form = form;
@@ -66,7 +66,7 @@ export class Details {
 
   /**
    * @param {Path} path
-   * @param {PropertyView} property
+   * @param {Property} property
    */
   field(path, property) {
     const input = makeInput(property.choices.length ? ["", ...property.choices] : []);
@@ -113,7 +113,7 @@ export class Details {
   /**
    * Show the value, unless another one is just being written, or was refused and nothing has changed since.
    *
-   * @param {PropertyView} one
+   * @param {Property} one
    */
   fill(one) {
     const field = this.fields.get(propertyKey(one));

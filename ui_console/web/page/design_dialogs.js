@@ -2,7 +2,7 @@
 
 import { find, make, makeButton, query } from "./dom.js";
 
-/** @import { AskedView } from "./design_messages.d.ts" */
+/** @import { Prompt } from "./design_messages.d.ts" */
 /** @import { Input } from "./design_types.d.ts" */
 
 /**
@@ -10,7 +10,7 @@ import { find, make, makeButton, query } from "./dom.js";
  *
  * @param {string} title
  * @param {string} doc
- * @param {AskedView[]} asks
+ * @param {Prompt[]} asks
  * @param {string} [refused] Why earlier answers were not taken.
  * @returns {Promise<string[] | null>}
  */
@@ -121,7 +121,7 @@ function item(option, choose) {
 /**
  * A labelled input; Enter in a select is the form's, as in any other.
  *
- * @param {AskedView} asked
+ * @param {Prompt} asked
  * @param {string} id
  */
 function field(asked, id) {

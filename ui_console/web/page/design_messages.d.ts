@@ -5,14 +5,6 @@ export interface AskAnswer {
   path: number[];
 }
 
-export interface AskedView {
-  name: string;
-  doc: string;
-  proposed: string;
-  choices: string[];
-  is_required: boolean;
-}
-
 export interface DesignView {
   welcome: DesignerWelcomed;
   tree: ElementRow[];
@@ -57,7 +49,7 @@ export interface ElementView {
   line: number;
   doc: string;
   type_doc: string[];
-  properties: PropertyView[];
+  properties: Property[];
   offers: OfferView[];
 }
 
@@ -74,7 +66,7 @@ export interface NoticeAnswer {
 export interface OfferView {
   label: string;
   doc: string;
-  asks: AskedView[];
+  asks: Prompt[];
 }
 
 export interface PaletteRow {
@@ -95,7 +87,15 @@ export interface ProblemRow {
   path: number[];
 }
 
-export interface PropertyView {
+export interface Prompt {
+  name: string;
+  doc: string;
+  proposed: string;
+  choices: string[];
+  is_required: boolean;
+}
+
+export interface Property {
   name: string;
   value: string | null;
   default: string | null;

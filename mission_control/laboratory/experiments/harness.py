@@ -1,0 +1,54 @@
+"""Many trials on all cores: the same trials give the same results, with any number of processes."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import TypeVar
+
+Order = TypeVar("Order")
+Result = TypeVar("Result")
+
+BATCH = 5  # chosen: seconds of work, so that the last process is not long alone, and cached pictures are used again
+
+Progress = Callable[[int, int], None]
+"""Callback with the number of finished trials and of all trials."""
+
+
+def run_all(
+    work: Callable[[Order], Result],
+    orders: Sequence[Order],
+    *,
+    jobs: int = 0,
+    progress: Progress | None = None,
+) -> list[Result]:
+    """Run the work for each order and return the results in the same order.
+
+    Args:
+        work: A function of a module, which other processes can import; its result depends only on its order.
+        orders: One for each result; orders and results can be pickled.
+        jobs: Processes; 0: one a core; 1: this one.
+
+    Raises:
+        Exception: The first exception of the work; no further order is begun.
+    """
+    results: list[Result] = []
+    for result in _results(work, orders, jobs or os.cpu_count() or 1):
+        results.append(result)
+        if progress is not None:
+            progress(len(results), len(orders))
+    return results
+
+
+def _results(work: Callable[[Order], Result], orders: Sequence[Order], jobs: int) -> Iterator[Result]:
+    if jobs == 1 or len(orders) <= 1:
+        yield from map(work, orders)
+        return
+    # Spawned, not forked: a fork of a process with threads of its own may hang.
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        try:
+            yield from pool.map(work, orders, chunksize=BATCH)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
