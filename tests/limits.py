@@ -119,7 +119,7 @@ def virtual_limit_s(item: pytest.Item) -> float:
 
 
 def watch(config: pytest.Config, grace_s: float = GRACE_S, locks: tuple[Path, Path] = LOCKS) -> None:
-    """Have all of it for this run."""
+    """Apply all limits to this run."""
     config.pluginmanager.register(Limits(grace_s, Machine(*locks)), "limits")
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(FailuresAtOnce(config), "failures-at-once")

@@ -22,7 +22,7 @@ LINES = [{"at_s": at_s, "left_rad_s": 3, "right_rad_s": 3} for at_s in range(600
 
 
 class Listener:
-    """Keeps what a script is told."""
+    """Keeps the events of a script."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self.heard: list[dict[str, Any]] = []

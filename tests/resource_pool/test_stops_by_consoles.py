@@ -75,7 +75,7 @@ class PoolPlacer:
 
 
 class Person:
-    """Somebody at a console: hands, and what the screens show."""
+    """A person at a console: held controls, and the content of the screens."""
 
     def __init__(self, name: str, stage: Stage, *, uses_stick: bool) -> None:
         self.name, self.stage, self.uses_stick = name, stage, uses_stick
@@ -89,7 +89,7 @@ class Person:
         self.drive: DriveWish | None = None
 
     async def hands(self) -> None:
-        """Say again what is held, for ever."""
+        """Repeat the held controls, for ever."""
         while True:
             if self.drive is not None:
                 self.console.hold(self.drive, STICK_LASTS_S if self.uses_stick else None)
@@ -172,7 +172,7 @@ class Stage:
         self.network.heal(source)
 
     async def play(self) -> None:
-        """One random sequence; afterwards everybody has let go and nobody is cut off."""
+        """One random sequence; afterwards all controls are let go and no console is cut off."""
         for _step in range(STEPS):
             await self.do(self.rng.choice(self.people), self.rng.choice(DOES))
             for who in self.people:

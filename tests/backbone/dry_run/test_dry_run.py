@@ -1,4 +1,4 @@
-"""A dry run tells what the mission would do, before anything starts."""
+"""A dry run shows the mission's first minute before it starts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``why`` and ``story`` name whoever did not answer, and understand what causes look like."""
+"""``why`` and ``story`` name the components that did not answer, and understand ids of causes."""
 
 from __future__ import annotations
 

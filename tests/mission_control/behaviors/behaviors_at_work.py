@@ -53,7 +53,7 @@ def example(*behaviors: str, **parameters: Any) -> MissionDescription:
 
 
 class Person:
-    """Whoever sits at a console: takes robots over, drives them about, gives them back."""
+    """A person at a console: takes robots over, drives them about, gives them back."""
 
     def __init__(self) -> None:
         self.running: RunningMission | None = None

@@ -1,4 +1,4 @@
-"""Laws of scripts: what is wrong is refused with its line; what is right is played in its time."""
+"""Laws of scripts: a wrong line is refused with its number; a right one is played in its time."""
 
 import json
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""The law of stops: a stopped robot never moves until somebody entitled lifted the stop and a fresh press drives it.
+"""The law of stops: a stopped robot never moves before an entitled operator lifts the stop and a fresh press drives it.
 
 Three operators, one robot, everything that their consoles decide by, and a network that delays what it likes.
 """
@@ -85,12 +85,12 @@ class World:
 
     # ------------------------------------------------------------------ the network
     def send(self, who: Operator, act: Callable[[], None]) -> None:
-        """Have it arrive later, much later over a link that is cut."""
+        """Let the message arrive later, much later over a cut link."""
         delay_s = self.rng.uniform(0, LONGEST_DELAY_S) + (self.rng.uniform(0, CUT_S) if who.is_cut else 0.0)
         heapq.heappush(self._on_the_way, (self.now_s + delay_s, next(self._numbers), act))
 
     def pass_s(self, seconds: float) -> None:
-        """Let time pass: hands repeat what they hold, consoles send what is due, messages arrive."""
+        """Let time pass: held controls repeat, consoles send due commands, messages arrive."""
         until_s = self.now_s + seconds
         while self.now_s < until_s:
             self.now_s += TICK_S

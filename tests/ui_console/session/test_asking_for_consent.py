@@ -44,7 +44,7 @@ class RcManager(Component[NoParameters]):
 
 
 class Person:
-    """Somebody at a console, and what its screens show."""
+    """A person at a console, and the content of its screens."""
 
     def __init__(self, name: str, placer: FakePlacer) -> None:
         self.model = ConsoleModel(name, name)

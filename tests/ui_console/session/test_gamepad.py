@@ -99,7 +99,7 @@ def test_up_is_forward_and_right_turns_right() -> None:
 
 
 class PlayedGamepad:
-    """Says what it is told to, then is unplugged, or hangs."""
+    """Yields the given events, then is unplugged, or hangs."""
 
     def __init__(self, script: list[tuple[float, Said]], *, unplugged: bool) -> None:
         self.script, self.unplugged = script, unplugged
@@ -178,7 +178,7 @@ def test_a_gamepad_that_is_gone_while_it_is_held_stops_the_wheels() -> None:
 
 
 class FoundDevice:
-    """What evdev tells of a device."""
+    """evdev's description of a device."""
 
     def __init__(self, path: str) -> None:
         self.path, self.is_closed = path, False

@@ -148,7 +148,7 @@ class Stage:
         return self.placer.arcs["console-7-drive"]
 
     def stop(self, by: str = "ben", reason: str = "") -> None:
-        """Somebody stops the robot: its commands are refused from now on, and everybody hears of it."""
+        """Stop the robot: its RC refuses commands from now on, and publishes the stop."""
         self.latch.stop(by, reason, self.clock.now_s(), f"ui_console/{by}")
         for arc in self.placer.arcs.values():
             arc.refusal = EmergencyStopped(
@@ -334,7 +334,7 @@ def test_a_jump_key_held_through_a_stop_does_not_jump_after_the_lift(stage: Call
 def test_a_robot_that_was_stopped_and_freed_before_it_is_granted_is_driven_by_the_first_press(
     stage: Callable[[Scene], None],
 ) -> None:
-    """Who takes it knows of the stop from the beginning, so that nobody has to press twice."""
+    """An operator who takes the robot knows of the stop from the beginning, so that no second press is needed."""
 
     async def scene(on: Stage) -> None:
         await on.console.give_back()

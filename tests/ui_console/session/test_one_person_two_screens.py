@@ -58,7 +58,7 @@ def test_what_another_person_or_a_script_holds_stays_there(user: str, holds: str
 
 # ---------------------------------------------------------------------- over the bus
 class RcManager(Component[NoParameters]):
-    """Tells who holds scout1."""
+    """Answers with the holder of scout1."""
 
     accepts = AskSchedule | AskWhy
     holder = ""
@@ -95,7 +95,7 @@ class Stage:
         )
 
     async def takes(self, console: Teleoperation) -> None:
-        """Have the console ask; it is granted unless another holds the robot."""
+        """Let the console claim; it is granted unless another one holds the robot."""
         await self.clock.sleep_s(1.0)
         console.take()
         await self.placer.wait(lambda: f"{console.name}-drive" in self.placer.arcs)
