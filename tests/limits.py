@@ -134,7 +134,7 @@ def virtual_limit_s(item: pytest.Item) -> float:
 
 
 def watch(config: pytest.Config, grace_s: float = GRACE_S, locks: tuple[Path, Path] = LOCKS) -> None:
-    """Have all of it for this run."""
+    """Apply all limits to this run."""
     config.pluginmanager.register(Limits(grace_s, Machine(*locks)), "limits")
     if hasattr(config, "workerinput"):
         config.pluginmanager.register(AloneFirst(), "alone-first")

@@ -15,7 +15,7 @@ from backbone.errors import Refusal
 from backbone.placer.messages import Start
 
 if TYPE_CHECKING:
-    from backbone.mission.model import Behavior, MissionDescription
+    from backbone.mission.model import BehaviorDescription, MissionDescription
 
 PathStep = tuple[str, int]
 Node = Mapping[str, Any]
@@ -63,7 +63,7 @@ def behavior_order(node: Node, parent_path: Sequence[PathStep]) -> Start:
     return Start(node["type"], node["name"], {**own, **tree}, process=node.get("process", ""))
 
 
-def _node(behavior: Behavior) -> Node:
+def _node(behavior: BehaviorDescription) -> Node:
     node = behavior.model_dump(mode="json")
     _refuse_reserved(node)
     return node

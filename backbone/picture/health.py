@@ -35,7 +35,7 @@ class HealthWord(StrEnum):
 
 
 class MissionHealth(Message, frozen=True):
-    """How a mission is; published by the launcher on every change, and every ``SAY_EVERY_S``: its silence is noticed.
+    """Health of a mission; the launcher publishes it on every change, and every ``SAY_EVERY_S`` as its heartbeat.
 
     Attributes:
         absent: Absent components: vital ones first, then by name.

@@ -16,7 +16,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from backbone.errors import Refusal
-from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 
 try:
     import evdev
@@ -103,7 +103,7 @@ class Stick:
             return BUTTONS.get(event.code)
         return None
 
-    def wanted(self, speed_rad_s: float) -> Drive | None:
+    def wanted(self, speed_rad_s: float) -> DriveWish | None:
         """Return the drive command now; None: the dead-man button is not held."""
         if not self._held:
             return None
@@ -132,7 +132,7 @@ async def play_gamepad(
     device: Gamepad,
     stick: Stick,
     *,
-    hold: Callable[[Drive, float], None],
+    hold: Callable[[DriveWish, float], None],
     stop: Callable[[], None],
     wish: Callable[[PadWish], None],
     speed_rad_s: Callable[[], float],

@@ -24,7 +24,7 @@ from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
-from ui_console.model.driving import Command, Drive, Halt, Jump
+from ui_console.model.driving import Command, DriveWish, HaltWish, JumpWish
 from ui_console.model.lifting import AskLift
 from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.session.claim import ANY_ROBOT, TeleoperationParameters
@@ -178,7 +178,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         if self.refusal is not None:
             raise self.refusal
 
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
@@ -344,7 +344,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
 
     async def arc_suspending(self, notice: Suspending) -> None:  # noqa: ARG002  one command needs no deadline
         """Stop the wheels within the deadline; see ``ArcListener``."""
-        await self.do(Halt())
+        await self.do(HaltWish())
 
     async def arc_suspended(self, notice: Suspended) -> None:
         """Show the loss; see ``ArcListener``."""
@@ -392,7 +392,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         await self.give_back(f"{self.user} is away", wanted=False)
 
     async def _jump(self) -> None:
-        await self.do(Jump())
+        await self.do(JumpWish())
 
     async def _work_and_end(self, work: Callable[[Teleoperation], Awaitable[None]]) -> None:
         await work(self)

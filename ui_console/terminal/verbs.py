@@ -14,7 +14,7 @@ from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 
@@ -43,7 +43,7 @@ class Session:
         """Return the mission time."""
         return self._console.clock.now_s() if self._console is not None else 0.0
 
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down."""
         self._with_robot(lambda console: console.hold(drive, lasts_s))
 

@@ -16,7 +16,7 @@ from backbone.mission_log.question import LogQuestion
 from backbone.moments import Now
 from backbone.printable import printable_all
 from ui_console.model.console import ConsoleModel
-from ui_console.model.driving import STICK_LASTS_S, Halt, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, HaltWish, drive_by_stick
 from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, PictureSeen, failed
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
@@ -146,7 +146,7 @@ class Operator:
         if console is not None and life is not None:
             self.stop()
             if console.is_ready and console.is_held:
-                await console.do(Halt())
+                await console.do(HaltWish())
             console.end(reason)
             await asyncio.wait({life})
         self._services.watching_changed()

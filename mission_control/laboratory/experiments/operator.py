@@ -38,7 +38,7 @@ TURN_RAD_S = 3.0  # chosen: wheel speed at which a Scout turns on the spot, slow
 
 
 class OperatorParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Parameters of ``Operator``.
+    """Parameters of ``SimulatedOperator``.
 
     Attributes:
         robot: Scout to claim.
@@ -91,7 +91,7 @@ class DrivePhases:
         self.is_driving = not self.is_driving
 
 
-class Operator(Component[OperatorParameters]):
+class SimulatedOperator(Component[OperatorParameters]):
     """One console that drives in some phases."""
 
     parameters_type = OperatorParameters

@@ -29,7 +29,7 @@ from mission_control.laboratory.experiments.mission_file import (
     mission_of_trial,
     watcher_of,
 )
-from mission_control.laboratory.experiments.operator import Operator
+from mission_control.laboratory.experiments.operator import SimulatedOperator
 from mission_control.laboratory.experiments.prediction import departs_s
 from mission_control.laboratory.simulation.whole_mission import RunningMission, mission_in_one_process
 from mission_control.messages import MotionSeen
@@ -133,7 +133,7 @@ class _Trial:
 
     async def run(self) -> tuple[Trial, list[Line]]:
         bare = self._mission.model_copy(update={"behaviors": ()})
-        consoles = {"operator": Operator}
+        consoles = {"operator": SimulatedOperator}
         async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
             running.bus.subscribe(
                 address(Subsystem.RESOURCE_POOL, WORLD), Conversation.TELEMETRY, WorldState, self._world_moved

@@ -1,4 +1,4 @@
-"""Whole missions from seeds: the laws hold, whatever goes wrong, and a seed means one run to the byte."""
+"""Whole missions from seeds: the laws hold under all faults, and a seed means one run to the byte."""
 
 from __future__ import annotations
 
