@@ -140,7 +140,7 @@ class Breaker:
         return found
 
     def end(self) -> dict[str, Any]:
-        """Take the mission down and return what the trace says and what is left."""
+        """Take the mission down; return the findings of the trace and the remains of the mission."""
         self.mission.detach_console()
         done = self.mission.down()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -148,7 +148,7 @@ class Breaker:
         return {"down": done.returncode, **self.aftermath()}
 
     def aftermath(self) -> dict[str, Any]:
-        """Return how ``up`` ended, what is left, and what the trace says."""
+        """Return the exit of ``up``, the remains of the mission, and the findings of the trace."""
         left = self.mission.left()
         broken, late = violations(self.mission.trace, self._pauses())
         return {

@@ -179,7 +179,7 @@ class BenchMission:
         return self.command("scout-backbone", "down")
 
     def left(self, within_s: float = GONE_WITHIN_S) -> list[psutil.Process]:
-        """Return what is left of its processes after at most this time."""
+        """Return its remaining processes after at most this time."""
         ends_s = time.monotonic() + within_s
         while (left := marked(self.environment[MARK])) and time.monotonic() < ends_s:
             time.sleep(POLL_S)
@@ -223,7 +223,7 @@ def marked(mark: str) -> list[psutil.Process]:
 
 @contextlib.contextmanager
 def mission_coming_up() -> Iterator[BenchMission]:
-    """Start a mission and an observer; whatever is left at the end of the block is killed."""
+    """Start a mission and an observer; at the end of the block kill the remaining processes."""
     with tempfile.TemporaryDirectory(prefix="scout-bench-") as folder:
         mark = uuid.uuid4().hex
         name = f"bench-{mark[:8]}"

@@ -72,7 +72,7 @@ async def open_bus(run_file: run_files.RunFile, clock: MissionClock) -> ZenohBus
 
 
 async def watch(bus: Bus, clock: MissionClock) -> None:
-    """Look again and again."""
+    """Look repeatedly."""
     last: dict[str, Any] = {}
     while True:
         began = time.monotonic()

@@ -45,7 +45,7 @@ def violations(trace: Path, pauses: Sequence[tuple[float, float]]) -> tuple[list
 
 
 def is_late_by_a_pause(found: Violation, life: list[dict[str, Any]], pauses: Sequence[tuple[float, float]]) -> bool:
-    """Say whether what was due fell into a pause, and the RC manager decided again as soon as it went on."""
+    """Return whether a due start fell into a pause, and the RC manager decided as soon as it went on."""
     since = SINCE.match(found.msg)
     if found.code not in LATE or since is None:
         return False

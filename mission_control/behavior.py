@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Coroutine, Mapping, Sequence
 from typing import Any, ClassVar, Generic, TypeVar, assert_never
 
@@ -27,7 +26,7 @@ from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal
 from backbone.mission.behavior_orders import TREE_PARAMETERS, PathStep
 from backbone.naming import Subsystem, address, component_of
-from backbone.wire import Envelope, Message, UnknownMessage
+from backbone.wire import Accepts, Envelope, Message, UnknownMessage
 from mission_control.behavior_hooks import BehaviorHooks
 from mission_control.behavior_tree import (
     ArcNeed,
@@ -96,12 +95,12 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
 
     parameters_type: ClassVar[type[msgspec.Struct]] = BehaviorParameters
     given_elsewhere: ClassVar[frozenset[str]] = frozenset(TREE_PARAMETERS)
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | ChildReport | AskBehavior
+    accepts: ClassVar[Accepts | None] = ArcNotice | ChildReport | AskBehavior
     children_together: ClassVar[bool] = True
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
-        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, Any]()
+        self.status, self.payload = BehaviorStatus.RUNNING, dict[str, object]()
         self.rcs: Mapping[str, str] = {}
         """Kind → name of the granted RCs; empty while suspended."""
         self.arc: ArcClient | None = None
@@ -147,7 +146,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Status of each child that was started."""
         return self._children.status
 
-    def finish(self, status: BehaviorStatus, payload: Mapping[str, Any] | None = None) -> None:
+    def finish(self, status: BehaviorStatus, payload: Mapping[str, object] | None = None) -> None:
         """Finish: give the ARC back, end the children, report to the parent. Later calls change nothing."""
         if self.status.is_final or not status.is_final:
             return
@@ -158,7 +157,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         self.publish_event(self.name, f"finished: {status}", LogLevel.WARNING if failed else LogLevel.NOTICE)
         self._begin(self._wind_up(), "wind-up")
 
-    def tell_parent(self, payload: Mapping[str, Any]) -> None:
+    def tell_parent(self, payload: Mapping[str, object]) -> None:
         """Send a report of progress to the parent; it is lost if the parent cannot be reached."""
         self.payload = dict(payload)
         if self._parent is not None and not self.status.is_final:
@@ -186,7 +185,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                 "children of an earlier life",
             )
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC, the children, and ``AskBehavior``."""
         match asked.body:
             case ChildReport(child=child, status=status, payload=payload):
@@ -347,7 +346,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
             self._begin(self._carry_out_in_order(instructions), "children")
 
     async def _carry_out_in_order(self, instructions: Sequence[Instruction]) -> None:
-        starting: list[Coroutine[Any, Any, None]] = []
+        starting: list[Coroutine[object, None, None]] = []
         for instruction in instructions:
             match instruction:
                 case StartChild(name):
@@ -372,12 +371,12 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     def _child_left(self, name: str) -> None:
         self._carry_out(self._children.left(name))
 
-    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    def _child_reported(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         if self._children.reported(name, status, payload):
             self.story.note(name, f"finished: {status}")
             self._begin(self._decide(name, status, payload), f"decide on {name}")
 
-    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    async def _decide(self, name: str, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         decision = await self.child_finished(name, status, payload)
         self.story.note(name, f"{decision} after {status}")
         if decision is not Decision.RETRY:
@@ -412,7 +411,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
     def _report(self) -> ChildReport:
         return ChildReport(self.name, self.status, self.payload)
 
-    def _begin(self, work: Coroutine[Any, Any, Any], name: str) -> asyncio.Task[None] | None:
+    def _begin(self, work: Coroutine[object, None, Any], name: str) -> asyncio.Task[None] | None:
         """Run the coroutine as a task, unless the component is ending."""
         if self.state is not LifeState.READY:
             work.close()

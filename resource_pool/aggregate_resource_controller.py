@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -47,7 +46,7 @@ from backbone.rc_manager.messages import (
 )
 from backbone.scheduling.claims import STREAMED_KINDS
 from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_request import ArcParameters, request_of, require_runtime, set_of
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.gate import Gate
@@ -93,7 +92,7 @@ class AggregateResourceController(Component[ArcParameters]):
     """Base class of every ARC; derive, set ``roles``, override ``prepare``."""
 
     parameters_type = ArcParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
+    accepts: ClassVar[Accepts | None] = OpenGate | CloseGate | AskRequest | TakePath | ArcQuestion
     roles: ClassVar[Sequence[str]] = ()
     """Kinds of RC in its set, one of each."""
     sharable_roles: ClassVar[frozenset[str]] = STREAMED_KINDS
@@ -183,7 +182,7 @@ class AggregateResourceController(Component[ArcParameters]):
             except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
                 log.info("not withdrawn: %s", error)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Obey the RC manager for the gate, and the owner for everything else."""
         match asked.body:
             case OpenGate() | CloseGate() | AskRequest() | TakePath() if asked.source != RC_MANAGER:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -140,7 +140,7 @@ class ArcClient:
         self,
         clock: Clock,
         kind: str,
-        parameters: dict[str, Any],
+        parameters: dict[str, object],
         *,
         rests: bool = False,
         patience_s: float = 0.0,
@@ -234,8 +234,8 @@ class ArcClient:
     def frames(self, listener: Callable[[Frame], None]) -> Subscription:
         """Call the listener with the newest picture of the present grant; pictures of earlier grants never arrive."""
 
-        def arrived(envelope: Envelope[Any]) -> None:
-            frame: Frame = envelope.body
+        def arrived(envelope: Envelope[Frame]) -> None:
+            frame = envelope.body
             if self.granted is not None and self.granted.epochs.get(frame.rc) == frame.epoch:
                 listener(frame)
 

@@ -16,16 +16,18 @@ import logging
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import zenoh
 
 from backbone.bus.bus_base import BusBase, settle
-from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
+from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
+from backbone.bus.sockets import close_without_waiting
 from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (
+    Accepts,
     Envelope,
     MalformedMessage,
     Message,
@@ -37,6 +39,7 @@ from backbone.wire import (
 )
 
 log = logging.getLogger(__name__)
+T = TypeVar("T")
 
 _TIMEOUT_PAYLOAD = b"Timeout"
 
@@ -96,6 +99,16 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         raise _unreachable(config, error) from error
 
 
+def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
+    """Keep the close of this session's TCP links from blocking, while the result is kept."""
+
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
+            close_without_waiting()
+
+    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
+
+
 async def close_session(session: zenoh.Session) -> None:
     """Close the session; return when its threads have ended."""
     await asyncio.get_running_loop().run_in_executor(None, session.close)
@@ -123,6 +136,7 @@ class ZenohBus(BusBase):
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
         self._session, self._is_hub, self._shared = session, is_hub, shared
+        self._links = None if shared else watch_links(session)
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()
@@ -205,7 +219,7 @@ class ZenohBus(BusBase):
             raise body.revive()
         return cast("Reply", body)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         self.require_open()
         reader = _reader(accepts)
@@ -216,7 +230,7 @@ class ZenohBus(BusBase):
 
         return self._declare(self._session.declare_queryable(own, lambda query: self.push(arrived, query)))
 
-    async def _answer(self, reader: Reader[Any], answer: Answer, own: str, query: zenoh.Query) -> None:
+    async def _answer(self, reader: Reader[Message], answer: Answer, own: str, query: zenoh.Query) -> None:
         try:
             question = reader.read(_bytes_of(query.payload))
             envelope = await self.reply_to(question, answer)
@@ -232,7 +246,7 @@ class ZenohBus(BusBase):
         finally:
             query.drop()  # type: ignore[no-untyped-call]
 
-    def _write_reply(self, envelope: Any) -> bytes:
+    def _write_reply(self, envelope: Envelope[Message]) -> bytes:
         try:
             return write(envelope)
         except OversizedMessage as refusal:
@@ -244,7 +258,7 @@ class ZenohBus(BusBase):
         if not self.closed:
             self.send(address, conversation, message)
 
-    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Any]:
+    def send(self, address: str, conversation: Conversation, message: Message) -> Envelope[Message]:
         """Publish over the session and return the envelope."""
         publisher = self._publishers.get((address, conversation)) or self._declare_publisher(address, conversation)
         self._publishers.move_to_end((address, conversation))
@@ -267,7 +281,7 @@ class ZenohBus(BusBase):
         return publisher
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         self.require_open()
@@ -355,7 +369,7 @@ class ZenohBus(BusBase):
         self._publishers.clear()
 
     # ------------------------------------------------------------------ from zenoh's threads into the loop
-    def push(self, act: Callable[[Any], None], what: Any) -> None:
+    def push(self, act: Callable[[T], None], what: T) -> None:
         """Make the loop call ``act(what)``; called from zenoh's threads."""
         self._inbox.append((act, what))
         if not self._woken:
@@ -406,7 +420,7 @@ class _Arrived:
 
     __slots__ = ("_answered", "_bus", "_replied")
 
-    def __init__(self, bus: ZenohBus, answered: asyncio.Future[Any]) -> None:
+    def __init__(self, bus: ZenohBus, answered: asyncio.Future[zenoh.Reply | None]) -> None:
         self._bus, self._answered, self._replied = bus, answered, False
 
     def reply(self, got: zenoh.Reply) -> None:
@@ -424,7 +438,7 @@ class _Arrived:
 class _Each:
     """Receives every sample of a subscriber, in order."""
 
-    def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
+    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
         self._bus, self._reader, self._listener = bus, reader, listener
 
     def __call__(self, sample: zenoh.Sample) -> None:
@@ -447,7 +461,7 @@ class _Latest(_Each):
     before it reads the flag, and the loop clears the flag before it takes samples out.
     """
 
-    def __init__(self, bus: ZenohBus, reader: Reader[Any], listener: Listener) -> None:
+    def __init__(self, bus: ZenohBus, reader: Reader[Message], listener: Listener) -> None:
         super().__init__(bus, reader, listener)
         self._newest: dict[str, zenoh.Sample] = {}
         self._pushed = False
@@ -477,18 +491,18 @@ def _bytes_of(payload: zenoh.ZBytes | None) -> bytes:
     return payload.to_bytes()
 
 
-_readers: dict[Any, Reader[Any]] = {}
-_reply_readers: dict[type[Any], Reader[Any]] = {}
+_readers: dict[Accepts, Reader[Message]] = {}
+_reply_readers: dict[type[Message], Reader[Message]] = {}
 
 
-def _reader(accepts: Accepted) -> Reader[Any]:
+def _reader(accepts: Accepts) -> Reader[Message]:
     reader = _readers.get(accepts)
     if reader is None:
         reader = _readers[accepts] = Reader(accepts)
     return reader
 
 
-def _reply_reader(reply: type[Any]) -> Reader[Any]:
+def _reply_reader(reply: type[Message]) -> Reader[Message]:
     reader = _reply_readers.get(reply)
     if reader is None:
         reader = _reply_readers[reply] = Reader(reply | Refused)

@@ -33,10 +33,8 @@ from backbone.command_line.options import (
     hub_endpoint,
     run,
 )
-from backbone.component.messages import LogLevel
+from backbone.component.log_level import LogLevel
 from backbone.launcher.endings import ExitCode, say
-from backbone.launcher.verdict import VerdictPipe
-from backbone.placer.messages import Start
 from backbone.spoken import counted
 
 app = typer.Typer(
@@ -145,6 +143,7 @@ def up(
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
     from backbone.command_line.mission_console import bring_up_on_console
     from backbone.launcher.core_launches import UpOptions
+    from backbone.launcher.verdict import VerdictPipe
 
     options, live = UpOptions(speed=speed, trace=trace, for_s=for_s), not headless and sys.stdout.isatty()
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
@@ -240,6 +239,7 @@ def start(
 ) -> None:
     """Start one more component through the placer."""
     from backbone.command_line.ordering import start_component
+    from backbone.placer.messages import Start
 
     where = chosen(mission, connect, secret_file)
     order = Start(type_, name, dict(map(_parameter, parameter or [])), host)
@@ -342,14 +342,14 @@ def _width() -> int | None:
     return None if sys.stdout.isatty() else PIPE_WIDTH
 
 
-def _parameter(given: str) -> tuple[str, Any]:
+def _parameter(given: str) -> tuple[str, object]:
     name, equals, value = given.partition("=")
     if not equals or not name:
         raise typer.BadParameter(f"{given!r} is not NAME=VALUE")
     return name, _value(value)
 
 
-def _value(text: str) -> Any:
+def _value(text: str) -> object:
     try:
         return json.loads(text)
     except json.JSONDecodeError:

@@ -51,7 +51,7 @@ def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
         parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
 
 
-def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: Any) -> Any:
+def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: object) -> Any:
     """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
     is_absent = value is None and not is_required
     return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)

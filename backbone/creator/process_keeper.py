@@ -394,7 +394,7 @@ class ProcessKeeper:
         self._alarm_s = at_s
         self._alarm = self._task(self._ring(at_s), "supervision's alarm")
 
-    def _task(self, work: Coroutine[Any, Any, None], name: str) -> asyncio.Task[None]:
+    def _task(self, work: Coroutine[object, None, None], name: str) -> asyncio.Task[None]:
         task = asyncio.create_task(work, name=name)
         self._tasks.add(task)
         task.add_done_callback(self._task_done)

@@ -20,7 +20,7 @@ from backbone.dependency_database.inventory import Inventory
 from backbone.dependency_database.messages import FindRcs
 from backbone.errors import Refusal, code_of
 from backbone.mission.behavior_orders import PathStep
-from backbone.mission.model import ArcWish, Behavior, MissionDescription
+from backbone.mission.model import ArcWish, BehaviorDescription, MissionDescription
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import NoHost
 from backbone.placer.placement import CandidateHost, place
@@ -29,10 +29,11 @@ from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import RcKnown, Requested
 from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.rehearsal import Line, Rehearsal, Timetable
+from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.requests import SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.trace import Line
 from backbone.scheduling.views import Why
 
 FIRST_MINUTE_S = 60.0
@@ -160,7 +161,7 @@ def placements(description: MissionDescription) -> list[Placed]:
         counts[found[-1].host] += 1
         return bool(found[-1].host)
 
-    def start_branch(behavior: Behavior) -> None:
+    def start_branch(behavior: BehaviorDescription) -> None:
         if not start(behavior.type, behavior.name):
             return
         if behavior.arc is not None:
@@ -194,7 +195,7 @@ class _BehaviorClaim:
     """A behavior's claim, or why the behavior cannot claim."""
 
     arc: str
-    behavior: Behavior
+    behavior: BehaviorDescription
     path: Sequence[PathStep]
     request: SchedulingRequest | None
     obstacle: str = ""
@@ -240,7 +241,9 @@ def _claims(description: MissionDescription) -> Iterator[_BehaviorClaim]:
         yield _BehaviorClaim(arc, behavior, path, request)
 
 
-def _walk(behaviors: Iterable[Behavior], above: Sequence[PathStep]) -> Iterator[tuple[list[PathStep], Behavior]]:
+def _walk(
+    behaviors: Iterable[BehaviorDescription], above: Sequence[PathStep]
+) -> Iterator[tuple[list[PathStep], BehaviorDescription]]:
     for behavior in behaviors:
         path = [*above, (behavior.name, behavior.priority)]
         yield path, behavior
@@ -293,7 +296,7 @@ def _claimed(answers: Answers, timetable: Timetable, asked: _Asked) -> Claimed:
     )
 
 
-def _arc_name(behavior: Behavior, wish: ArcWish) -> str:
+def _arc_name(behavior: BehaviorDescription, wish: ArcWish) -> str:
     return f"{behavior.name}-{wish.kind}"
 
 

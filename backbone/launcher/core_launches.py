@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -45,7 +44,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     types = [msgspec.to_builtins(component_type) for component_type in description.types]
     resources = [msgspec.to_builtins(resource) for resource in description.resources]
     trace = str(options.trace.absolute()) if options.trace else ""
-    parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
+    parameters: dict[str, Callable[[Host], dict[str, object]]] = {
         "component_database": lambda _: {"types": types},
         "placer": lambda _: {},
         "creator": lambda host: {
@@ -92,7 +91,7 @@ def launcher_launch(description: MissionDescription, endpoint: str, clock: Missi
 
 
 def service_launch(
-    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, Any]
+    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, object]
 ) -> Launch:
     """Return the launch of a core service on the launcher's host."""
     class_path = next(t.class_path for t in description.types if t.name == component_type)

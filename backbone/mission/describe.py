@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
@@ -19,7 +18,13 @@ from backbone.mission.declaration.elements import (
 )
 from backbone.mission.declaration.parts import Declared, ParameterElement
 from backbone.mission.declaration.world_elements import AirElement, TargetElement, WorldElement
-from backbone.mission.model import ArcWish, Behavior, Component, CoreService, MissionDescription
+from backbone.mission.model import (
+    ArcWish,
+    BehaviorDescription,
+    ComponentDescription,
+    CoreServiceDescription,
+    MissionDescription,
+)
 from backbone.mission.room_files import room_text
 from backbone.mission.tables import CORE_SERVICES, NETWORK_ID, SIMULATED, WORLD, parameter_value
 
@@ -46,9 +51,11 @@ def _parameters(given: Iterable[ParameterElement]) -> dict[str, bool | int | flo
     return {one.name: parameter_value(one.value) for one in given}
 
 
-def _core(mission: MissionElement, hosts: Sequence[str]) -> tuple[CoreService, ...]:
+def _core(mission: MissionElement, hosts: Sequence[str]) -> tuple[CoreServiceDescription, ...]:
     written = () if mission.core is None else mission.core.service
-    services = [CoreService(type=one.type, host=one.host, parameters=_parameters(one.parameter)) for one in written]
+    services = [
+        CoreServiceDescription(type=one.type, host=one.host, parameters=_parameters(one.parameter)) for one in written
+    ]
     return tuple(sorted(services, key=lambda one: (CORE_SERVICES.index(one.type), hosts.index(one.host))))
 
 
@@ -79,8 +86,8 @@ def _resource(declared: ResourceElement, world: WorldElement | None) -> Resource
     )
 
 
-def _behavior(declared: BehaviorElement) -> Behavior:
-    return Behavior(
+def _behavior(declared: BehaviorElement) -> BehaviorDescription:
+    return BehaviorDescription(
         **declared.model_dump(include=set(BehaviorAttributes.model_fields), exclude_defaults=True),
         parameters=_parameters(declared.parameter),
         arc=None if declared.arc is None else _arc(declared.arc),
@@ -97,9 +104,9 @@ def _arc(declared: ArcElement) -> ArcWish:
 
 
 # ---------------------------------------------------------------------- the world
-def _world(world: WorldElement, resources: Sequence[ResourceElement], source: str) -> Component:
+def _world(world: WorldElement, resources: Sequence[ResourceElement], source: str) -> ComponentDescription:
     ids = {one.name: _parameters(one.parameter).get(NETWORK_ID) for one in resources}
-    return Component(
+    return ComponentDescription(
         type=world.type,
         name=world.name,
         host=world.host,
@@ -108,7 +115,7 @@ def _world(world: WorldElement, resources: Sequence[ResourceElement], source: st
     )
 
 
-def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> dict[str, Any]:
+def _world_content(world: WorldElement, ids: Mapping[str, object], source: str) -> dict[str, object]:
     """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
     return {
         "width_m": world.room.width_m,
@@ -128,7 +135,7 @@ def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> 
     }
 
 
-def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
+def _body(declared: Declared, *left_out: str) -> dict[str, object]:
     """Return the attributes of a body, its heading in radians."""
     values = declared.model_dump(exclude=set(left_out))
     if "heading_deg" in values:
@@ -136,5 +143,5 @@ def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
     return values
 
 
-def _target(target: TargetElement) -> dict[str, Any]:
+def _target(target: TargetElement) -> dict[str, object]:
     return {**_body(target, "point"), "path": [[point.x_m, point.y_m] for point in target.point]}

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from contextlib import AsyncExitStack
 from functools import partial
 from itertools import chain, repeat
-from typing import Any, assert_never
+from typing import assert_never
 
 from backbone.addresses import COMPONENT_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
@@ -104,7 +104,7 @@ class Placer(Component[NoParameters]):
             begin = await self._queue.get()
             begin()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Start``, ``StopComponent``, ``AskPlacement`` and ``ListPlacements``."""
         match asked.body:
             case Start() as order:
@@ -239,7 +239,7 @@ class Placer(Component[NoParameters]):
             await self._happened.or_at(until_s)
 
     # ------------------------------------------------------------------ events
-    def _component_changed(self, heard: Envelope[Any]) -> None:
+    def _component_changed(self, heard: Envelope[Message]) -> None:
         match heard.body:
             case Appeared(component=component) if component.type == CREATOR:
                 self._enqueue(partial(self._meetings.begin_meeting, component))

@@ -16,7 +16,7 @@ import logging
 from collections import Counter, deque
 from collections.abc import Callable, Coroutine, Mapping
 from pathlib import Path
-from typing import Any, assert_never
+from typing import assert_never
 
 from backbone.addresses import DEPENDENCY_DATABASE, NAMESERVER
 from backbone.bus.interface import Bus, Clock
@@ -193,7 +193,7 @@ class RcManager(Component[RcManagerParameters]):
         }
 
     # ------------------------------------------------------------------ questions
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ARCs, consoles and tools."""
         match asked.body:
             case SchedulingRequest() as request:
@@ -281,7 +281,7 @@ class RcManager(Component[RcManagerParameters]):
             case _:
                 assert_never(instruction)
 
-    def _switch(self, arc: str, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    def _switch(self, arc: str, work: Callable[[], Coroutine[object, None, None]]) -> None:
         """Run the work after whatever is still under way for this ARC was ended."""
         before = self._switches.get(arc)
 
@@ -355,7 +355,7 @@ class RcManager(Component[RcManagerParameters]):
             if current.rcs and not found.holds_rightly(arc):
                 self._admit(current.request, tuple(current.rcs))
 
-    def _heard_from_nameserver(self, envelope: Envelope[Any]) -> None:
+    def _heard_from_nameserver(self, envelope: Envelope[Message]) -> None:
         match envelope.body:
             case Appeared(component=component):
                 self._appeared(component_of(component.address), component.address)
@@ -366,9 +366,9 @@ class RcManager(Component[RcManagerParameters]):
         if name in self._resources and at.startswith("resource_pool/"):
             self._rcs.meet_again(name)
 
-    def _heard_rc(self, envelope: Envelope[Any]) -> None:
+    def _heard_rc(self, envelope: Envelope[RcState]) -> None:
         """Correct what is believed of an RC by what it says itself: news of it, or a renewal, may have been lost."""
-        state: RcState = envelope.body
+        state = envelope.body
         rc = state.name
         if not self._rcs.believes(state):
             return
@@ -450,7 +450,7 @@ class RcManager(Component[RcManagerParameters]):
             super().publish_news()
         self.bus.publish(self.address, Conversation.SCHEDULE, schedule)
 
-    def _heard_beat(self, envelope: Envelope[Any]) -> None:
+    def _heard_beat(self, envelope: Envelope[Beat]) -> None:
         arc = envelope.body.arc
         if arc in self._uses:
             self._beats.heard(arc, self.clock.now_s())

@@ -1,13 +1,13 @@
 """Schedule manager: carries the master schedule out, one context switch after the other.
 
-Events go in, instructions come out. The caller owns the clock and the bus: it reports what happened and when, carries
-the instructions out, and reports the outcome. A decision has three steps: *apply* the event to the state, *plan* whose
-turn it is, *switch* to it; the last two again until it is no ARC's turn.
+Events go in, instructions come out. The caller owns the clock and the bus: it reports events with their times, carries
+the instructions out, and reports their outcomes. A decision has three steps: *apply* the event to the state, *plan* the
+next turn, *switch* to it; the last two repeat until no ARC's time has come.
 
 Rules of this file (numbers as in docs and ``why``):
 
-* 4  What was freed by force goes to the ARC it was freed for: it has a reservation, and comes before its equals.
-* 5  A slice ends only if an ARC that is entitled can use the RCs.
+* 4  Preempted RCs go to the ARC that preempted them: it has a reservation, and comes before its equals.
+* 5  A slice ends only if an entitled ARC can use the RCs.
 * 6  revoke → free → connect → grant. An ARC connects only when all its RCs are free.
 
 Source: RAM 2002, "The RC Scheduler", last paragraph.
@@ -57,10 +57,10 @@ from backbone.scheduling.transitions import Transitions
 
 
 class ScheduleManager:
-    """Who holds which RC now and next.
+    """Decides on the present and next holders of every RC.
 
     Attributes:
-        rules: With which it decides.
+        rules: Its rules.
         master_schedule: The plans and the state; only this manager changes them.
         tree: The behavior tree with its priorities.
         wake_s: Mission time at which it asked to be woken; None: it did not.
@@ -80,7 +80,7 @@ class ScheduleManager:
         """Begin with no RCs and no ARCs.
 
         Args:
-            rules: With which rules to decide.
+            rules: Rules of the decisions.
             tolerance_s: Reaction and timer tolerance of this run.
             exact_up_to: Groups of at most this size are planned whole.
             mission: Name of the mission's own node, root of the behavior tree.
@@ -113,12 +113,12 @@ class ScheduleManager:
     # Events in, instructions out: apply, plan, switch.
 
     def handle(self, event: Event, now_s: float) -> list[Instruction]:
-        """Take note of what happened and decide what follows from it.
+        """Apply an event and decide.
 
-        An event about an ARC or RC that is not known, or one that came too late to matter, changes nothing.
+        An event about an unknown ARC or RC, or an outdated event, changes nothing.
 
         Returns:
-            Instructions in the order in which they must be carried out.
+            Instructions, to be carried out in this order.
         """
         self._transitions.begin(now_s)
         self._apply(event)
@@ -174,7 +174,7 @@ class ScheduleManager:
                 assert_never(event)
 
     def _switch(self, turn: Turn) -> None:
-        """Connect the ARC whose turn it is, or first revoke who is in its way."""
+        """Connect the ARC whose turn it is, or first revoke the holders of its RCs."""
         if not turn.in_the_way:
             self._transitions.connect(turn.arc)
             return
@@ -189,7 +189,7 @@ class ScheduleManager:
                 self._transitions.end_slice(holder, turn.arc)
 
     def _set_alarm(self, *, rang: bool) -> None:
-        """Ask to be woken when the next decision can be due without an event."""
+        """Instruct the caller to wake the manager when the next decision can be due without an event."""
         slice_end_s = self._state.end_slices(self._transitions.now_s)
         times_s = [self._arcs.next_retry_s(), slice_end_s, self._priorities.next_aging_s()]
         wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
@@ -203,10 +203,10 @@ class ScheduleManager:
         """Return the set of RCs this request should wait for; nothing changes.
 
         Raises:
-            MissingRuntime: It does not say for how long it must run at least.
+            MissingRuntime: The request has no valid minimum run time.
             UnknownRc: All alternatives name RCs that do not exist.
             CapacityExceeded: It could not run even alone; facts ``demanded``, ``used`` and ``free``.
-            SchedulingRefusal: It asks for nothing, or for streams that make no sense.
+            SchedulingRefusal: The request has no RC, or a stream with impossible times.
         """
         return choose(self._state, request)
 
@@ -242,7 +242,7 @@ class ScheduleManager:
         """Make sure that the invariants of the schedule hold.
 
         Raises:
-            AssertionError: One does not; with the story of the ARCs concerned.
+            AssertionError: An invariant is broken; with the story of the ARCs concerned.
         """
         for invariant, whom in broken(self.master_schedule, self._transitions.now_s):
             story = self._transitions.trace.story_of({arc.name for arc in whom})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import Any, ClassVar, TypeVar
+from typing import ClassVar, TypeVar
 
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.naming import Subsystem, address
@@ -107,6 +107,6 @@ class Driver(Behavior[D]):
 
     def give_up(self, refusal: Refusal) -> None:
         """Fail; the parent gets the refusal's code, detail and remedy."""
-        why: dict[str, Any] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
+        why: dict[str, object] = {"code": code_of(refusal), "detail": refusal.detail, "remedy": refusal.remedy}
         self.report(f"gives up: {refusal.detail}")
         self.finish(BehaviorStatus.FAILURE, why)

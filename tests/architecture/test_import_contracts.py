@@ -168,6 +168,16 @@ def test_only_the_clock_sleeps() -> None:
     assert sleepers == {"backbone.bus.clock"}
 
 
+def test_any_is_rare() -> None:
+    """``Any`` turns the type checker off; it is for struct fields and libraries whose values really are of any kind."""
+    texts = [file.read_text() for file in MODULES.values()]
+    trees = [ast.parse(text) for text in texts if "import Any" in text or ", Any" in text]
+    names = [node.id for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Name)]
+    count = names.count("Any")
+    lines = sum(text.count("\n") for text in texts)
+    assert count <= 2 * lines / 1000, f"{count} in {lines} lines"
+
+
 def test_each_refusal_has_a_code_of_its_own() -> None:
     """scout_model knows no refusals: what it raises is turned into one, under the same code, above it."""
     codes: Counter[str] = Counter()

@@ -188,7 +188,7 @@ class Attacker:
 
 
 def main() -> None:
-    """Attack as told."""
+    """Carry out the ordered attacks."""
     given = json.load(sys.stdin)
     os.setgroups([])
     os.setresgid(given["uid"], given["uid"], given["uid"])

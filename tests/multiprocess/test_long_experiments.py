@@ -45,7 +45,7 @@ from backbone.wire import Envelope
 from resource_pool.arc_client import Suspended
 from resource_pool.drivers.world_messages import RadioPacket
 from scout_model import radio_link
-from ui_console.model.driving import Drive
+from ui_console.model.driving import DriveWish
 from ui_console.model.events import CommandApplied, ConsoleEvent, Granted, said
 from ui_console.session.teleoperation import Teleoperation
 
@@ -103,7 +103,7 @@ def contested(trace: Sequence[Line], arcs: set[str]) -> list[Slice]:
 
 
 def gaps(slices: Sequence[Slice]) -> list[float]:
-    """Return for each hand-over the time in which nobody held anything, settling included."""
+    """Return for each hand-over the time in which no ARC held anything, settling included."""
     return [later.granted_s - earlier.revoked_s for earlier, later in pairwise(slices) if earlier.arc != later.arc]
 
 
@@ -321,7 +321,7 @@ NETWORK_ID = 3
 
 
 class Observed:
-    """What the mission tells unasked while its RC manager falls again and again."""
+    """The mission's publications while its RC manager falls repeatedly."""
 
     def __init__(self, bus: Bus, clock: MissionClock) -> None:
         self._clock = clock
@@ -421,7 +421,7 @@ async def console(
 
 @dataclass
 class Driven:
-    """What the driving console was told was applied."""
+    """The commands that were reported as applied to the driving console."""
 
     over: asyncio.Event = field(default_factory=asyncio.Event)
     granted: asyncio.Event = field(default_factory=asyncio.Event)
@@ -435,7 +435,7 @@ class Driven:
             if self.over.is_set():
                 break
             speed_rad_s = 1.0 + (number % 4000) * 0.001
-            self.refused += not await teleoperation.do(Drive(speed_rad_s, -speed_rad_s))
+            self.refused += not await teleoperation.do(DriveWish(speed_rad_s, -speed_rad_s))
             await clock.sleep_s(COMMAND_EVERY_S)
         await teleoperation.give_back()
 
@@ -511,7 +511,7 @@ async def kill_once(bus: Bus, clock: MissionClock, seen: Observed, fallen: Falle
 
 
 def require_that_all_told_was_sent(events: Sequence[ConsoleEvent], seen: Observed) -> int:
-    """Every command of which the console was told that it was applied went over the radio; return how many."""
+    """Assert that every command reported to the console as applied went over the radio; return how many."""
     applied = [event for event in events if isinstance(event, CommandApplied)]
     for event in applied:
         payload = radio_link.encode_drive(event.values["left_rad_s"], event.values["right_rad_s"])

@@ -76,7 +76,7 @@ def the_world() -> WorldDescription:
 
 
 def is_in_view(scout: ScoutPlace, target: Target, world_s: float) -> bool:
-    """Say whether any of the target could be in the Scout's picture, furniture forgotten."""
+    """Return whether any part of the target could be in the Scout's picture, without regard to furniture."""
     at = where(target, world_s)
     distance_m = math.hypot(at.x_m - scout.x_m, at.y_m - scout.y_m)
     direction_rad = math.atan2(at.y_m - scout.y_m, at.x_m - scout.x_m)

@@ -175,7 +175,7 @@ async def test_two_equal_operators_have_the_robot_in_turns(served: Served) -> No
 
 
 async def holds(bus: Bus, behavior: str) -> bool:
-    """Say whether this behavior has scout1."""
+    """Return whether this behavior has scout1."""
     schedule = await bus.ask(RC_MANAGER, AskSchedule(), Schedule, within_s=5.0)
     return any(holder.arc.startswith(behavior) for rc in schedule.rcs if rc.rc == "scout1" for holder in rc.holders)
 

@@ -1,4 +1,4 @@
-"""What operators do to a running mission is told to everybody, once, with the user's name."""
+"""Every action of an operator on a running mission is published once, with the user's name."""
 
 from __future__ import annotations
 

@@ -145,7 +145,7 @@ class HandOperatedGrabber:
 
 
 class Owner(Component[Any]):
-    """A decision process that keeps what it was told."""
+    """A decision process that keeps its notices."""
 
     accepts = ArcNotice
 
@@ -243,7 +243,7 @@ class Pool:
         return await self.start(Owner, name, None, Subsystem.MISSION_CONTROL)
 
     async def arc(self, owner: Owner, kind: str, scout: str, **more: Any) -> ArcClient:
-        """Have an ARC for this robot started and return the owner's hold on it."""
+        """Start an ARC for this robot and return the owner's hold on it."""
         name = f"{owner.name}-{kind}"
         client = owner.know(name)
         given = {"minimum_runtime_s": 5.0, "path": [PathNode("local", 10), PathNode(owner.name, 1)]} | more

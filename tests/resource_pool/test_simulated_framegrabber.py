@@ -1,4 +1,4 @@
-"""The simulated receiver and camera: what is heard is drawn, a failed drawing is not silent, an end is prompt."""
+"""The simulated receiver and camera: a received signal is drawn, a failed drawing is reported, an end is prompt."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ DRIVER = "resource_pool.rcs.skeleton:PaintedLamp"
 
 
 def said(pool: Pool) -> list[str]:
-    """Return what the lamp told, oldest first."""
+    """Return the lamp's events, oldest first."""
     events = [event.what for event in pool.running["lamp1"].story.of("lamp1")]
     return [what for what in events if what.startswith(("shines", "is dark"))]
 

@@ -12,7 +12,7 @@ from resource_pool.stop_messages import AskStop, EmergencyStop, LiftStop
 
 
 class StoppableRobot(Component[Any]):
-    """Keeps who stopped it, and tells everybody."""
+    """Keeps the authors of its stop, and publishes it."""
 
     accepts = AskStop | EmergencyStop | LiftStop
 

@@ -44,7 +44,7 @@ class _DraftRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DraftFile:
-    """What is kept of one draft; only whoever keeps it writes there.
+    """The file that keeps one draft; only the designer that keeps it writes there.
 
     Args:
         source: The mission file.

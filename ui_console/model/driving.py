@@ -22,7 +22,7 @@ REPEAT_EVERY_S = 0.1  # chosen: 10 Hz; commands end by themselves after 0.5 s at
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
+class DriveWish:
     """Turn the wheels at these speeds, rad/s, forward is positive."""
 
     left_rad_s: float
@@ -30,12 +30,12 @@ class Drive:
 
 
 @dataclass(frozen=True, slots=True)
-class Halt:
+class HaltWish:
     """Stop the wheels."""
 
 
 @dataclass(frozen=True, slots=True)
-class Jump:
+class JumpWish:
     """Jump once."""
 
 
@@ -59,7 +59,8 @@ class StopAll:
     reason: str = ""
 
 
-Command = Drive | Halt | Jump
+Command = DriveWish | HaltWish | JumpWish
+COMMAND_WORDS: dict[type[Command], str] = {DriveWish: "drive", HaltWish: "halt", JumpWish: "jump"}
 Wish = Command | GiveBack | StopRobot | StopAll
 
 Direction = Literal["forward", "backward", "left", "right"]
@@ -67,7 +68,7 @@ Direction = Literal["forward", "backward", "left", "right"]
 STICK_LASTS_S = 0.3  # chosen: three times the interval at which sticks, pads and pages send their wish
 
 
-def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> Drive:
+def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> DriveWish:
     """Return the wheel speeds for a stick or a drag pad.
 
     Args:
@@ -77,33 +78,33 @@ def drive_by_stick(forward: float, right: float, speed_rad_s: float) -> Drive:
 
     Example:
         >>> drive_by_stick(1.0, 0.0, 4.0)
-        Drive(left_rad_s=4.0, right_rad_s=4.0)
+        DriveWish(left_rad_s=4.0, right_rad_s=4.0)
         >>> drive_by_stick(0.0, 1.0, 4.0)
-        Drive(left_rad_s=2.0, right_rad_s=-2.0)
+        DriveWish(left_rad_s=2.0, right_rad_s=-2.0)
     """
     forward, right = min(max(forward, -1.0), 1.0), min(max(right, -1.0), 1.0)
     left_share, right_share = forward + right / 2, forward - right / 2
     most = max(1.0, abs(left_share), abs(right_share))
-    return Drive(speed_rad_s * left_share / most, speed_rad_s * right_share / most)
+    return DriveWish(speed_rad_s * left_share / most, speed_rad_s * right_share / most)
 
 
-def drive_towards(direction: Direction, speed_rad_s: float) -> Drive:
+def drive_towards(direction: Direction, speed_rad_s: float) -> DriveWish:
     """Return the wheel speeds for a direction key; turns are on the spot, at half the speed.
 
     Example:
         >>> drive_towards("left", 4.0)
-        Drive(left_rad_s=-2.0, right_rad_s=2.0)
+        DriveWish(left_rad_s=-2.0, right_rad_s=2.0)
     """
     turn = speed_rad_s / 2
     match direction:
         case "forward":
-            return Drive(speed_rad_s, speed_rad_s)
+            return DriveWish(speed_rad_s, speed_rad_s)
         case "backward":
-            return Drive(-speed_rad_s, -speed_rad_s)
+            return DriveWish(-speed_rad_s, -speed_rad_s)
         case "left":
-            return Drive(-turn, turn)
+            return DriveWish(-turn, turn)
         case "right":
-            return Drive(turn, -turn)
+            return DriveWish(turn, -turn)
 
 
 class DriveSpan:
@@ -117,7 +118,7 @@ class DriveSpan:
 
     def begins(self, command: Command, at_s: float) -> bool:
         """Take in an applied command; return True if a drive begins with it."""
-        if self._began_s is not None or not isinstance(command, Drive):
+        if self._began_s is not None or not isinstance(command, DriveWish):
             return False
         self._began_s = at_s
         return True
@@ -136,14 +137,14 @@ class DeadMan:
     """
 
     def __init__(self) -> None:
-        self._held: Drive | None = None
+        self._held: DriveWish | None = None
         self._pressed_s = self._until_s = self._next_s = 0.0
         self._repeats = 0
         self._must_halt = False
         self._keys, self._stick, self._jump = Grip(), Grip(), Grip()
 
     # ------------------------------------------------------------------ controls
-    def press(self, drive: Drive, now_s: float, lasts_s: float | None = None) -> bool:
+    def press(self, drive: DriveWish, now_s: float, lasts_s: float | None = None) -> bool:
         """Take in that a key is down, for the first time or again; return whether that counts.
 
         Args:
@@ -194,13 +195,13 @@ class DeadMan:
         return any(grip.is_held_back(now_s) for grip in self._grips)
 
     # ------------------------------------------------------------------ commands to send
-    def due(self, now_s: float) -> Drive | Halt | None:
+    def due(self, now_s: float) -> DriveWish | HaltWish | None:
         """Return the command to send now, if one is due; asking counts as sending."""
         if self._held is not None and now_s >= self._until_s:
             self._held, self._must_halt = None, True
         if self._held is None:
             must_halt, self._must_halt = self._must_halt, False
-            return Halt() if must_halt else None
+            return HaltWish() if must_halt else None
         if now_s < self._next_s:
             return None
         self._next_s = now_s + REPEAT_EVERY_S

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import msgspec
 
 from backbone.errors import Refusal
-from ui_console.model.driving import REPEAT_EVERY_S, Drive, GiveBack, Halt, Jump, StopAll, StopRobot, Wish
+from ui_console.model.driving import REPEAT_EVERY_S, DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot, Wish
 
 
 class WrongScript(Refusal):
@@ -96,16 +96,16 @@ class ScriptReader:
         if line.stop_all:
             return StopAll(line.reason)
         if line.halt:
-            return Halt()
+            return HaltWish()
         if line.jump:
-            return Jump()
+            return JumpWish()
         if line.release:
             return GiveBack()
         if line.left_rad_s is None or line.right_rad_s is None:
             raise self._wrong("left_rad_s and right_rad_s belong together")
         if not (math.isfinite(line.left_rad_s) and math.isfinite(line.right_rad_s)):
             raise self._wrong("a wheel speed is not finite")
-        return Drive(line.left_rad_s, line.right_rad_s)
+        return DriveWish(line.left_rad_s, line.right_rad_s)
 
     def _wrong(self, what: str) -> WrongScript:
         return WrongScript(f"script line {self._number}: {what}", line=self._number)
@@ -119,7 +119,7 @@ def read_script(text: str) -> list[Step]:
 
     Example:
         >>> read_script('{"at_s": 0, "halt": true}')
-        [Step(at_s=0.0, wish=Halt(), at_once=False)]
+        [Step(at_s=0.0, wish=HaltWish(), at_once=False)]
     """
     reader = ScriptReader()
     return [step for line in text.splitlines() if (step := reader.read(line)) is not None]
@@ -136,7 +136,7 @@ class ScriptPlayer:
     def __init__(self, steps: list[Step] | None = None) -> None:
         self._steps = deque(steps or [])
         self._ended = steps is not None
-        self._drive: Drive | None = None
+        self._drive: DriveWish | None = None
         self._next_s = 0.0
         self._over = self.must_let_go = False
         self.held_back = 0
@@ -168,13 +168,13 @@ class ScriptPlayer:
         wishes: list[Wish] = []
         while self._steps and self._steps[0].at_s <= since_grant_s and not self._over:
             wish = self._steps.popleft().wish
-            self.must_let_go = self.must_let_go and not isinstance(wish, Halt)
-            if self.must_let_go and isinstance(wish, Drive | Jump):
+            self.must_let_go = self.must_let_go and not isinstance(wish, HaltWish)
+            if self.must_let_go and isinstance(wish, DriveWish | JumpWish):
                 self.held_back += 1
                 continue
             self._over = isinstance(wish, GiveBack)
-            if isinstance(wish, Drive | Halt | GiveBack):
-                self._drive = wish if isinstance(wish, Drive) else None
+            if isinstance(wish, DriveWish | HaltWish | GiveBack):
+                self._drive = wish if isinstance(wish, DriveWish) else None
             self._next_s = since_grant_s + REPEAT_EVERY_S
             wishes.append(wish)
         if self._ended and not self._steps and not self._over:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from backbone.errors import LinkError, Refusal
 from backbone.mission_log.operators import OperatorAction
 from resource_pool.arc_client import EmergencyStopped
-from ui_console.model.driving import Command, DeadMan, Drive, DriveSpan, Halt, Jump
+from ui_console.model.driving import COMMAND_WORDS, Command, DeadMan, DriveSpan, DriveWish, HaltWish, JumpWish
 from ui_console.model.events import CommandApplied, LetGoNeeded, LinkTrouble, MomentBegan, failed
 
 if TYPE_CHECKING:
     from resource_pool.arc_client import Applied, ArcClient
-    from ui_console.session.observer import Observer
+    from ui_console.session.observer import AnyObserver
 
 
 class Controls:
@@ -24,7 +24,7 @@ class Controls:
         console: The console.
     """
 
-    def __init__(self, console: Observer[Any]) -> None:
+    def __init__(self, console: AnyObserver) -> None:
         self._console = console
         self._dead_man, self._span = DeadMan(), DriveSpan()
         self._pressed = asyncio.Event()
@@ -54,7 +54,7 @@ class Controls:
         self._console.show(MomentBegan(self._console.clock.now_s()))
 
     # ------------------------------------------------------------------ the operator's controls
-    def hold(self, drive: Drive, lasts_s: float | None = None) -> None:
+    def hold(self, drive: DriveWish, lasts_s: float | None = None) -> None:
         """Take in that a drive key is down: the command repeats until the hold ends, then the wheels stop.
 
         Args:
@@ -110,11 +110,11 @@ class Controls:
         wanted_s = time.perf_counter()
         try:
             match command:
-                case Drive(left_rad_s, right_rad_s):
+                case DriveWish(left_rad_s, right_rad_s):
                     applied = await self._arc.drive(left_rad_s, right_rad_s)
-                case Halt():
+                case HaltWish():
                     applied = await self._arc.halt()
-                case Jump():
+                case JumpWish():
                     applied = await self._arc.jump()
         except Refusal as refusal:
             if isinstance(refusal, EmergencyStopped):
@@ -123,7 +123,7 @@ class Controls:
             return False
         except LinkError as error:
             self.require_let_go()  # an operator who is cut off for a moment does not see the robot's next moves
-            show(LinkTrouble(now_s(), str(error), type(command).__name__.lower()))
+            show(LinkTrouble(now_s(), str(error), COMMAND_WORDS[type(command)]))
             return False
         took_s = time.perf_counter() - wanted_s
         self._record_applied(command, applied)
@@ -142,7 +142,7 @@ class Controls:
         if self._span.begins(command, applied.at_s):
             speeds = ", ".join(f"{name.partition('_')[0]} {value:+.1f}" for name, value in applied.values.items())
             self._console.acted(OperatorAction.DRIVE_BEGIN, applied.rc, f"{speeds} rad/s")
-        elif isinstance(command, Jump):
+        elif isinstance(command, JumpWish):
             self._console.acted(OperatorAction.JUMP, applied.rc)
-        elif isinstance(command, Halt):
+        elif isinstance(command, HaltWish):
             self.record_drive_end(applied.rc)

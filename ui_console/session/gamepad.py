@@ -13,10 +13,10 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.errors import Refusal
-from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 
 try:
     import evdev
@@ -103,7 +103,7 @@ class Stick:
             return BUTTONS.get(event.code)
         return None
 
-    def wanted(self, speed_rad_s: float) -> Drive | None:
+    def wanted(self, speed_rad_s: float) -> DriveWish | None:
         """Return the drive command now; None: the dead-man button is not held."""
         if not self._held:
             return None
@@ -132,7 +132,7 @@ async def play_gamepad(
     device: Gamepad,
     stick: Stick,
     *,
-    hold: Callable[[Drive, float], None],
+    hold: Callable[[DriveWish, float], None],
     stop: Callable[[], None],
     wish: Callable[[PadWish], None],
     speed_rad_s: Callable[[], float],
@@ -190,7 +190,7 @@ async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
 
 def buttons_help() -> list[str]:
     """Return the actions of the gamepad's buttons, for people."""
-    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
+    names: dict[int, str] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),

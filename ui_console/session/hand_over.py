@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from enum import StrEnum
-from typing import Any
 
 from backbone.addresses import RC_MANAGER
 from backbone.errors import LinkError, Refusal
@@ -19,7 +18,7 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message
 from ui_console.session.feed import REPLY_TIME_S
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 
 class AskHandOver(Message, frozen=True):
@@ -36,7 +35,7 @@ class AskHandOver(Message, frozen=True):
     since_s: Instant
 
 
-class Outcome(StrEnum):
+class ClaimOutcome(StrEnum):
     """Outcome of two claims."""
 
     GIVEN = "given"  # the robot is free for the asker
@@ -47,10 +46,10 @@ class Outcome(StrEnum):
 class HandedOver(Message, frozen=True):
     """Answer to ``AskHandOver``."""
 
-    outcome: Outcome
+    outcome: ClaimOutcome
 
 
-def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_script: bool) -> Outcome:
+def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_script: bool) -> ClaimOutcome:
     """Return the outcome for the asker's claim.
 
     Args:
@@ -63,11 +62,11 @@ def decide(asked: AskHandOver, user: str, robot: str, since_s: float, *, by_scri
     Example:
         >>> asked = AskHandOver("scout1", "anna", 5.0)
         >>> decide(asked, "anna", "scout1", 2.0, by_script=False), decide(asked, "ben", "scout1", 2.0, by_script=False)
-        (<Outcome.GIVEN: 'given'>, <Outcome.NOT_YOURS: 'not_yours'>)
+        (<ClaimOutcome.GIVEN: 'given'>, <ClaimOutcome.NOT_YOURS: 'not_yours'>)
     """
     if not user or asked.user != user or asked.robot != robot or by_script:
-        return Outcome.NOT_YOURS
-    return Outcome.GIVEN if asked.since_s > since_s else Outcome.NEWER
+        return ClaimOutcome.NOT_YOURS
+    return ClaimOutcome.GIVEN if asked.since_s > since_s else ClaimOutcome.NEWER
 
 
 class HandOver:
@@ -78,7 +77,7 @@ class HandOver:
         give_back: Gives its robot back, or its claim up, for the reason it is called with.
     """
 
-    def __init__(self, console: Observer[Any], give_back: Callable[[str], Awaitable[None]]) -> None:
+    def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
         self._reason = f"{console.user} goes on at another screen"
 
@@ -99,20 +98,20 @@ class HandOver:
         arcs = {holder.arc for rc in schedule.rcs if rc.rc == robot for holder in rc.holders}
         owners = {request.owner for request in schedule.requests if request.arc in arcs}
         for screen in sorted(owner for owner in owners if is_console(owner) and owner != console.address):
-            if await self._ask(screen, AskHandOver(robot, console.user, since_s)) is Outcome.NEWER:
+            if await self._ask(screen, AskHandOver(robot, console.user, since_s)) is ClaimOutcome.NEWER:
                 await self._give_back(self._reason)
                 return
 
     async def answer(self, asked: AskHandOver, robot: str, since_s: float, *, by_script: bool) -> HandedOver:
         """Give the robot back if this console's person goes on at another one; see ``decide``."""
         outcome = decide(asked, self._console.person(), robot, since_s, by_script=by_script)
-        if outcome is Outcome.GIVEN:
+        if outcome is ClaimOutcome.GIVEN:
             await self._give_back(self._reason)
         return HandedOver(outcome)
 
-    async def _ask(self, holder: str, question: AskHandOver) -> Outcome:
+    async def _ask(self, holder: str, question: AskHandOver) -> ClaimOutcome:
         try:
             answer = await self._console.bus.ask(holder, question, HandedOver, within_s=REPLY_TIME_S)
         except (Refusal, LinkError):  # a console of another make, or a console that left: the scheduler's rule decides
-            return Outcome.NOT_YOURS
+            return ClaimOutcome.NOT_YOURS
         return answer.outcome

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import sys
 from pathlib import Path
-from typing import Any
 
 from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
@@ -23,7 +22,7 @@ from ui_console.session.teleoperation import Teleoperation
 STANDARD_INPUT = "-"
 
 
-async def drive_by_script(where: Where, wished: dict[str, Any], user: str, script: str, within_s: float) -> int:
+async def drive_by_script(where: Where, wished: dict[str, object], user: str, script: str, within_s: float) -> int:
     """Drive a robot by a script; return the command's exit code.
 
     Args:

@@ -10,7 +10,6 @@ import socket
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
@@ -20,7 +19,7 @@ from backbone.command_line.where import Where
 from backbone.component.launch import Launch
 from backbone.launcher.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
 
@@ -50,7 +49,7 @@ class Joining:
         return await ZenohBus.open_when_up(who.mission, who.address, self.clock, config)
 
 
-async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joining:
+async def join(where: Where, parameters: dict[str, object] | None = None) -> Joining:
     """Return the identity of this process in the mission.
 
     Args:
@@ -86,7 +85,7 @@ async def join(where: Where, parameters: dict[str, Any] | None = None) -> Joinin
     return Joining(launch, clock, secret)
 
 
-def end_on_signals(console: Observer[Any]) -> Callable[[], bool]:
+def end_on_signals(console: AnyObserver) -> Callable[[], bool]:
     """Make SIGINT and SIGTERM end the console in good order; the result returns whether SIGINT came."""
     return _end_on(console.end, signal.SIGINT, signal.SIGTERM)
 

@@ -13,7 +13,7 @@ from backbone.picture.words import UNDECIDED
 from backbone.rc_manager.messages import StaleEpoch
 from resource_pool.arc_client import StopState, Suspended, SwappedOut
 from ui_console.model import events
-from ui_console.model.driving import Drive, GiveBack, Halt, Jump, StopAll, StopRobot
+from ui_console.model.driving import DriveWish, GiveBack, HaltWish, JumpWish, StopAll, StopRobot
 from ui_console.model.script import ScriptPlayer, ScriptReader, Step, WrongScript
 from ui_console.session.teleoperation import Teleoperation
 
@@ -131,9 +131,9 @@ class ScriptDriver:
                         return
                     case StopRobot() | StopAll():
                         await self._stop(console, wish)
-                    case Jump():
+                    case JumpWish():
                         await console.do(wish)
-                    case Drive() | Halt() if console.is_held:
+                    case DriveWish() | HaltWish() if console.is_held:
                         await console.do(wish)
             await self._wait_news(console, granted_s)
 

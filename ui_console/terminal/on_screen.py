@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
@@ -35,7 +34,7 @@ class Looks:
     has_gamepad: bool
 
 
-async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> int:
+async def drive_by_hand(where: Where, wished: dict[str, object], looks: Looks) -> int:
     """Drive a robot by keys; return the command's exit code.
 
     Args:

@@ -17,7 +17,7 @@ from textual.widget import Widget
 from textual.widgets import Static
 
 from backbone.spoken import counted
-from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
+from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
 from ui_console.terminal.keys import Hint, key_lines
 from ui_console.terminal.lines import Row, laid_out
 from ui_console.terminal.pixels import MOST_ROWS, row_of_cells, send
@@ -178,7 +178,7 @@ class DrivePad(Widget):
     class Dragged(Message):
         """The pad is being dragged; repeated every ``SAY_EVERY_S``."""
 
-        def __init__(self, drive: Drive) -> None:
+        def __init__(self, drive: DriveWish) -> None:
             super().__init__()
             self.drive, self.lasts_s = drive, STICK_LASTS_S
 

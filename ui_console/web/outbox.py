@@ -21,7 +21,7 @@ ANSWERS_KEPT = 20  # chosen: more than a person asks before reading
 
 
 @dataclass(slots=True)
-class _Stream:
+class _PictureStream:
     waiting: tuple[int, float, bytes] | None = None
     underway: dict[int, tuple[float, float]] = field(default_factory=dict)  # number → (sent, captured)
     turn: int = 0
@@ -34,7 +34,7 @@ class Outbox:
         self._sections: dict[str, bytes] = {}
         self._unsent: dict[str, None] = {}
         self._answers: deque[bytes] = deque(maxlen=ANSWERS_KEPT)
-        self._streams: dict[str, _Stream] = {}
+        self._streams: dict[str, _PictureStream] = {}
         self._turns = 0
         self.skipped = 0
         """Pictures that a newer one replaced before they were sent."""
@@ -61,7 +61,7 @@ class Outbox:
 
     def watch(self, robots: frozenset[str]) -> None:
         """Show these robots' pictures and no others."""
-        self._streams = {robot: self._streams.get(robot) or _Stream() for robot in sorted(robots)}
+        self._streams = {robot: self._streams.get(robot) or _PictureStream() for robot in sorted(robots)}
 
     @property
     def watched(self) -> frozenset[str]:
@@ -121,7 +121,7 @@ class Outbox:
         return min(held, default=None)
 
 
-def _has_room(stream: _Stream, now_s: float) -> bool:
+def _has_room(stream: _PictureStream, now_s: float) -> bool:
     if len(stream.underway) >= PICTURES_UNDERWAY:
         stream.underway = {n: at for n, at in stream.underway.items() if now_s < at[0] + DRAWN_WITHIN_S}
     return len(stream.underway) < PICTURES_UNDERWAY

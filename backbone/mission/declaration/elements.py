@@ -54,7 +54,7 @@ class Host(Declared):
 
     @property
     def is_loopback(self) -> bool:
-        """True if the address means the machine 'up' is typed on, whatever machine that is."""
+        """True if the address means the machine on which 'up' is typed, without its name."""
         return is_loopback(self.address)
 
 

@@ -8,15 +8,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from random import Random
-from typing import Any
 
 import msgspec
 
 from backbone.component_database.messages import ComponentType
 from backbone.creator.messages import creator_name
 from backbone.dependency_database.messages import Resource
-from backbone.mission.model import ArcWish, Behavior, CoreService, Host, MissionDescription
-from backbone.mission.model import Component as MissionComponent
+from backbone.mission.model import (
+    ArcWish,
+    BehaviorDescription,
+    ComponentDescription,
+    CoreServiceDescription,
+    Host,
+    MissionDescription,
+)
 from backbone.naming import Subsystem
 from mission_control.laboratory.simulation.shape import MISSION, POOL, POOL_TYPES, MissionShape, draw_shape
 
@@ -50,7 +55,7 @@ class SupervisedShape:
     pool: MissionShape
     hosts: tuple[str, ...]
     places: dict[str, str]
-    trees: tuple[Behavior, ...]
+    trees: tuple[BehaviorDescription, ...]
 
     def groups(self) -> list[list[str]]:
         """Return the targets of faults, by kind: core services, creators, RCs, ARCs, owners, nodes of the tree."""
@@ -87,12 +92,14 @@ class SupervisedShape:
         types.append(ComponentType("console", OWNER, Subsystem.UI_CONSOLE))
         types.append(ComponentType("owner", OWNER, Subsystem.MISSION_CONTROL))
         types.append(ComponentType("node", NODE, Subsystem.MISSION_CONTROL))
-        services = [CoreService(type="nameserver", host=self.hosts[0])]
+        services = [CoreServiceDescription(type="nameserver", host=self.hosts[0])]
         for name in CORE:
             where = self.hosts if name == "creator" else self.hosts[:1]
-            services += [CoreService(type=name, host=host, parameters=self._core_parameters(name)) for host in where]
+            services += [
+                CoreServiceDescription(type=name, host=host, parameters=self._core_parameters(name)) for host in where
+            ]
         owners = [
-            MissionComponent(
+            ComponentDescription(
                 type="console" if owner.console else "owner",
                 name=owner.name,
                 parameters=self.pool.owner_parameters(owner),
@@ -113,18 +120,18 @@ class SupervisedShape:
             source="a seed",
         )
 
-    def _core_parameters(self, service: str) -> dict[str, Any]:
+    def _core_parameters(self, service: str) -> dict[str, object]:
         return {"grace_s": self.pool.grace_s, "policy": self.pool.policy} if service == "rc_manager" else {}
 
 
-def walk(nodes: tuple[Behavior, ...]) -> Iterator[Behavior]:
+def walk(nodes: tuple[BehaviorDescription, ...]) -> Iterator[BehaviorDescription]:
     """Yield every node, parents before their children."""
     for node in nodes:
         yield node
         yield from walk(node.children)
 
 
-def arc_of(node: Behavior) -> str:
+def arc_of(node: BehaviorDescription) -> str:
     """Return the name of the node's ARC."""
     assert node.arc is not None  # noqa: S101  asked only of those that have one
     return f"{node.name}-{node.arc.kind}"
@@ -140,22 +147,22 @@ def draw_supervised_shape(seed: int) -> SupervisedShape:
     return SupervisedShape(seed, pool, hosts, places, trees)
 
 
-def _tree(dice: Random, name: str, resources: tuple[Resource, ...]) -> Behavior:
+def _tree(dice: Random, name: str, resources: tuple[Resource, ...]) -> BehaviorDescription:
     process = SHARED_PROCESS if dice.random() < 0.4 else ""
     leaves = tuple(
         _node(dice, f"{name}-leaf{number}", resources, process) for number in range(1, dice.randint(1, 3) + 1)
     )
-    tree = Behavior(type="node", name=name, priority=0, children=leaves)
+    tree = BehaviorDescription(type="node", name=name, priority=0, children=leaves)
     return _sharing(tree, "" if dice.random() < 0.5 else process)
 
 
-def _node(dice: Random, name: str, resources: tuple[Resource, ...], process: str) -> Behavior:
+def _node(dice: Random, name: str, resources: tuple[Resource, ...], process: str) -> BehaviorDescription:
     scouts = [resource.name for resource in resources if resource.type == "scout"]
     wish = {"scout": dice.choice(scouts)} if dice.random() < 0.5 else {}
     arc = ArcWish(kind="drive", wish=wish, minimum_runtime_s=NODE_RUNTIME_S, period_s=0.4, packet_time_s=0.02)
-    node = Behavior(type="node", name=name, priority=0, arc=arc if dice.random() < 0.7 else None)
+    node = BehaviorDescription(type="node", name=name, priority=0, arc=arc if dice.random() < 0.7 else None)
     return _sharing(node, process)
 
 
-def _sharing(node: Behavior, process: str) -> Behavior:
+def _sharing(node: BehaviorDescription, process: str) -> BehaviorDescription:
     return node.model_copy(update={"process": process}) if process else node

@@ -42,7 +42,7 @@ class Echoed(Message, frozen=True):
 
 
 class Other(Message, frozen=True):
-    """A message nobody in these tests accepts."""
+    """A message that no component of these tests accepts."""
 
 
 class News(Message, frozen=True):

@@ -235,7 +235,7 @@ async def test_a_hub_sees_its_own_link_up_whoever_comes_and_goes() -> None:
 
 
 async def until_gone(hub: ZenohBus) -> None:
-    """Return when a token declared and withdrawn by a last client has fallen, so what fell before it was told too."""
+    """Return when a token declared and withdrawn by a last client has fallen: earlier falls were reported too."""
     fallen = asyncio.Event()
     watching = hub.watch_alive(SERVER, lambda _address, alive: None if alive else fallen.set())
     other = hub.declare_alive(SERVER)

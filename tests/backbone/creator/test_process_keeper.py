@@ -67,7 +67,7 @@ def on_bench(local_mission: Callable) -> Callable[[Callable[[Bench], Awaitable[N
             zygote, fell, vitals = InProcessZygote(network), [], dict[int, Vitals]()
 
             def look(_folder: str, pid: int) -> Vitals:
-                """Every process beats at each look, unless the test says what is seen."""
+                """Every process beats at each look, unless the test sets the beats."""
                 return vitals.get(pid) or Vitals(int(now_s() * 1000))
 
             keeper = ProcessKeeper(zygote, VirtualClock(), look)

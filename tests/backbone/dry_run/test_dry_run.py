@@ -1,4 +1,4 @@
-"""A dry run tells what the mission would do, before anything starts."""
+"""A dry run shows the mission's first minute before it starts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
 from backbone.dry_run.run import dry_run, placements, requests
 from backbone.dry_run.screen import bars, screen
-from backbone.mission.model import ArcWish, Behavior, CoreService, Host, MissionDescription
+from backbone.mission.model import ArcWish, BehaviorDescription, CoreServiceDescription, Host, MissionDescription
 from backbone.mission.reader import read_mission
 from backbone.naming import Subsystem
 from backbone.scheduling.requests import RcUse, Usage
@@ -27,7 +27,7 @@ MISSION_XML = Path(__file__).parents[3] / "mission.xml"
 
 
 def mission(
-    *behaviors: Behavior, tags: tuple[str, ...] = (), robots: int = 2, **types: list[str]
+    *behaviors: BehaviorDescription, tags: tuple[str, ...] = (), robots: int = 2, **types: list[str]
 ) -> MissionDescription:
     """Return a mission with one radio, one video frequency, two robots and these behaviors.
 
@@ -45,7 +45,7 @@ def mission(
         name="m",
         priority=10,
         hosts=(Host(name="a", address="127.0.0.1", tags=tags), Host(name="b", address="192.0.2.2")),
-        core=(CoreService(type="nameserver", host="a"),),
+        core=(CoreServiceDescription(type="nameserver", host="a"),),
         types=(component_type("watch"), component_type("capture", kinds), *map(component_type, kinds)),
         resources=(
             Resource("radio", "command_radio", sharable=True),
@@ -58,7 +58,7 @@ def mission(
     )
 
 
-def watch(name: str, priority: int = 1, *, robot: str = "", run_s: float = 5.0, **more: Any) -> Behavior:
+def watch(name: str, priority: int = 1, *, robot: str = "", run_s: float = 5.0, **more: Any) -> BehaviorDescription:
     arc = ArcWish(
         kind="capture",
         wish={"scout": robot} if robot else {},
@@ -66,7 +66,7 @@ def watch(name: str, priority: int = 1, *, robot: str = "", run_s: float = 5.0, 
         period_s=0.1,
         packet_time_s=more.pop("packet_time_s", 0.01),
     )
-    return Behavior(type="watch", name=name, priority=priority, arc=arc, **more)
+    return BehaviorDescription(type="watch", name=name, priority=priority, arc=arc, **more)
 
 
 # ---------------------------------------------------------------------- placement
@@ -95,7 +95,7 @@ def test_a_component_no_host_can_take_goes_nowhere_and_its_requests_wait_visibly
 
 
 def test_children_of_a_behavior_without_a_host_do_not_start() -> None:
-    parent = watch("parent", children=(Behavior(type="capture", name="child", priority=1),))
+    parent = watch("parent", children=(BehaviorDescription(type="capture", name="child", priority=1),))
     dry = dry_run(mission(parent, watch=["gl"]))
     assert "child" not in [one.name for one in dry.placed]
     assert dry.claimed[0].refused == "parent has no host, so no ARC is asked for"
@@ -125,7 +125,7 @@ def test_a_lower_behavior_never_runs_and_the_higher_one_is_named() -> None:
 
 
 def test_priorities_count_by_place_in_the_tree() -> None:
-    group = Behavior(type="watch", name="group", priority=5, children=(watch("child", 1, robot="scout1"),))
+    group = BehaviorDescription(type="watch", name="group", priority=5, children=(watch("child", 1, robot="scout1"),))
     dry = dry_run(mission(watch("other", 4, robot="scout2"), group))
     other, child = dry.claimed
     assert (other.never_runs, child.never_runs) == (True, False)

@@ -48,7 +48,7 @@ class BusOnACable(LocalBus):
 
 @dataclass
 class FakeCreator:
-    """Keeps nothing, and notes what it is told."""
+    """Keeps nothing, and notes its calls."""
 
     on_fell: Callable[[ProcessFell], None] = lambda _fell: None
     runs: bool = False

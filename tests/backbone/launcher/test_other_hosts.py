@@ -1,4 +1,4 @@
-"""Which machines of a mission are missing, and what is typed there."""
+"""The missing machines of a mission, and the commands to type there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A question to the log becomes one that the launcher understands, or a typed refusal, whatever is typed."""
+"""Any typed question to the log becomes a valid question to the launcher, or a typed refusal."""
 
 from __future__ import annotations
 

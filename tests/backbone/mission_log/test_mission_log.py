@@ -1,4 +1,4 @@
-"""The log keeps what was told and done, and each filter lets through just what it says."""
+"""The log keeps events and actions, and each filter passes exactly its matches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever a person does can be said in one line with the name of who did it."""
+"""Every action of a person is one line with that person's name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Consoles and what they claim are called by the person who sits there, in whatever is read."""
+"""Every text names the person at a console instead of the console and its ARCs."""
 
 from __future__ import annotations
 

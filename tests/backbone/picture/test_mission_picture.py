@@ -1,4 +1,4 @@
-"""What a look at a mission says of those who did not answer, and of what is wanted and absent."""
+"""A look at a mission reports services that did not answer, and wanted components that are absent."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def process(name: str, subsystem: Subsystem = Subsystem.RESOURCE_POOL, pid: int 
 
 
 def serve(network: LocalNetwork, address: str, answers: dict[type[Message], Message]) -> Any:
-    """Have a component at this address answer these questions."""
+    """Answer these questions by a component at this address."""
     accepts: Any = None
     for question in answers:
         accepts = question if accepts is None else accepts | question
@@ -56,7 +56,7 @@ WHOLE = Components(LISTED, True, 0.0)
 def core(
     network: LocalNetwork, listing: Components = WHOLE, processes: tuple[ProcessState, ...] = ()
 ) -> dict[str, Any]:
-    """Have all core services that are asked by a look answer."""
+    """Answer all questions of a look by core services."""
     time = {AskTime: MissionTime(1.0, 1.0)}
     return {
         NAMESERVER: serve(network, NAMESERVER, {ListComponents: listing}),

@@ -256,7 +256,7 @@ async def test_a_loaded_host_gets_fewer(one: Mission) -> None:
 
 @on("a", "b")
 async def test_a_start_that_a_leaving_creator_gives_up_goes_to_another_host(one: Mission) -> None:
-    """A creator that ends politely ends what is starting there too; that says nothing against the component."""
+    """A creator that drains also ends components that are starting there; that is no fault of these components."""
     leaving = one.creators["a"]
     leaving.spawn_s, leaving.fails = 0.5, ["watcher-1"]
     one.creators["b"].tell_load(cpu=0.9)
@@ -422,7 +422,7 @@ async def test_what_a_component_wanted_ends_with_an_order_to_stop_it(one: Missio
 
 @on("a")
 async def test_what_nobody_wants_any_more_is_ended(one: Mission) -> None:
-    """The owner and the placer died at the same moment, and nobody brought the owner back."""
+    """The owner and the placer died at the same moment, and no component restarted the owner."""
     gone = one.network.join("mission_control/gone", one.clock)
     await gone.ask(PLACER, Start("watcher", "child"), Started, within_s=10.0)
     await gone.close()

@@ -20,7 +20,7 @@ SETTLED_S = 0.3  # chosen: some events of the bus later
 
 
 def serve_placer(bus: Bus) -> None:
-    """Have it believe that its creator mends whatever is missing."""
+    """Let it believe that its creator restarts all missing components."""
 
     async def answer(asked: Envelope[Start | AskPlacement]) -> Message:
         if isinstance(asked.body, Start):

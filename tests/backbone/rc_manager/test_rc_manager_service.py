@@ -75,7 +75,7 @@ HARDWARE = [
 
 
 class PlainRc(Component[Any]):
-    """An RC that keeps the rules to the letter and says when somebody else does not."""
+    """An RC that keeps the rules to the letter and reports violations of others."""
 
     accepts = Connect | Disconnect | AskRc
     sharable = False
@@ -114,7 +114,7 @@ class PlainRc(Component[Any]):
 
 
 class PlainArc(Component[Any]):
-    """An ARC that opens and closes as told."""
+    """An ARC that opens and closes on order."""
 
     accepts = OpenGate | CloseGate | AskRequest
 

@@ -1,4 +1,4 @@
-"""Faults that somebody could put into the scheduling core: each a change of one place, each caught by the tests."""
+"""Faults that a change could put into the scheduling core: each at one place, each caught by the tests."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ SAFETY = {"FORM", "EXCL", "CAP", "RTA", "DOWN", "MINRUN", "PRIO", "DEMOTE", "GRA
 @settings(max_examples=80, derandomize=True)
 @given(seeds)
 def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardware_safe(seed):
-    """It may leave a gap or let a younger equal go first; nobody is cut short and nobody waits for a lower one."""
+    """The plan may leave a gap or let a younger equal go first; no slice is cut short, no ARC waits for a lower one."""
     found = violations(play(*random_mission(Random(seed), exact_up_to=0)))
     assert [one for one in found if one.code in SAFETY] == []
 

@@ -1,4 +1,4 @@
-"""The scenarios that tell readings of the papers apart: H priority 2, L priority 1, 5 s slices."""
+"""The scenarios that distinguish readings of the papers: H priority 2, L priority 1, 5 s slices."""
 
 from __future__ import annotations
 

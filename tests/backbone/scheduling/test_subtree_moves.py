@@ -24,7 +24,7 @@ Way = tuple[str, ...]
 
 # ---------------------------------------------------------------------- the tree
 class PlainTree:
-    """A behavior tree as anybody would write it down: each node has a parent and a number."""
+    """A plain behavior tree: each node has a parent and a number."""
 
     def __init__(self, rng: Random) -> None:
         self.parent: dict[str, str] = {}

@@ -93,7 +93,7 @@ def test_without_those_that_why_names_a_waiting_arc_is_granted_after_one_hand_ov
 
 
 def test_beside_others_a_slice_that_is_over_but_for_rounding_is_over() -> None:
-    """Something happened at 14.25 s, when a slice ended at 14.250000000000002 s: nobody looked again."""
+    """An event came at 14.25 s, when a slice ended at 14.250000000000002 s: no decision followed."""
     assert granted_without_blockers(252, moment(252, {"exact_up_to": 0})) is None
 
 
@@ -106,7 +106,7 @@ def test_without_those_that_why_names_each_of_a_thousand_is_granted(rules: dict[
 
 
 def test_with_aging_why_is_nearly_always_enough() -> None:
-    """Who goes takes the levels along by which it had raised its parents, and so who is higher may change."""
+    """An ARC that leaves takes the levels along by which it had raised its parents, so the order may change."""
     assert len(untrue(100, {"aging_s": 7.0})) <= 10
 
 

@@ -47,7 +47,7 @@ class Page:
         await self.socket.send(json.dumps(message))
 
     async def change(self, **message: Any) -> dict[str, Any] | None:
-        """Say a change of what is shown now; return the answer to it once it was handled, None if there was none."""
+        """Send a change of the present draft; return the answer once it was handled, None if there was none."""
         handled, heard = self.view.get("handled", 0), len(self.answers)
         await self.say(revision=self.view["status"]["revision"], **message)
         await self.wait(lambda: self.view.get("handled", 0) > handled, f"handled {message}")

@@ -15,7 +15,7 @@ FACTS = {
 
 
 def tutorial_draft(source: str = "guard.xml") -> Draft:
-    """Return the mission of the design tutorial, whatever hands build it."""
+    """Return the mission of the design tutorial, as every pointer has to build it."""
 
     def path_of(tag: str, name: str) -> tuple[int, ...]:
         return next(node.path for node in draft.mission if (node.tag, node.text("name")) == (tag, name))

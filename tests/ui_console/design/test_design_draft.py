@@ -174,7 +174,7 @@ def test_what_the_text_means_is_what_the_reader_reads(tmp_path: Path) -> None:
 
 
 def test_a_problem_is_about_the_element_it_stands_in() -> None:
-    """Whatever stands before it in its line, and with a byte order mark."""
+    """With any text before it in its line, and with a byte order mark."""
     for mark in (b"", b"\xef\xbb\xbf"):
         text = mark + SHIPPED[0].read_bytes().replace(b'x-m="7.20"', 'x-m="ü"'.encode())
         draft = Draft("mission.xml", TextState(text))

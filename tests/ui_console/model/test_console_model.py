@@ -419,7 +419,7 @@ def test_a_schedule_in_json_names_its_fields() -> None:
 
 
 def test_a_slice_that_ends_now_has_no_number_and_one_kept_longer_says_so() -> None:
-    """Schedules that nobody waits in let a console keep its robot beyond its slice."""
+    """Schedules without a waiting ARC let a console keep its robot beyond its slice."""
     shown = held_model()
     assert shown.status_line(GRANT.until_s - 3.0).endswith("slice 3 s")
     assert "slice" not in shown.status_line(GRANT.until_s - 0.4)

@@ -52,7 +52,7 @@ class RcManager(Component[Any]):
 
 
 class Robot(Component[Any]):
-    """Only stops and moves again; says nothing any more when it is told to."""
+    """Only stops and moves again; silent on request."""
 
     accepts = AskStop | EmergencyStop | LiftStop
 

@@ -1,4 +1,4 @@
-"""A stop is lifted by its author at once, by others if each author who is there agrees; silence keeps it."""
+"""The author of a stop lifts it at once, others if each author who is there agrees; silence keeps it."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_who_stopped_under_no_name_is_known_by_the_console() -> None:
 
 # ---------------------------------------------------------------------- three people at consoles that only watch
 class Person:
-    """Somebody at a console, and what its screens show."""
+    """A person at a console, and the content of its screens."""
 
     def __init__(self, name: str, stage: Stage, console: str = "") -> None:
         self.name, self.clock = name, stage.clock
@@ -132,7 +132,7 @@ class Stage:
                 await self.clock.sleep_s(0.01)
 
     def lift(self, name: str) -> Any:
-        """Have this person lift the stop that is in force."""
+        """Lift the stop in force by this person."""
         console = self.people[name].console
         return asyncio.ensure_future(console.lift_stop("scout1", self.robot.latch.state.number))
 

@@ -1,4 +1,4 @@
-"""Over HTTPS a page and its socket are read by nobody on the way; real sockets on the loopback."""
+"""HTTPS keeps a page and its socket secret on the way; real sockets on the loopback."""
 
 from __future__ import annotations
 

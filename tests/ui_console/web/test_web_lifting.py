@@ -1,4 +1,4 @@
-"""Somebody at a page is asked whether a stop they set may be lifted, and one who closed the page is not."""
+"""A person at a page is asked whether their stop may be lifted; a person who closed the page is not."""
 
 from __future__ import annotations
 

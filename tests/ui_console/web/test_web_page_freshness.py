@@ -29,7 +29,7 @@ addEventListener("DOMContentLoaded", () => setInterval(() => {
 
 
 async def test_the_age_of_what_is_shown_counts_from_the_newest_beat_that_came_back(stage: Stage) -> None:
-    """The pure part: whatever came back late, out of order or never, nothing counts as younger than it is."""
+    """The pure part: beats may come back late, out of order or never; no content counts as younger than it is."""
     async with page_at(stage) as page:
         ages = await page.evaluate("""async () => {
           const { Freshness, makeClock } = await import("./freshness.js");

@@ -96,7 +96,7 @@ class Served:
             writer.close()
 
     async def crowd(self, stack: ExitStack, many: int, says: bytes) -> list[socket.socket]:
-        """Have many come who say this and nothing more, and read nothing."""
+        """Connect many clients that send this and nothing more, and read nothing."""
         came = []
         for _ in range(many):
             one = stack.enter_context(socket.socket())

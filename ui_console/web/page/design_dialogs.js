@@ -1,4 +1,4 @@
-// Questions: one dialog to answer, one to choose, one to read. Each is a promise; null means that nothing was chosen.
+// Questions: one dialog to answer, one to choose, one to read. Each is a promise; null: the person chose nothing.
 
 import { find, make, makeButton, query } from "./dom.js";
 
@@ -96,7 +96,7 @@ export function read(title, text, line = 1) {
 }
 
 /**
- * Makes an input, or a select where what can be meant can be listed.
+ * Makes an input, or a select if the choices can be listed.
  *
  * @param {string[]} choices
  * @returns {Input}

@@ -1,4 +1,4 @@
-"""Links to the hub: what is said over them waits for a short cut, is lost in a long one, and tokens tell of it."""
+"""Links to the hub: messages wait during a short cut, are lost in a long one, and tokens show it."""
 
 from __future__ import annotations
 
