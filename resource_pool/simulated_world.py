@@ -7,8 +7,6 @@ Other processes draw pictures from the state that it publishes once a frame.
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from backbone.bus.interface import Bus, Clock
@@ -84,7 +82,7 @@ class SimulatedWorld(Component[WorldParameters]):
             self._world.step_frame()
             self._publish(frame, due_s)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``AskWorld`` and ``AskPose``."""
         match asked.body:
             case AskWorld():
@@ -116,8 +114,8 @@ class SimulatedWorld(Component[WorldParameters]):
             "frames": self._world.frame,
         }
 
-    def _hear(self, envelope: Envelope[Any]) -> None:
-        packet: RadioPacket = envelope.body
+    def _hear(self, envelope: Envelope[RadioPacket]) -> None:
+        packet = envelope.body
         self._packets += 1
         if packet.epoch < self._epochs.get(packet.network_id, 0):
             self._stale += 1

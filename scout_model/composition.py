@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from importlib import resources
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -167,7 +166,9 @@ def _grey(level: float) -> list[float]:
     return [level, level, level, 1.0]
 
 
-def _box(parent: Any, name: str, centre_m: list[float], size_m: list[float], level: float, group: int) -> None:
+def _box(
+    parent: mujoco.MjsBody, name: str, centre_m: list[float], size_m: list[float], level: float, group: int
+) -> None:
     """Add a box that is seen and, unless it is a mark, touched; ``size_m`` is its full extent."""
     is_solid = group != _MARKS
     parent.add_geom(
@@ -182,7 +183,9 @@ def _box(parent: Any, name: str, centre_m: list[float], size_m: list[float], lev
     )
 
 
-def _cylinder(parent: Any, name: str, radius_m: float, bottom_m: float, top_m: float, level: float, group: int) -> None:
+def _cylinder(
+    parent: mujoco.MjsBody, name: str, radius_m: float, bottom_m: float, top_m: float, level: float, group: int
+) -> None:
     is_solid = group != _MARKS
     parent.add_geom(
         name=name,
@@ -196,7 +199,7 @@ def _cylinder(parent: Any, name: str, radius_m: float, bottom_m: float, top_m: f
     )
 
 
-def _add_walls(spec: Any, description: WorldDescription) -> None:
+def _add_walls(spec: mujoco.MjSpec, description: WorldDescription) -> None:
     width_m, depth_m = description.width_m, description.depth_m
     half_m, height_m = _WALL_THICKNESS_M / 2, WALL_HEIGHT_M
     world = spec.worldbody
@@ -207,7 +210,7 @@ def _add_walls(spec: Any, description: WorldDescription) -> None:
     _box(world, "wall_east", [width_m + half_m, depth_m / 2, height_m / 2], along_y, 0.78, 0)
 
 
-def _add_marks(spec: Any, description: WorldDescription) -> None:
+def _add_marks(spec: mujoco.MjSpec, description: WorldDescription) -> None:
     """Put lines on the floor, and skirting boards and posters on the walls, so that a picture shows motion."""
     width_m, depth_m = description.width_m, description.depth_m
     rng = np.random.default_rng(description.seed)
@@ -243,7 +246,7 @@ def _below_tables(description: WorldDescription) -> list[DarkPlace]:
     ]
 
 
-def _add_dark_place(spec: Any, dark: DarkPlace, description: WorldDescription) -> None:
+def _add_dark_place(spec: mujoco.MjSpec, dark: DarkPlace, description: WorldDescription) -> None:
     """Darken floor and walls, and leave a site that tells cameras what else to darken."""
     world = spec.worldbody
     size_m = [dark.width_m, dark.depth_m, dark.height_m]
@@ -275,7 +278,7 @@ def _add_dark_place(spec: Any, dark: DarkPlace, description: WorldDescription) -
             _box(world, f"shade/{dark.name}_{side}", [dark.x_m, wall_m, middle_m], size_m, level, _MARKS)
 
 
-def _add_furniture(spec: Any, furniture: Furniture, dark_places: list[DarkPlace]) -> None:
+def _add_furniture(spec: mujoco.MjSpec, furniture: Furniture, dark_places: list[DarkPlace]) -> None:
     world, x_m, y_m, height_m = spec.worldbody, furniture.x_m, furniture.y_m, furniture.height_m
     if furniture.shape == "box":
         is_dark = any(_is_in(furniture, dark) for dark in dark_places)
@@ -309,7 +312,7 @@ def _turned(heading_rad: float) -> list[float]:
     return [math.cos(heading_rad / 2), 0.0, 0.0, math.sin(heading_rad / 2)]
 
 
-def _add_ramp(spec: Any, ramp: Ramp) -> None:
+def _add_ramp(spec: mujoco.MjSpec, ramp: Ramp) -> None:
     """Add a wedge. A tilted board would leave an edge at its foot, and be seen below the floor."""
     half_m, across_m, height_m = ramp.length_m / 2, ramp.width_m / 2, ramp.height_m
     corners_m = [
@@ -329,7 +332,7 @@ def _add_ramp(spec: Any, ramp: Ramp) -> None:
     )
 
 
-def _add_landmark(spec: Any, landmark: Landmark) -> None:
+def _add_landmark(spec: mujoco.MjSpec, landmark: Landmark) -> None:
     body = spec.worldbody.add_body(
         name=landmark.name, pos=[landmark.x_m, landmark.y_m, 0.0], quat=_turned(landmark.heading_rad)
     )
@@ -349,7 +352,7 @@ def _add_landmark(spec: Any, landmark: Landmark) -> None:
         )
 
 
-def _add_robot(spec: Any, place: ScoutPlace) -> None:
+def _add_robot(spec: mujoco.MjSpec, place: ScoutPlace) -> None:
     frame = spec.worldbody.add_frame(pos=[place.x_m, place.y_m, 0.0], quat=_turned(place.heading_rad))
     try:
         body = mujoco.MjSpec.from_string(robot_class(place.kind).body_mjcf())
@@ -358,7 +361,7 @@ def _add_robot(spec: Any, place: ScoutPlace) -> None:
         raise InvalidWorld(f"the body of {place.name}, a {place.kind}, cannot be built: {error}") from error
 
 
-def _add_target(spec: Any, target: Target) -> None:
+def _add_target(spec: mujoco.MjSpec, target: Target) -> None:
     # A mocap body must hang on the world, so each swinging leg of a person is a body of its own.
     body, *legs = (
         spec.worldbody.add_body(name=part.body, mocap=True, pos=part.position_m, quat=part.quaternion)
@@ -375,7 +378,7 @@ def _add_target(spec: Any, target: Target) -> None:
     _shape_person(body, legs, target.name)
 
 
-def _shape_carrier(body: Any, name: str) -> None:
+def _shape_carrier(body: mujoco.MjsBody, name: str) -> None:
     length_m, width_m = CARRIER_LENGTH_M, CARRIER_WIDTH_M
     hull_m, deck_m = [length_m, width_m - 0.10, CARRIER_DECK_M - 0.08], [length_m, width_m, 0.03]
     _box(body, f"{name}/hull", [0.0, 0.0, 0.05 + hull_m[2] / 2], hull_m, 0.35, _THINGS)
@@ -392,7 +395,7 @@ def _shape_carrier(body: Any, name: str) -> None:
         )
 
 
-def _shape_person(body: Any, legs: list[Any], name: str) -> None:
+def _shape_person(body: mujoco.MjsBody, legs: list[mujoco.MjsBody], name: str) -> None:
     head_m, shoulder_m = 0.11, PERSON_HEIGHT_M - 0.28
     body.add_geom(
         name=f"{name}/torso",

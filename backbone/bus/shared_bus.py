@@ -15,11 +15,11 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, Listener, Reply, Subscription
+from backbone.bus.interface import Answer, Clock, LifeListener, Listener, Reply, Subscription
 from backbone.bus.local_bus import LocalNetwork, Neighbor
-from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session
+from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
 from backbone.keys import Conversation
-from backbone.wire import Message
+from backbone.wire import Accepts, Message
 
 AGAIN_AFTER_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)  # chosen: together as long as a lost link stands unnoticed
 
@@ -36,6 +36,7 @@ class SharedSession:
 
     def __init__(self, mission: str, endpoint: str, secret: str = "") -> None:
         self._session = open_session(client_config(endpoint, secret))
+        self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
 
     def join(self, source: str, clock: Clock) -> SharedBus:
@@ -61,7 +62,7 @@ class SharedBus(Neighbor, ZenohBus):
             return await self.ask_neighbor(address, question, reply, within_s=within_s)
         return await super().ask(address, question, reply, within_s=within_s)
 
-    def serve(self, address: str, accepts: Accepted, answer: Answer) -> Subscription:
+    def serve(self, address: str, accepts: Accepts, answer: Answer) -> Subscription:
         """Answer questions to this address; see ``Bus.serve``."""
         elsewhere = super().serve(address, accepts, answer)
         return _Both(self.serve_neighbors(address, accepts, answer), elsewhere)
@@ -72,7 +73,7 @@ class SharedBus(Neighbor, ZenohBus):
             self.publish_to_neighbors(address, conversation, self.send(address, conversation, message))
 
     def subscribe(
-        self, address: str, conversation: Conversation, accepts: Accepted, listener: Listener, *, latest: bool = False
+        self, address: str, conversation: Conversation, accepts: Accepts, listener: Listener, *, latest: bool = False
     ) -> Subscription:
         """Subscribe to publications; see ``Bus.subscribe``."""
         elsewhere = super().subscribe(address, conversation, accepts, listener, latest=latest)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from backbone.addresses import NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus
@@ -46,7 +45,7 @@ class ShownAttributes:
 
     name: str
     requests: Sequence[RequestAttributes]
-    parameters: Mapping[str, Any] | None
+    parameters: Mapping[str, object] | None
 
     def lines(self) -> list[str]:
         """Return all attributes as lines for people."""
@@ -75,7 +74,7 @@ class ShownAttributes:
             raise WrongAttribute(f"{self.name} has no {attribute}", name=self.name)
         return lines
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return all attributes as plain data."""
         return {"name": self.name, "requests": [*map(_plain, self.requests)], "parameters": self.parameters}
 
@@ -101,7 +100,7 @@ async def attributes_of(bus: Bus, name: str) -> ShownAttributes:
     return ShownAttributes(name, requests, values)
 
 
-async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> list[str]:
+async def change(bus: Bus, name: str, attribute: str, value: object, user: str) -> list[str]:
     """Change one attribute; the next decision of RC manager, ARC or component uses the new value.
 
     Args:
@@ -129,7 +128,7 @@ async def change(bus: Bus, name: str, attribute: str, value: Any, user: str) -> 
     return await _set_parameter(bus, name, attribute, value, user)
 
 
-async def _set_priority(bus: Bus, name: str, value: Any) -> list[str]:
+async def _set_priority(bus: Bus, name: str, value: object) -> list[str]:
     if isinstance(value, bool) or not isinstance(value, int):
         raise WrongAttribute(f"the priority of {name} cannot be {value!r}", name=name)
     await bus.ask(RC_MANAGER, SetPriority(name, value), Done, within_s=REPLY_TIME_S)
@@ -140,13 +139,13 @@ async def _set_priority(bus: Bus, name: str, value: Any) -> list[str]:
     return [f"{name}: priority is {value}", *(f"  {one.arc} has {_path(one.path)}" for one in found.requests)]
 
 
-async def _move(bus: Bus, name: str, value: Any) -> list[str]:
+async def _move(bus: Bus, name: str, value: object) -> list[str]:
     await bus.ask(RC_MANAGER, MoveNode(name, str(value)), Done, within_s=REPLY_TIME_S)
     found = await bus.ask(RC_MANAGER, AskAttributes(name), Attributes, within_s=REPLY_TIME_S)
     return [f"{name}: parent is {value}", *(f"  {one.arc} has {_path(one.path)}" for one in found.requests)]
 
 
-async def _set_parameter(bus: Bus, name: str, parameter: str, value: Any, user: str) -> list[str]:
+async def _set_parameter(bus: Bus, name: str, parameter: str, value: object, user: str) -> list[str]:
     now = await bus.ask(
         await _address(bus, name), SetParameter(parameter, value, user), Parameters, within_s=REPLY_TIME_S
     )
@@ -157,7 +156,7 @@ async def _address(bus: Bus, name: str) -> str:
     return (await bus.ask(NAMESERVER, Resolve(name), Resolved, within_s=REPLY_TIME_S)).component.address
 
 
-def _plain(request: RequestAttributes) -> dict[str, Any]:
+def _plain(request: RequestAttributes) -> dict[str, object]:
     uses = {rc: plain(use.streams) for rc, use in request.uses.items()}
     return {**plain(request), "uses": uses}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from typing import IO, Any
+from typing import IO
 
 from rich.console import Console
 from rich.live import Live
@@ -15,19 +15,21 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.launcher.bring_up import Outcome, run_mission
+from backbone.launcher.bring_up import run_mission
 from backbone.launcher.core_launches import UpOptions
 from backbone.launcher.endings import ExitCode, complaint_of
+from backbone.launcher.outcome import Outcome
 from backbone.launcher.verdict import VerdictPipe
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.operators import OperatorActed
 from backbone.naming import Subsystem
 from backbone.picture.health import HealthWord, MissionHealth
 from backbone.picture.look import look
-from backbone.picture.mission import MissionPicture, Said, holders_line
+from backbone.picture.mission import MissionPicture, holders_line
 from backbone.picture.screen import live_screen
 from backbone.picture.words import absence_line
-from backbone.printable import printable_all, printable_lines
+from backbone.printable import printable_all
+from backbone.printable_text import printable_lines
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
@@ -106,8 +108,8 @@ class ConsoleObserver:
                 live.update(live_screen(picture, picture.log.newest(EVENTS_KEPT), console.height), refresh=True)
                 await clock.sleep_s(REDRAW_EVERY_S * clock.rate)
 
-    def _heard_health(self, envelope: Envelope[Any]) -> None:
-        heard: MissionHealth = printable_all(envelope.body)
+    def _heard_health(self, envelope: Envelope[MissionHealth]) -> None:
+        heard = printable_all(envelope.body)
         if not self._is_up:
             self._heard_while_coming_up(heard, envelope.stamp_s)
             return
@@ -129,15 +131,15 @@ class ConsoleObserver:
             for absence in heard.absent:
                 self.tell(f"  … {absence_line(absence, at_s)}")
 
-    def _heard(self, envelope: Envelope[Any]) -> None:
-        said: Said = printable_all(envelope.body)
+    def _heard(self, envelope: Envelope[StoryEvent | OperatorActed | ComponentState]) -> None:
+        said = printable_all(envelope.body)
         self._picture.take(said, envelope.source)
         if not self._live and not isinstance(said, ComponentState):
             [event] = self._picture.log.newest(1)
             self._print(f"{event.at_s:9.2f} s  {event.subject}: {event.what}")
 
-    def _heard_schedule(self, envelope: Envelope[Any]) -> None:
-        schedule: Schedule = envelope.body
+    def _heard_schedule(self, envelope: Envelope[Schedule]) -> None:
+        schedule = envelope.body
         if any(request.state in (RequestState.CONNECTING, RequestState.REVOKING) for request in schedule.requests):
             return
         line = self._picture.people.named(holders_line(schedule))

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
+
+from backbone.command_line.where import Where
+from backbone.errors import BackboneError
 
 DISTRIBUTION = "scout-backbone"
 
@@ -48,7 +51,7 @@ def _convert_only_what_needs_it(parameters: Iterable[Any]) -> None:
         parameter.process_value = partial(_processed, parameter.process_value, parameter.required)
 
 
-def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: Any) -> Any:
+def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx: Any, value: object) -> Any:
     """Return the value as the command gets it; an absent optional value, or one beside completions, stays as it is."""
     is_absent = value is None and not is_required
     return value if is_absent or ctx.resilient_parsing else process_value(ctx, value)
@@ -56,6 +59,20 @@ def _processed(process_value: Callable[[Any, Any], Any], is_required: bool, ctx:
 
 def _first_paragraph(text: str) -> str:
     return " ".join(text.partition("\n\n")[0].split())
+
+
+def run(work: Callable[[], Awaitable[int]]) -> NoReturn:
+    """Run a command's coroutine and end the process with its exit code; a refusal becomes one line."""
+    from backbone.command_line.event_loop import exit_code_of
+
+    raise typer.Exit(exit_code_of(work))
+
+
+def chosen(mission: str | None, endpoint: str | None, secret_file: Path | None) -> Where:
+    """Return the mission that the options name; a hub elsewhere needs the mission's name."""
+    if endpoint is not None and mission is None:
+        raise typer.BadParameter("--connect needs --mission NAME")
+    return Where(mission, endpoint, secret_file)
 
 
 def print_version(is_asked: bool) -> None:
@@ -79,7 +96,6 @@ def hub_endpoint(value: str | None) -> str | None:
 
 def complete_mission() -> list[str]:
     """Return the missions that are up on this machine."""
-    from backbone.errors import BackboneError
     from backbone.run_files import find_all
 
     try:

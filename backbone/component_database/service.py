@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from backbone.addresses import NAMESERVER
@@ -53,7 +51,7 @@ class ComponentDatabase(Component[ComponentDatabaseParameters]):
         """Use the new types from now on."""
         self._catalogue = Catalogue(self.parameters.types)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Admit`` and ``ListTypes``."""
         match asked.body:
             case Admit(type=type_name, name=name):

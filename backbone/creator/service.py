@@ -8,7 +8,7 @@ Source: S000, "creator"; RAM 2002, "Backbone".
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 import psutil
@@ -34,8 +34,9 @@ from backbone.creator.messages import (
     Spawned,
     UnlistedType,
 )
-from backbone.creator.process_keeper import Forks, ProcessKeeper, ReadVitals
-from backbone.creator.zygote import Zygote
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.signs_of_life import ReadVitals
+from backbone.creator.zygote import Forks, Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
 from backbone.wire import Envelope, Message, UnknownMessage
@@ -114,7 +115,7 @@ class Creator(Component[CreatorParameters]):
             self._publish_load()
             await self.clock.sleep_s(LOAD_EACH_S * self.clock.rate)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Spawn`` and ``EndProcess`` of the placer, and ``ListProcesses`` of any component."""
         question: Message = asked.body
         match question:
@@ -198,7 +199,7 @@ class Creator(Component[CreatorParameters]):
         self.story.note(order.name, f"is ready, pid {pid}, ordered by {order.requester or PLACER}")
         return Spawned(launch.address, pid)
 
-    def _refuse_strangers(self, asked: Envelope[Any]) -> None:
+    def _refuse_strangers(self, asked: Envelope[Message]) -> None:
         if asked.source != PLACER:
             raise NotThePlacer(f"{asked.source} asked {self.address} for {type(asked.body).__name__}")
 

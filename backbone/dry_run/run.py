@@ -27,11 +27,13 @@ from backbone.placer.placement import CandidateHost, place
 from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
-from backbone.scheduling.rehearsal import Line, Rehearsal, Timetable
+from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.requests import SchedulingRequest, Usage
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.scheduling.trace import Line
 from backbone.scheduling.views import Why
 
 FIRST_MINUTE_S = 60.0
@@ -136,10 +138,11 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
     for rc in _rcs(description, hosts):
         rehearsal.tell(rc)
+    answers = Answers(manager)
     asked = [_ask(manager, rehearsal, claim, hosts) for claim in _claims(description)]
     rehearsal.run(for_s)
     timetable = Timetable(rehearsal.trace, rehearsal.now_s)
-    claimed = [_claimed(manager, timetable, one) for one in asked]
+    claimed = [_claimed(answers, timetable, one) for one in asked]
     return DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
 
 
@@ -276,7 +279,7 @@ def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _BehaviorClaim, 
     return _Asked(claim, rcs)
 
 
-def _claimed(manager: ScheduleManager, timetable: Timetable, asked: _Asked) -> Claimed:
+def _claimed(answers: Answers, timetable: Timetable, asked: _Asked) -> Claimed:
     claim, wish = asked.claim, asked.claim.behavior.arc
     grants = [run.grant_s for run in timetable.of_arc(claim.arc) if run.grant_s is not None]
     return Claimed(
@@ -289,7 +292,7 @@ def _claimed(manager: ScheduleManager, timetable: Timetable, asked: _Asked) -> C
         turns=len(grants),
         first_grant_s=min(grants, default=None),
         worst_wait_s=timetable.worst_wait_s(claim.arc),
-        why=None if asked.refused else manager.why(claim.arc, timetable.end_s),
+        why=None if asked.refused else answers.why(claim.arc, timetable.end_s),
     )
 
 

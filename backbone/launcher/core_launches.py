@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.component.launch import Launch
-from backbone.creator.messages import creator_name
+from backbone.creator.messages import RestartPolicy, creator_name
 from backbone.creator.preload import arc_modules
 from backbone.mission.model import Host, MissionDescription
 from backbone.naming import Subsystem
+
+CORE_POLICY = RestartPolicy(
+    back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
+)  # chosen: a dead hub stops all components, and leases outlast a restart of the RC manager only if its pause is short
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ def core_launches(description: MissionDescription, own: Launch, options: UpOptio
     types = [msgspec.to_builtins(component_type) for component_type in description.types]
     resources = [msgspec.to_builtins(resource) for resource in description.resources]
     trace = str(options.trace.absolute()) if options.trace else ""
-    parameters: dict[str, Callable[[Host], dict[str, Any]]] = {
+    parameters: dict[str, Callable[[Host], dict[str, object]]] = {
         "component_database": lambda _: {"types": types},
         "placer": lambda _: {},
         "creator": lambda host: {
@@ -88,7 +91,7 @@ def launcher_launch(description: MissionDescription, endpoint: str, clock: Missi
 
 
 def service_launch(
-    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, Any]
+    own: Launch, component_type: str, name: str, description: MissionDescription, parameters: dict[str, object]
 ) -> Launch:
     """Return the launch of a core service on the launcher's host."""
     class_path = next(t.class_path for t in description.types if t.name == component_type)

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from backbone.authentication import read_secret_file
 from backbone.bus.clock import MissionClock
@@ -34,7 +34,7 @@ from backbone.errors import HubUnreachable, LinkError, Refusal
 from backbone.launcher.kept_creator import KeepsCreator, KeptCreator, Offered
 from backbone.launcher.mission_connection import clock_elsewhere, mission_clock
 from backbone.naming import Subsystem, legal
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 
 OFFER_TYPE = "offer"
 CUT_OFF_S = 3.0  # chosen: a cut shows after 2 s (the link's lease), a killed hub at once and is back within 3 s
@@ -59,7 +59,7 @@ class MachineOffer(Component[NoParameters]):
         ending: Why it ended; valid after ``run``.
     """
 
-    accepts: ClassVar[Any] = ListProcesses
+    accepts: ClassVar[Accepts | None] = ListProcesses
 
     def __init__(
         self, launch: Launch, bus: Bus, clock: Clock, creator: KeepsCreator, on_ready: Callable[[], None]
@@ -79,7 +79,7 @@ class MachineOffer(Component[NoParameters]):
         """Report that the machine is in the mission."""
         self._on_ready()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``ListProcesses`` with the creator's process."""
         if isinstance(asked.body, ListProcesses):
             return Processes(self.launch.host, [], self._creator.processes())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from backbone.component_database.messages import ComponentType
 from backbone.dependency_database.messages import Resource
@@ -116,7 +115,7 @@ def _world(world: WorldElement, resources: Sequence[ResourceElement], source: st
     )
 
 
-def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> dict[str, Any]:
+def _world_content(world: WorldElement, ids: Mapping[str, object], source: str) -> dict[str, object]:
     """Return the world as plain data, with the field names of ``scout_model.description.WorldDescription``."""
     return {
         "width_m": world.room.width_m,
@@ -136,7 +135,7 @@ def _world_content(world: WorldElement, ids: Mapping[str, Any], source: str) -> 
     }
 
 
-def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
+def _body(declared: Declared, *left_out: str) -> dict[str, object]:
     """Return the attributes of a body, its heading in radians."""
     values = declared.model_dump(exclude=set(left_out))
     if "heading_deg" in values:
@@ -144,5 +143,5 @@ def _body(declared: Declared, *left_out: str) -> dict[str, Any]:
     return values
 
 
-def _target(target: TargetElement) -> dict[str, Any]:
+def _target(target: TargetElement) -> dict[str, object]:
     return {**_body(target, "point"), "path": [[point.x_m, point.y_m] for point in target.point]}

@@ -107,6 +107,6 @@ class MissionDescription(_Part):
         """Machines besides the one that runs the nameserver; each offers itself by a command typed there."""
         return tuple(host for host in self.hosts[1:] if not host.is_loopback)
 
-    def core_parameters(self, service: str) -> dict[str, Any]:
+    def core_parameters(self, service: str) -> dict[str, object]:
         """Return what the file sets of a core service's parameters, of the first of this type."""
         return next((dict(core.parameters) for core in self.core if core.type == service), {})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 from backbone.component.messages import LogLevel, StoryEvent
 from backbone.mission_log.log import Log
@@ -34,7 +33,7 @@ def _about(event: StoryEvent) -> str:
     return "" if event.what.startswith(f"{event.subject} ") else event.subject
 
 
-def log_json(log: Log, now: Now) -> dict[str, Any]:
+def log_json(log: Log, now: Now) -> dict[str, object]:
     """Return the events, each also with the time of day, as plain data."""
     events = [timed_event_json(event, now) for event in log.events]
     return {"events": events, "left_out": log.left_out, "since_s": log.since_s}
@@ -49,18 +48,18 @@ def story_lines(events: Iterable[StoryEvent]) -> list[str]:
     ]
 
 
-def story_json(name: str, events: Iterable[StoryEvent], missing: Sequence[str]) -> dict[str, Any]:
+def story_json(name: str, events: Iterable[StoryEvent], missing: Sequence[str]) -> dict[str, object]:
     """Return a story as plain data; ``missing`` names the components that did not answer."""
     return {"name": name, "events": [event_json(event) for event in events], "missing": list(missing)}
 
 
-def timed_event_json(event: StoryEvent, now: Now) -> dict[str, Any]:
+def timed_event_json(event: StoryEvent, now: Now) -> dict[str, object]:
     """Return one event with the time of day as plain data."""
     time = now.time_of_day(event.at_s).astimezone().isoformat(timespec="milliseconds")
     return event_json(event) | {"time": time}
 
 
-def event_json(event: StoryEvent) -> dict[str, Any]:
+def event_json(event: StoryEvent) -> dict[str, object]:
     """Return one event as plain data."""
     return {
         "at_s": event.at_s,

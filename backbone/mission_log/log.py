@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from itertools import islice
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -169,7 +169,7 @@ class LogKeeper:
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
         bus.subscribe(f"{Subsystem.UI_CONSOLE}/*", Conversation.STATUS, ComponentState, self._heard, latest=True)
 
-    def _heard(self, envelope: Envelope[Any]) -> None:
+    def _heard(self, envelope: Envelope[StoryEvent | OperatorActed | ComponentState]) -> None:
         self.log.take(printable_all(envelope.body), envelope.source, envelope.cause)
 
 

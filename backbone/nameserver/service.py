@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from pathlib import Path
-from typing import Any, assert_never
+from typing import assert_never
 
 import msgspec
 
@@ -113,7 +113,7 @@ class Nameserver(Component[NameserverParameters]):
             address = await self._to_introduce.get()
             self.start_task(self._introduce(address), f"introduce {address}")
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Register``, ``Resolve`` and ``ListComponents``."""
         match asked.body:
             case Register(component=component):

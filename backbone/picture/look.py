@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
-from typing import Any
 
 import msgspec
 
@@ -25,6 +24,7 @@ from backbone.printable import printable_all
 from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.spoken import counted
+from backbone.wire import Message
 
 LOOK_TIME_S = 1.0  # chosen: a person waits this long for a picture
 NAMES_SHOWN = 8  # chosen: a line of a terminal
@@ -53,9 +53,10 @@ async def look(
         return before
     picture = before or MissionPicture(bus.mission, rate=rate)
     keepers = sorted({LAUNCHER, *(one.address for one in listing.components if one.type == CREATOR)})
-    question, answer = (AskSchedule(), Schedule) if schedule else (AskTime(), MissionTime)
     answers = await asyncio.gather(
-        _ask_or_absence(bus, now_s, RC_MANAGER, question, answer),
+        _ask_or_absence(bus, now_s, RC_MANAGER, AskSchedule(), Schedule)
+        if schedule
+        else _ask_or_absence(bus, now_s, RC_MANAGER, AskTime(), MissionTime),
         _ask_or_absence(bus, now_s, PLACER, AskTime(), MissionTime),
         *(_ask_or_absence(bus, now_s, keeper, ListProcesses(), Processes) for keeper in keepers),
     )
@@ -81,7 +82,9 @@ def _gone_stale(picture: MissionPicture, silence: Absence, now_s: float) -> None
     picture.at_s = now_s
 
 
-async def _ask_or_absence(bus: Bus, now_s: float, address: str, question: Any, reply: type[Any]) -> Any:
+async def _ask_or_absence(
+    bus: Bus, now_s: float, address: str, question: Message, reply: type[Schedule | MissionTime | Processes]
+) -> Schedule | MissionTime | Processes | Absence:
     """Return the answer, or the absence of the component that did not answer."""
     try:
         return printable_all(await bus.ask(address, question, reply, within_s=LOOK_TIME_S))

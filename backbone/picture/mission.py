@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any, assert_never
+from typing import assert_never
 
 from backbone.component.messages import Absence, ComponentState, LifeState, MissionTime, StandingStop, StoryEvent
 from backbone.creator.messages import Processes, ProcessState
@@ -146,7 +146,7 @@ class MissionPicture:
         process = self.processes.get(component_of(component.address))
         return process.restarts if process else 0
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the whole picture as plain data."""
         shown = ("type", "host", "pid", "state", "since_s", "feedback", "requester")
         components = [

@@ -5,10 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from backbone.addresses import LAUNCHER, NAMESERVER, PLACER, RC_MANAGER
-from backbone.bus.interface import Bus, Clock
+from backbone.bus.interface import Bus, Clock, Reply
 from backbone.component.messages import Absence, AskStory, ComponentState, Story, StoryEvent
 from backbone.component.story import LENGTH as STORY_LENGTH
 from backbone.creator.messages import TYPE as CREATOR
@@ -28,7 +27,7 @@ from backbone.rc_manager.messages import AskWhy
 from backbone.scheduling.requests import RequestState, UnknownRequest
 from backbone.scheduling.views import Why
 from backbone.spoken import counted
-from backbone.wire import plain
+from backbone.wire import Message, plain
 
 REPLY_TIME_S = 1.0  # chosen: a person waits this long
 
@@ -92,7 +91,7 @@ class Reasons:
             lines += [f"  {event.at_s:.3f} s  {event.where}  {event.subject}: {event.what}" for event in self.led_to]
         return lines
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the reasons as plain data."""
         return {
             "name": self.name,
@@ -163,8 +162,8 @@ async def reasons_for(bus: Bus, text: str, clock: Clock) -> Reasons:
         picture.people,
     )
     if not reasons.is_known:
-        errors = (why, placement, resolved)
-        raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), resolved)
+        errors = [one for one in (why, placement, resolved) if isinstance(one, Refusal | LinkError)]
+        raise next((e for e in errors if not isinstance(e, UnknownName | UnknownRequest | NotPlaced)), errors[-1])
     return printable_all(reasons)
 
 
@@ -219,9 +218,9 @@ async def story_of(bus: Bus, text: str, clock: Clock) -> Told:
     """
     asked = AskedName.of(text)
     listing = await bus.ask(NAMESERVER, ListComponents(), Components, within_s=REPLY_TIME_S)
-    picture, *stories = await asyncio.gather(
+    picture, stories = await asyncio.gather(
         _seen(bus, clock),
-        *(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components),
+        asyncio.gather(*(_or_error(bus, c.address, _question(c.address, asked), Story) for c in listing.components)),
     )
     events = [event for story in stories if isinstance(story, Story) for event in story.events]
     missing = [
@@ -261,7 +260,7 @@ def _question(address: str, asked: AskedName) -> AskStory:
     return AskStory() if component_of(address) == asked.name else AskStory(asked.name)
 
 
-async def _or_error(bus: Bus, address: str, question: Any, reply: type[Any]) -> Any:
+async def _or_error(bus: Bus, address: str, question: Message, reply: type[Reply]) -> Reply | Refusal | LinkError:
     try:
         return await bus.ask(address, question, reply, within_s=REPLY_TIME_S)
     except (Refusal, LinkError) as error:

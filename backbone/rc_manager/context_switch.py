@@ -19,7 +19,6 @@ import logging
 import math
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.errors import LinkError, Refusal
@@ -45,7 +44,7 @@ ARC_REPLY_S = 1.0  # chosen: an ARC asks RCs before it opens
 CONFIRM_S = 0.04  # chosen: ten round trips, within the tolerance of a trace; also for RCs that are late already
 CLOSE_S = 0.2  # chosen: an ARC shuts its gate in milliseconds; a hung ARC must not cost the next one its turn
 
-Note = Callable[[str, str], Any]
+Note = Callable[[str, str], object]
 Hold = tuple[str, str, int]
 """RC, ARC and epoch."""
 
@@ -119,8 +118,8 @@ class ContextSwitch:
             True if it confirmed the end of all holds.
         """
         left = self._left[rc]
-        while holds := {*found, *(hold for hold, until_s in left.items() if until_s > self._clock.now_s())}:
-            if await self._disconnect([*holds], "held from before it was down", math.inf):
+        while holds := [*dict.fromkeys([*found, *(one for one in left if left[one] > self._clock.now_s())])]:
+            if await self._disconnect(holds, "held from before it was down", math.inf):
                 return False
             found = ()
             for hold in holds:

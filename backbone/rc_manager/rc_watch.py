@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Coroutine, Iterable
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.addresses import PLACER
 from backbone.bus.interface import Bus, Clock
@@ -47,7 +47,7 @@ class Service(Protocol):
     def publish_event(self, subject: str, what: str, level: LogLevel) -> None:
         """Publish an event about the subject to the mission's log."""
 
-    def start_task(self, work: Coroutine[Any, Any, None], name: str) -> object:
+    def start_task(self, work: Coroutine[object, None, None], name: str) -> object:
         """Run the coroutine until the component ends."""
 
 

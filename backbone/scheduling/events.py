@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from backbone.scheduling.requests import SchedulingRequest
+from backbone.scheduling.trace import Line
 
 
 # ---------------------------------------------------------------------- events
@@ -249,7 +249,7 @@ class Record:
         cause: One line for people, of the rule that decided.
     """
 
-    line: Mapping[str, Any]
+    line: Line
     cause: str = ""
 
 

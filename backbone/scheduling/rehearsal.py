@@ -32,10 +32,9 @@ from backbone.scheduling.events import (
     WakeAt,
     Woken,
 )
+from backbone.scheduling.trace import Line
 
 MOST_AT_ONCE = 1000  # chosen: far above the two connections of one ARC that any schedule needs at one instant
-
-Line = Mapping[str, Any]
 
 
 class Decides(Protocol):

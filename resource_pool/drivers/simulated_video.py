@@ -101,8 +101,8 @@ class SimulatedFramegrabber:
             await asyncio.get_running_loop().run_in_executor(self._thread, self._studio.close)
         self._thread.shutdown()
 
-    def _world_moved(self, envelope: Envelope[Any]) -> None:
-        state: WorldState = envelope.body
+    def _world_moved(self, envelope: Envelope[WorldState]) -> None:
+        state = envelope.body
         if self._deliver is None or self._is_drawing or state.at_s < self._next_s - EARLY_S:
             return
         in_time = state.at_s < self._next_s + self._pause_s

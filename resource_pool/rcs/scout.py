@@ -110,7 +110,7 @@ class Scout(ResourceController[ScoutParameters]):
         """Send no further command; the radio sends the safe packet at its own disconnection."""
         self._holder, self._halt_at_s, self._frequency = None, None, ""
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer operators, too, who need no grant to stop the robot."""
         match asked.body:
             case AskStop():
@@ -129,9 +129,11 @@ class Scout(ResourceController[ScoutParameters]):
             case _:
                 return await super().answer(asked)
 
-    async def command(self, asked: Envelope[Any]) -> Message:
+    async def command(self, asked: Envelope[Message]) -> Message:
         """Drive, halt, jump, or switch the transmitter."""
-        order: CommandScout = asked.body
+        order = asked.body
+        if not isinstance(order, CommandScout):
+            return await super().command(asked)
         if isinstance(order.command, Drive) and not _is_finite(order.command):
             raise NotFinite(
                 f"{self.name}: wheel speeds {order.command.left_rad_s} and {order.command.right_rad_s} rad/s"

@@ -69,6 +69,23 @@ def test_the_walls_stand(edges: set[walls.Import]) -> None:
     assert walls.broken(CONTRACTS, edges) == {}
 
 
+def folder_of(module: str) -> str:
+    return ".".join(MODULES[module].relative_to(TOP).parts[:-1])
+
+
+def test_no_folder_and_no_file_imports_what_imports_it(edges: set[walls.Import]) -> None:
+    own = {(importer, imported) for importer, imported in edges if imported in MODULES}
+    assert walls.circle(own, folder_of) == []
+    assert walls.circle(own, lambda module: module) == []
+
+
+def test_a_planted_circle_is_found(edges: set[walls.Import]) -> None:
+    back = ("backbone.errors", "backbone.launcher.endings")
+    own = {(importer, imported) for importer, imported in edges if imported in MODULES} | {back}
+    assert walls.circle(own, folder_of)
+    assert walls.circle(own, lambda module: module)
+
+
 def test_every_wall_has_a_planted_violation() -> None:
     assert {wall for wall, _file, _line in PLANTED} == {contract["id"] for contract in CONTRACTS}
 
@@ -149,6 +166,16 @@ def test_only_the_clock_sleeps() -> None:
                 ) if not (isinstance(argument, ast.Constant) and argument.value == 0):
                     sleepers.add(name)
     assert sleepers == {"backbone.bus.clock"}
+
+
+def test_any_is_rare() -> None:
+    """``Any`` turns the type checker off; it is for struct fields and libraries whose values really are of any kind."""
+    texts = [file.read_text() for file in MODULES.values()]
+    trees = [ast.parse(text) for text in texts if "import Any" in text or ", Any" in text]
+    names = [node.id for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Name)]
+    count = names.count("Any")
+    lines = sum(text.count("\n") for text in texts)
+    assert count <= 2 * lines / 1000, f"{count} in {lines} lines"
 
 
 def test_each_refusal_has_a_code_of_its_own() -> None:

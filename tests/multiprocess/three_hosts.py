@@ -71,6 +71,7 @@ class ThreeHosts:
         file: The mission file.
         offers: The commands typed on near and far.
         names: What the mission consists of when it is whole.
+        missing: What was not there when that was last asked.
         talks: Every command that was typed and let run.
         up: The command typed on base.
     """
@@ -80,6 +81,7 @@ class ThreeHosts:
     file: Path
     offers: dict[str, Talk] = field(default_factory=dict)
     names: frozenset[str] = frozenset()
+    missing: list[str] = field(default_factory=list)
     talks: list[Talk] = field(default_factory=list)
     up: Talk = field(init=False)
 

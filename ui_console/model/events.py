@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import msgspec
 
@@ -275,7 +274,7 @@ OwnEvent = (
 TeamEvent = Heard | LinkHeard
 ConsoleEvent = OwnEvent | TeamEvent
 
-_WORDS: dict[type[Any], str] = {
+_WORDS: dict[type[object], str] = {
     Suspended: "suspended",
     CommandApplied: "applied",
     CommandRefused: "refused",

@@ -7,7 +7,6 @@ negative time, age or remaining time means that there is none.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Any
 
 import msgspec
 
@@ -379,6 +378,6 @@ class ConsoleView(msgspec.Struct, frozen=True):
     health: HealthView | None = None
 
 
-def view_json(view: Any) -> bytes:
+def view_json(view: object) -> bytes:
     """Return any view as JSON, messages in it too with their fields by name."""
     return msgspec.json.encode(plain(view))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -37,7 +37,7 @@ class TeleoperationParameters(msgspec.Struct, frozen=True, forbid_unknown_fields
         """Return the name of the ARC of the console whose bus this is."""
         return arc_name(bus, self.kind)
 
-    def claim(self, address: str) -> dict[str, Any]:
+    def claim(self, address: str) -> dict[str, object]:
         """Return the parameters of the ARC of the console at this address."""
         return claim_parameters(
             address,

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any
 
 from backbone.addresses import RC_MANAGER
 from backbone.component.messages import LogLevel
@@ -30,7 +29,7 @@ from ui_console.model.consent import (
 )
 from ui_console.model.events import ConsentAsked, ConsentHeard, failed
 from ui_console.session.feed import REPLY_TIME_S
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,7 @@ class ConsentTalk:
         give_back: Gives the robot back for the reason it is called with; returns when that is done.
     """
 
-    def __init__(self, console: Observer[Any], give_back: Callable[[str], Awaitable[None]]) -> None:
+    def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
         console.answers.yield_robot = self._begin_to_yield
         self._unanswered = 0

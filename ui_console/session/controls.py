@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from backbone.errors import LinkError, Refusal
 from backbone.mission_log.operators import OperatorAction
@@ -14,7 +14,7 @@ from ui_console.model.events import CommandApplied, LetGoNeeded, LinkTrouble, Mo
 
 if TYPE_CHECKING:
     from resource_pool.arc_client import Applied, ArcClient
-    from ui_console.session.observer import Observer
+    from ui_console.session.observer import AnyObserver
 
 
 class Controls:
@@ -24,7 +24,7 @@ class Controls:
         console: The console.
     """
 
-    def __init__(self, console: Observer[Any]) -> None:
+    def __init__(self, console: AnyObserver) -> None:
         self._console = console
         self._dead_man, self._span = DeadMan(), DriveSpan()
         self._pressed = asyncio.Event()

@@ -12,7 +12,6 @@ import logging
 import time
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import Any
 
 from backbone.addresses import LAUNCHER, NAMESERVER, RC_MANAGER
 from backbone.bus.interface import Bus, Clock, Subscription
@@ -42,7 +41,7 @@ from backbone.picture.mission import LOG_KEPT
 from backbone.picture.reasons import reasons_for
 from backbone.rc_manager.messages import AskSchedule, Leases
 from backbone.scheduling.views import Schedule
-from backbone.wire import Envelope
+from backbone.wire import Envelope, Message
 from resource_pool.arc_client import StopState, ask_stop, lift_stop, stop_robot, watch_stops
 from ui_console.model.events import CommandRefused, Heard, LinkHeard, LinkTrouble, Said, failed
 from ui_console.model.robot_board import ROBOT_KIND
@@ -94,7 +93,7 @@ class ConsoleFeed:
         bus.subscribe("*/*", Conversation.LOG, StoryEvent, self._heard)
         bus.subscribe("*/*", Conversation.OPERATORS, OperatorActed, self._heard)
         bus.subscribe("*/*", Conversation.STATUS, ComponentState, self._heard, latest=True)
-        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard)
+        bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_nameserver)
         bus.subscribe(LAUNCHER, Conversation.HEALTH, MissionHealth, self._heard, latest=True)
         watch_stops(bus, self._hear)
         bus.watch_link(self._heard_link)
@@ -170,7 +169,7 @@ class ConsoleFeed:
             return True
         return False
 
-    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
+    async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
         """Set a parameter of a component; return whether the component applied it."""
         with self._showing_failure():
             address = await self._resolve(name)
@@ -276,10 +275,15 @@ class ConsoleFeed:
         with _quietly(radio, "did not answer with its counters"):
             self._hear(await self._bus.ask(address, AskStatistics(), Statistics, within_s=REPLY_TIME_S), address)
 
-    def _heard(self, envelope: Envelope[Any]) -> None:
+    def _heard_nameserver(self, envelope: Envelope[Message]) -> None:
         match envelope.body:
             case Appeared(component=component):
                 self._hear(component)
+            case Disappeared() as disappeared:
+                self._hear(disappeared)
+
+    def _heard(self, envelope: Envelope[Said]) -> None:
+        match envelope.body:
             case Leases():  # they count from the time they were sent
                 self._show(Heard(envelope.stamp_s, envelope.body))
             case OperatorActed():

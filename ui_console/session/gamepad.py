@@ -13,10 +13,15 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Protocol
 
 from backbone.errors import Refusal
 from ui_console.model.driving import STICK_LASTS_S, DriveWish, drive_by_stick
+
+try:
+    import evdev
+except ImportError:  # an extra that few machines have
+    evdev = None
 
 log = logging.getLogger(__name__)
 
@@ -111,10 +116,8 @@ def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
     Raises:
         NoGamepad: There is none, or none that can be read.
     """
-    try:
-        import evdev  # noqa: PLC0415  an extra that few machines have
-    except ImportError as error:
-        raise NoGamepad(f"evdev is not installed: {error}") from None
+    if evdev is None:
+        raise NoGamepad("evdev is not installed")
     for path in evdev.list_devices():
         device = evdev.InputDevice(path)
         can = device.capabilities()
@@ -187,7 +190,7 @@ async def _wait(changed: asyncio.Event, within_s: float | None) -> None:
 
 def buttons_help() -> list[str]:
     """Return the actions of the gamepad's buttons, for people."""
-    names: dict[int, Any] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
+    names: dict[int, str] = {BTN_SOUTH: "A", BTN_EAST: "B", BTN_NORTH: "X", BTN_SELECT: "select", BTN_START: "start"}
     return [
         "shoulder button held: the left stick drives",
         *(f"{names[code]}: {wish}" for code, wish in BUTTONS.items()),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from enum import StrEnum
-from typing import Any
 
 from backbone.addresses import RC_MANAGER
 from backbone.errors import LinkError, Refusal
@@ -19,7 +18,7 @@ from backbone.rc_manager.messages import AskSchedule
 from backbone.scheduling.views import Schedule
 from backbone.wire import Message
 from ui_console.session.feed import REPLY_TIME_S
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 
 class AskHandOver(Message, frozen=True):
@@ -78,7 +77,7 @@ class HandOver:
         give_back: Gives its robot back, or its claim up, for the reason it is called with.
     """
 
-    def __init__(self, console: Observer[Any], give_back: Callable[[str], Awaitable[None]]) -> None:
+    def __init__(self, console: AnyObserver, give_back: Callable[[str], Awaitable[None]]) -> None:
         self._console, self._give_back = console, give_back
         self._reason = f"{console.user} goes on at another screen"
 

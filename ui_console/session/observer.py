@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import types
 from collections.abc import Callable
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import msgspec
 
@@ -17,7 +16,7 @@ from backbone.mission_log.operators import OperatorActed, OperatorAction
 from backbone.printable import printable_all
 from backbone.scheduling.views import Schedule
 from backbone.spoken import value_text
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from ui_console.model.consent import Consent, Topic, require_console
 from ui_console.model.events import ConsoleEvent, Heard, LinkHeard
 from ui_console.model.lifting import AskLift
@@ -25,7 +24,7 @@ from ui_console.session.consent_answers import ConsentAnswers
 from ui_console.session.feed import ConsoleFeed, FeedEvent
 from ui_console.session.lift_talk import LiftTalk
 
-P = TypeVar("P", bound=msgspec.Struct)
+P_co = TypeVar("P_co", bound=msgspec.Struct, covariant=True)
 
 
 def no_person_here(_user: str) -> ConsentAnswers | None:
@@ -33,7 +32,7 @@ def no_person_here(_user: str) -> ConsentAnswers | None:
     return None
 
 
-class Observer(Component[P], Generic[P]):
+class Observer(Component[P_co], Generic[P_co]):
     """Passes a screen the mission's events, and offers it the verbs that need no grant.
 
     Args:
@@ -45,7 +44,7 @@ class Observer(Component[P], Generic[P]):
         answers_of: Returns the questions to this person, None for a person who left; None: one person sits here.
     """
 
-    accepts: ClassVar[types.UnionType | type[Any] | None] = AskLift
+    accepts: ClassVar[Accepts | None] = AskLift
 
     def __init__(
         self,
@@ -121,7 +120,7 @@ class Observer(Component[P], Generic[P]):
         """Answer the first question to this operator: for the robot held here, or to lift a stop."""
         self.answers.decide(is_given, reason)
 
-    async def set_parameter(self, name: str, parameter: str, value: Any, user: str = "") -> bool:
+    async def set_parameter(self, name: str, parameter: str, value: object, user: str = "") -> bool:
         """Set a parameter of a component; return whether the component applied it."""
         is_set = await self.feed.set_parameter(name, parameter, value, user or self.user)
         detail = f"{parameter} = {value_text(value)}{'' if is_set else ', which it did not take'}"
@@ -147,7 +146,7 @@ class Observer(Component[P], Generic[P]):
         if self._watches:
             self.feed.listen()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Ask the author of a stop whether it may be lifted."""
         match asked.body:
             case AskLift(robot=robot, author=author, user=user, why=why):
@@ -192,3 +191,7 @@ class Observer(Component[P], Generic[P]):
                 self.schedule_heard()
             case LinkHeard(is_up=False):
                 self.require_let_go()
+
+
+AnyObserver = Observer[msgspec.Struct]
+"""An observer whose kind of parameters does not matter."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ui_console.model.events import Attention
 
 if TYPE_CHECKING:
-    from ui_console.session.observer import Observer
+    from ui_console.session.observer import AnyObserver
 
 
 class Presence:
@@ -19,7 +19,7 @@ class Presence:
         console: The operator's console.
     """
 
-    def __init__(self, console: Observer[Any]) -> None:
+    def __init__(self, console: AnyObserver) -> None:
         self._console = console
         self._touched = asyncio.Event()
         self._is_there = True

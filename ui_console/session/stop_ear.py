@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from backbone.bus.interface import Subscription
 from backbone.errors import LinkError, Refusal
 from resource_pool.arc_client import StopState, ask_stop, watch_stops
 
 if TYPE_CHECKING:
-    from ui_console.session.observer import Observer
+    from ui_console.session.observer import AnyObserver
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ class StopEar:
         heard: Called with each state, with the one in force at the beginning too.
     """
 
-    def __init__(self, console: Observer[Any], heard: Callable[[StopState], None]) -> None:
+    def __init__(self, console: AnyObserver, heard: Callable[[StopState], None]) -> None:
         self._console, self._heard = console, heard
         self._listening: Subscription | None = None
         self._robot, self._known = "", asyncio.Event()

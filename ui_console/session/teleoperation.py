@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import types
 from collections.abc import Awaitable, Callable
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -21,7 +20,7 @@ from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.errors import LinkError, Refusal, code_of
 from backbone.mission_log.operators import OperatorAction
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import ArcClient, ArcNotice, Frame, NotMyArc, Resumed, StopState, Suspended, Suspending
 from ui_console.model import events
 from ui_console.model.consent import AskConsent, Consent
@@ -57,7 +56,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
     """
 
     parameters_type: ClassVar[type[msgspec.Struct]] = TeleoperationParameters
-    accepts: ClassVar[types.UnionType | type[Any] | None] = ArcNotice | AskConsent | AskHandOver | AskLift
+    accepts: ClassVar[Accepts | None] = ArcNotice | AskConsent | AskHandOver | AskLift
 
     def __init__(
         self,
@@ -78,7 +77,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
         super().__init__(launch, bus, clock, show=show, watches=watches, signs_in=signs_in, user=user, answers=answers)
         self._see, self._work, self._takes, self._keeps_arc = see, work, takes, keeps_arc
         self._arc: ArcClient | None = None
-        self._claimed: tuple[str, dict[str, Any]] | None = None
+        self._claimed: tuple[str, dict[str, object]] | None = None
         self._rests = False
         self._keeping: asyncio.Task[None] | None = None
         self._frames: Subscription | None = None
@@ -290,7 +289,7 @@ class Teleoperation(Observer[TeleoperationParameters]):
             self.start_task(self._work_and_end(self._work), "work")
         await self.watch()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC's notices, and other consoles that ask for the robot or to lift a stop."""
         if isinstance(asked.body, AskConsent):
             return await self._consent.seek(asked.source, asked.body, self._consent_at_once())

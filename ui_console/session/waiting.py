@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Any
 
 from backbone.addresses import RC_MANAGER
 from backbone.errors import LinkError, Refusal
@@ -14,7 +13,7 @@ from backbone.scheduling.views import Why
 from ui_console.model.events import Heard
 from ui_console.session.feed import REPLY_TIME_S
 from ui_console.session.hand_over import HandOver
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +28,7 @@ class Waiting:
     """
 
     def __init__(
-        self, console: Observer[Any], hand_over: HandOver, waits_for: Callable[[], tuple[str, float] | None]
+        self, console: AnyObserver, hand_over: HandOver, waits_for: Callable[[], tuple[str, float] | None]
     ) -> None:
         self._console, self._hand_over, self._waits_for = console, hand_over, waits_for
         self._asking: asyncio.Task[None] | None = None

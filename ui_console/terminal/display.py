@@ -5,7 +5,7 @@ Widgets are thin: ``ConsoleModel`` has their content, ``keys`` the keys.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 from rich.text import Text
@@ -188,7 +188,7 @@ class ConsoleDisplay(EndingApp):
             remark = own.status
         main.query_one(Video).look(remark)
 
-    def _main(self) -> Screen[Any] | None:
+    def _main(self) -> Screen[object] | None:
         """Return the screen behind all dialogs; None while it is just being taken down."""
         screens = self.screen_stack if self.is_running else []
         return screens[0] if screens and screens[0].query("#status") else None
@@ -197,7 +197,7 @@ class ConsoleDisplay(EndingApp):
         """Hide the keys that this profile does not have."""
         return has(self.profile, action)
 
-    def _show_head(self, main: Screen[Any], view: ConsoleView) -> None:
+    def _show_head(self, main: Screen[object], view: ConsoleView) -> None:
         first = head(view, self.size.width, self.profile, self.speed_rad_s)
         main.query_one("#status", Static).update(first.status, layout=False)
         say = main.query_one("#say", Static)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
 from backbone.launcher.endings import ExitCode
 from ui_console.model.profile import Profile
 from ui_console.session.gamepad import find_gamepad
-from ui_console.session.joining import Where, end_on_signals, join
+from ui_console.session.joining import end_on_signals, join
 from ui_console.session.observer import Observer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession
@@ -34,7 +34,7 @@ class Looks:
     has_gamepad: bool
 
 
-async def drive_by_hand(where: Where, wished: dict[str, Any], looks: Looks) -> int:
+async def drive_by_hand(where: Where, wished: dict[str, object], looks: Looks) -> int:
     """Drive a robot by keys; return the command's exit code.
 
     Args:

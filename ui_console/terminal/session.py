@@ -6,7 +6,7 @@ import asyncio
 import os
 import sys
 from collections.abc import Callable, Coroutine, Mapping
-from typing import Any, assert_never
+from typing import assert_never
 
 from textual import pilot as textual_pilot
 
@@ -17,7 +17,7 @@ from ui_console.model.events import ConsoleEvent
 from ui_console.model.profile import Profile
 from ui_console.model.team import TeamModel
 from ui_console.session.gamepad import Gamepad, PadWish, Stick, play_gamepad
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.app import ConsoleApp
 from ui_console.terminal.hangup import HangupWatch
@@ -25,7 +25,7 @@ from ui_console.terminal.pixels import can_show_pixels
 from ui_console.terminal.verbs import Session
 
 LIFT_REMEDY = "When the robot may move, press c, then l."
-Pilot = Callable[[textual_pilot.Pilot[Any]], Coroutine[Any, Any, None]]
+Pilot = Callable[[textual_pilot.Pilot[object]], Coroutine[object, None, None]]
 
 
 class TerminalSession(Session):
@@ -64,7 +64,7 @@ class TerminalSession(Session):
         self._frame = frame
 
     async def run(
-        self, console: Observer[Any], *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
+        self, console: AnyObserver, *, pilot: Pilot | None = None, size: tuple[int, int] = (120, 40)
     ) -> ExitCode:
         """Show the screen until a key or the component ends it; the component ends first, then the screen.
 
@@ -134,7 +134,7 @@ class TerminalSession(Session):
                 assert_never(wish)
 
     @staticmethod
-    async def _on_terminal(screen: ConsoleApp, console: Observer[Any]) -> None:
+    async def _on_terminal(screen: ConsoleApp, console: AnyObserver) -> None:
         """Run the screen; a terminal that goes away ends the console and with it the hold on the robot."""
 
         def gone() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import datetime
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from backbone.moments import Now
 from resource_pool.arc_client import Frame
 from ui_console.model.console import ConsoleModel
 from ui_console.model.driving import DriveWish
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 
 
@@ -29,7 +28,7 @@ class Session:
 
     def __init__(self, model: ConsoleModel) -> None:
         self.model = model
-        self._console: Observer[Any] | None = None
+        self._console: AnyObserver | None = None
         self._frame: Frame | None = None
         self._picture: NDArray[np.uint8] | None = None
 
@@ -143,7 +142,7 @@ class Session:
         if isinstance(self._console, Teleoperation) and self._console.is_ready:
             act(self._console)
 
-    def _ready_console(self) -> Observer[Any]:
+    def _ready_console(self) -> AnyObserver:
         if self._console is None:
             raise RuntimeError("the session does not run")
         return self._console

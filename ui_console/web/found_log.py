@@ -6,8 +6,6 @@ same page: ten thousand events are two megabytes, which a slow link carries in t
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
 from backbone.mission_log.lines import timed_event_json
@@ -31,7 +29,7 @@ class FoundLog:
         self.number = number
         self._log, self._now = log, now
 
-    def part(self, first: int) -> dict[str, Any]:
+    def part(self, first: int) -> dict[str, object]:
         """Return some events, the newest first.
 
         Args:

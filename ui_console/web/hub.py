@@ -8,13 +8,11 @@ import logging
 import os
 import re
 from collections.abc import Awaitable, Callable
-from typing import Any
 
 import msgspec
 import numpy as np
 
 from backbone.bus.interface import Bus, Clock, Subscription
-from backbone.component.component import NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import LifeState, LogLevel
 from backbone.keys import Conversation
@@ -30,7 +28,7 @@ from ui_console.model.robot_board import ROBOT_KIND
 from ui_console.model.team import TeamModel
 from ui_console.model.views import AlarmKind
 from ui_console.session.consent_answers import ConsentAnswers
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver, Observer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web.login import ProtocolViolation, ViolationKind, Welcome
 from ui_console.web.operator import Operator
@@ -66,7 +64,7 @@ class WebHub:
     ) -> None:
         self.clock = clock
         self.team = TeamModel(launch.mission, LIFT_REMEDY)
-        self.observer: Observer[NoParameters] = Observer(
+        self.observer: AnyObserver = Observer(
             launch, bus, clock, show=self._heard, signs_in=False, user=launch.name, answers_of=self._answers_of
         )
         self.clients: dict[Operator, None] = {}
@@ -200,8 +198,8 @@ class WebHub:
                 operator.schedule_heard()
 
     def _listen(self, robot: str, arc: str) -> Subscription:
-        def arrived(envelope: Envelope[Any]) -> None:
-            frame: Frame = envelope.body
+        def arrived(envelope: Envelope[Frame]) -> None:
+            frame = envelope.body
             if frame.robot == robot:
                 self._show_picture(frame)
 
@@ -221,7 +219,7 @@ class WebHub:
 
     def _send_tables(self, outboxes: list[Outbox]) -> None:
         team, now_s = self.team, self.clock.now_s()
-        tables: dict[str, Any] = {
+        tables: dict[str, object] = {
             "tree": team.tree(),
             "requests": plain(team.requests()),
             "timeline": team.timeline(now_s),

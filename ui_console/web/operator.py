@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
-from typing import Any, Protocol, assert_never
+from typing import Protocol, assert_never
 
 import msgspec
 
@@ -21,7 +21,7 @@ from ui_console.model.events import Attention, CommandApplied, ConsoleEvent, Pic
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
 from ui_console.session.consent_answers import ConsentAnswers
-from ui_console.session.observer import Observer
+from ui_console.session.observer import AnyObserver
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.web import protocol
 from ui_console.web.found_log import FoundLog
@@ -49,7 +49,7 @@ AtWork = (
 class OperatorServices(Protocol):
     """Services of the server for an operator."""
 
-    observer: Observer[Any]
+    observer: AnyObserver
     team: TeamModel
     clock: Clock
 
@@ -319,10 +319,10 @@ class Operator:
         if not task.cancelled() and (bug := task.exception()) is not None:
             self._services.observer.fail(bug)
 
-    def _answer(self, answer: dict[str, Any]) -> None:
+    def _answer(self, answer: dict[str, object]) -> None:
         self.outbox.put_answer(msgspec.json.encode({"answer": answer}))
         self.news.set()
 
 
-def _encode(views: list[Any]) -> bytes:
+def _encode(views: Sequence[object]) -> bytes:
     return msgspec.json.encode(views)

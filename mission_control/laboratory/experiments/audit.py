@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+
+from backbone.scheduling.trace import Line
 
 FRAME_S = 1.0 / 30.0
 SLACK_S = 2 * FRAME_S + 0.01  # chosen: packets take milliseconds and take effect at the next frame
@@ -48,7 +49,7 @@ class _Hold:
 
 
 def agreement(
-    trace: Iterable[Mapping[str, Any]],
+    trace: Iterable[Line],
     samples: Sequence[Transmitting],
     robots: Iterable[str],
     frequencies: Iterable[str],

@@ -6,7 +6,7 @@ import json
 import sys
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 
@@ -97,7 +97,7 @@ def surveillance(
     from mission_control.laboratory.experiments.conditions import EVERYTHING, ImpossibleCondition, checked
     from mission_control.laboratory.experiments.mission_file import mission_text
 
-    given: dict[str, Any] = {
+    given: dict[str, object] = {
         "active": active,
         "channels": channels,
         "target": target and str(target),
@@ -219,6 +219,6 @@ def _run(
         raise typer.Exit(int(_Exit.FAILED))
 
 
-def _refuse(refusal: Refusal) -> Any:
+def _refuse(refusal: Refusal) -> NoReturn:
     print(f"refused [{code_of(refusal)}]: {refusal}", file=sys.stderr)
     raise typer.Exit(int(_Exit.USAGE)) from None

@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from backbone.mission.model import MissionDescription
@@ -108,7 +107,7 @@ def _world(condition: Condition) -> Iterator[str]:
     places = (*WATCHERS[: condition.active], *EXTRAS[: condition.extra])
     for robot, (x_m, y_m) in zip(condition.robots, places, strict=True):
         yield f'    <scout name="{robot}" x-m="{x_m:g}" y-m="{y_m:g}" heading-deg="90"/>'
-    target: dict[str, Any] = {
+    target: dict[str, object] = {
         "name": "target",
         "shape": passage.shape,
         "speed-m-s": f"{passage.speed_m_s:g}",
@@ -140,6 +139,6 @@ def _watcher(condition: Condition, robot: str, view_s: float) -> Iterator[str]:
     yield "    </behavior>"
 
 
-def _tag(name: str, attributes: dict[str, Any], *, closed: bool = True) -> str:
+def _tag(name: str, attributes: dict[str, object], *, closed: bool = True) -> str:
     written = "".join(f" {attribute}={quoteattr(str(value))}" for attribute, value in attributes.items())
     return f"<{name}{written}{'/' if closed else ''}>"

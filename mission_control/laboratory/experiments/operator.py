@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 from random import Random
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import msgspec
 
@@ -18,7 +18,7 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.component import Component
 from backbone.component.launch import Launch
 from backbone.errors import LinkError, Refusal
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 from resource_pool.arc_client import (
     ArcClient,
     ArcNotice,
@@ -95,7 +95,7 @@ class SimulatedOperator(Component[OperatorParameters]):
     """One console that drives in some phases."""
 
     parameters_type = OperatorParameters
-    accepts: ClassVar[Any] = ArcNotice
+    accepts: ClassVar[Accepts | None] = ArcNotice
 
     def __init__(self, launch: Launch, bus: Bus, clock: Clock) -> None:
         super().__init__(launch, bus, clock)
@@ -122,7 +122,7 @@ class SimulatedOperator(Component[OperatorParameters]):
         )
         await self._arc.keep(self.clock, KIND, parameters)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer the ARC's notices."""
         if not isinstance(asked.body, ArcNotice):
             raise NotMyArc(f"{self.name} answers its ARC alone")

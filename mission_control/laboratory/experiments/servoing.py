@@ -16,7 +16,6 @@ from functools import lru_cache
 from pathlib import Path
 from random import Random
 from statistics import median
-from typing import Any
 
 import msgspec
 
@@ -152,7 +151,7 @@ class ServoOutcome:
         """Mission time of all trials."""
         return sum(trial.took_s for trial in self.trials)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as plain data: ``conditions`` with one entry, ``seed``, ``wall_s``, ``simulated_s``."""
         count = len(self.trials)
         condition = {

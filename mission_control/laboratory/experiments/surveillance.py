@@ -9,7 +9,6 @@ import hashlib
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -83,7 +82,7 @@ class ConditionRow(msgspec.Struct, frozen=True):
         """True if grants and transmitters agreed at every switch, and no frequency ever had two transmitters."""
         return not self.disagreements and not self.jammed_frames and not self.stale_packets
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as plain data."""
         condition = self.condition
         given = PUBLISHED.get(condition)
@@ -124,7 +123,7 @@ class SurveillanceOutcome(msgspec.Struct, frozen=True):
         """True if all rows are sound."""
         return all(row.is_sound for row in self.rows)
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return it as plain data: ``conditions``, ``geometry``, ``seed``, ``wall_s``, ``simulated_s``, ``sound``."""
         return {
             "conditions": [row.to_json() for row in self.rows],
@@ -142,7 +141,7 @@ def trials_line(outcome: SurveillanceOutcome) -> str:
     return f"{' or '.join(map(str, counts))} trials of each condition, seed {outcome.seed}"
 
 
-def geometry_json() -> Mapping[str, Any]:
+def geometry_json() -> Mapping[str, object]:
     """Return the geometry of all conditions as plain data."""
     return {
         "room_m": list(geometry.ROOM_M),

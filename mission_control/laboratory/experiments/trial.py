@@ -8,7 +8,6 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
-from typing import Any
 
 import msgspec
 
@@ -17,6 +16,7 @@ from backbone.keys import Conversation
 from backbone.mission.behavior_orders import behavior_orders
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import Start
+from backbone.scheduling.trace import Line
 from backbone.wire import Envelope
 from mission_control.laboratory.experiments.audit import Transmitting, agreement
 from mission_control.laboratory.experiments.conditions import Condition
@@ -131,7 +131,7 @@ class _Trial:
         self._requested: dict[str, asyncio.Event] = {}
         self._detected = asyncio.Event()
 
-    async def run(self) -> tuple[Trial, list[dict[str, Any]]]:
+    async def run(self) -> tuple[Trial, list[Line]]:
         bare = self._mission.model_copy(update={"behaviors": ()})
         consoles = {"operator": SimulatedOperator}
         async with mission_in_one_process(bare, trace=self._decided, consoles=consoles) as running:
@@ -199,12 +199,12 @@ class _Trial:
             await event.wait()
 
     # ------------------------------------------------------------------ published messages
-    def _decided(self, line: dict[str, Any]) -> None:
+    def _decided(self, line: Line) -> None:
         if line["ev"] == "request" and line["arc"] in self._requested:
             self._requested[line["arc"]].set()
 
-    def _world_moved(self, envelope: Envelope[Any]) -> None:
-        state: WorldState = envelope.body
+    def _world_moved(self, envelope: Envelope[WorldState]) -> None:
+        state = envelope.body
         self._frame, self._world_began_s = state.frame, state.at_s - state.frame / FRAMES_PER_S
         if not self._samples or self._samples[-1].on != state.transmitting:
             self._samples.append(Transmitting(state.at_s, dict(state.transmitting)))
@@ -212,8 +212,8 @@ class _Trial:
             self._waits_for[1].set()
             self._waits_for = None
 
-    def _motion_seen(self, envelope: Envelope[Any]) -> None:
-        seen: MotionSeen = envelope.body
+    def _motion_seen(self, envelope: Envelope[MotionSeen]) -> None:
+        seen = envelope.body
         since_s = seen.at_s - self._world_began_s - self._departs_s
         is_true = is_in_view(self._condition.passage, self._places[seen.robot], since_s)
         self._seen.append((since_s, seen.robot, is_true))
@@ -221,7 +221,7 @@ class _Trial:
             self._detected.set()
 
     # ------------------------------------------------------------------ result
-    def _judge(self, trace: list[dict[str, Any]], world: dict[str, float], over_s: float) -> Trial:
+    def _judge(self, trace: list[Line], world: dict[str, float], over_s: float) -> Trial:
         frequencies = [f"video{channel}" for channel in range(1, self._condition.channels + 1)]
         agreed = agreement(trace, self._samples, self._condition.robots, frequencies, over_s)
         true = [(since_s, robot) for since_s, robot, is_true in self._seen if is_true]

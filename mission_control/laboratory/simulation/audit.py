@@ -50,7 +50,7 @@ class Audit:
     def __init__(self) -> None:
         self.happenings: list[Happening] = []
 
-    def note(self, who: str, what: str, **values: Any) -> None:
+    def note(self, who: str, what: str, **values: object) -> None:
         """Record an event now."""
         self.happenings.append(Happening(asyncio.get_running_loop().time(), who, what, values))
 
@@ -66,7 +66,7 @@ current_audit: ContextVar[Audit] = ContextVar("current_audit")
 """The audit of the present task's run; drivers, which a mission names by class path, find it here."""
 
 
-def _flat(value: Any) -> Iterator[Any]:
+def _flat(value: object) -> Iterator[object]:
     if isinstance(value, dict):
         for name, inner in value.items():
             yield name
@@ -78,5 +78,5 @@ def _flat(value: Any) -> Iterator[Any]:
         yield value
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -8,11 +8,10 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalNetwork
-from backbone.component.component import Component
+from backbone.component.component import AnyComponent
 from backbone.component.launch import Launch
 from backbone.component.messages import NameTaken
 from backbone.creator.messages import EndedBy
@@ -22,6 +21,7 @@ from backbone.placer.messages import NotPlaced
 from mission_control.laboratory.simulation.audit import Audit
 
 HOST = "host"  # chosen: all components are on one host
+PID = 1  # chosen: they share one process; its true pid would make two runs of one seed differ
 FALLEN_AWAY_S = 0.3  # chosen: a creator's first back-off is of this order
 STOP_WITHIN_S = 3.0  # chosen: longer than an ARC waits for the RC manager when it withdraws
 
@@ -35,18 +35,18 @@ class PlayedRole:
         is_restarted: True if its creator restarts it when it falls.
     """
 
-    component: Callable[[Launch, Bus, Clock], Component[Any]]
+    component: Callable[[Launch, Bus, Clock], AnyComponent]
     subsystem: Subsystem
     name: str
     kind: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, object]
     is_restarted: bool = True
 
 
 @dataclass
 class _Life:
     role: PlayedRole
-    component: Component[Any] | None = None
+    component: AnyComponent | None = None
     task: asyncio.Task[None] | None = None
     ready: asyncio.Event = field(default_factory=asyncio.Event)
     away_s: float = FALLEN_AWAY_S
@@ -95,7 +95,7 @@ class PlayedHosts:
         """Return whether a component of this name lives or is being restarted."""
         return name in self._lives
 
-    def running(self, name: str) -> Component[Any] | None:
+    def running(self, name: str) -> AnyComponent | None:
         """Return the living component of this name, or None."""
         life = self._lives.get(name)
         return life.component if life is not None else None
@@ -166,6 +166,7 @@ class PlayedHosts:
             await bus.close()
             self._audit.note(role.name, "gives up", error=f"{type(refusal).__name__}: {refusal}")
             return
+        component.pid = PID
         life.component = component
         self._audit.note(role.name, "begins")
         watching = bus.watch_alive(launch.address, lambda _, alive: life.ready.set() if alive else life.ready.clear())

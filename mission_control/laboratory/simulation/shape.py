@@ -97,7 +97,7 @@ class MissionShape:
     active_s: float
     calm_s: float
 
-    def owner_parameters(self, owner: OwnerShape) -> dict[str, Any]:
+    def owner_parameters(self, owner: OwnerShape) -> dict[str, object]:
         """Return the parameters of this decision process, a ``SimulatedOwner``."""
         return {
             "seed": self.seed,

@@ -15,16 +15,15 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
 from contextvars import Context
-from typing import Any
 
 from backbone.bus.interface import Clock, LinkListener
 from backbone.bus.local_bus import Answered, Declaration, Listening, LocalBus, LocalNetwork, Watching
 from backbone.errors import NoResponder
-from backbone.wire import Envelope
+from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.simulated_processes import SimulatedProcess, current_process
 
-LINK_LEASE_S = 2.0  # zenoh_bus.LINK_LEASE_MS
-RECONNECT_AFTER_S = 0.1  # zenoh_bus.RETRY_MOST_MS
+LINK_LEASE_S = 2.0  # zenoh_settings.LINK_LEASE_MS
+RECONNECT_AFTER_S = 0.1  # zenoh_settings.RETRY_MOST_MS
 
 Act = Callable[[], None]
 
@@ -267,7 +266,7 @@ class LinkedNetwork(LocalNetwork):
         """Return a new bus of the present process."""
         return LinkedBus(self, source, clock, self.links[_own()])
 
-    def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
+    def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
         """Carry the question over both links, and the answer back."""
         own, server = self.links.get(_own()), self.servers.get(address)
         if own is None or own.process.is_dead:
@@ -278,7 +277,7 @@ class LinkedNetwork(LocalNetwork):
         if not own.is_up:
             raise NoResponder("this process has no link")
 
-        def end(outcome: Envelope[Any] | None = None) -> None:
+        def end(outcome: Envelope[Message] | None = None) -> None:
             if question not in ended:
                 ended.add(question)
                 own.questions.pop(question, None)
@@ -294,7 +293,7 @@ class LinkedNetwork(LocalNetwork):
                 theirs.carry(lambda: ask(theirs), end)
 
         def ask(theirs: Link) -> None:
-            def back(outcome: Envelope[Any] | None) -> None:
+            def back(outcome: Envelope[Message] | None) -> None:
                 if theirs.questions.pop(question, None) is None or theirs.process.is_dead:
                     end()
                 else:
@@ -310,7 +309,7 @@ class LinkedNetwork(LocalNetwork):
         own.questions[question] = end
         own.carry(arrive, end)
 
-    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
+    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Message]) -> None:
         """Carry the publication over both links."""
         own, theirs = self.links.get(_own()), self._link_of(listening)
         if own is None or theirs is None or own.process.is_dead:

@@ -11,11 +11,10 @@ import contextvars
 import signal
 from collections.abc import Callable
 from contextvars import ContextVar
-from typing import Any
 
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
-from backbone.component.component import Component
+from backbone.component.component import AnyComponent
 from backbone.component.heartbeat import Vitals
 from backbone.component.launch import Launch
 from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, load_class
@@ -27,7 +26,7 @@ from mission_control.laboratory.simulation.simulated_links import LinkedNetwork
 from mission_control.laboratory.simulation.simulated_processes import ProcessLoop, SimulatedProcess, current_process
 
 FORK_S = 0.02  # chosen: the duration of a fork and of a component's imports
-HUB_WITHIN_S = 5.0  # zenoh_bus.OPEN_TIMEOUT_MS
+HUB_WITHIN_S = 5.0  # zenoh_settings.OPEN_TIMEOUT_MS
 FIRST_PID = 1000
 LATE_STEPS = 5  # chosen: creator, owner, nameserver and observer need a step each, and one was just missed
 
@@ -43,7 +42,7 @@ class Machines:
 
     def __init__(self, loop: ProcessLoop, network: LinkedNetwork, audit: Audit) -> None:
         self.network = network
-        self.lives: dict[SimulatedProcess, Component[Any] | SharedProcess | None] = {}
+        self.lives: dict[SimulatedProcess, AnyComponent | SharedProcess | None] = {}
         self.on_begin: Callable[[SimulatedProcess], None] = lambda _process: None
         self._loop, self._audit = loop, audit
         self._tasks: dict[SimulatedProcess, asyncio.Task[int]] = {}
@@ -59,7 +58,7 @@ class Machines:
                 return process
         return None
 
-    def component(self, name: str) -> Component[Any] | None:
+    def component(self, name: str) -> AnyComponent | None:
         """Return the living component of this name, or None."""
         for process, life in self.lives.items():
             if isinstance(life, SharedProcess):
@@ -157,7 +156,7 @@ class Machines:
         self._audit.note(process.name, "ends")
         return 0
 
-    def _born(self, process: SimulatedProcess, launch: Launch, clock: Clock) -> Component[Any] | SharedProcess:
+    def _born(self, process: SimulatedProcess, launch: Launch, clock: Clock) -> AnyComponent | SharedProcess:
         if launch.is_shared_process:
             return SharedProcess(launch, self.network.join, clock, process.pid)
         component = load_class(launch.class_path)(launch, self.network.join(launch.address, clock), clock)

@@ -10,7 +10,6 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from random import Random
-from typing import Any
 
 import msgspec
 
@@ -34,6 +33,7 @@ from resource_pool.arc_client import (
     claim_parameters,
     notice_arc,
 )
+from resource_pool.messages import Applied
 
 log = logging.getLogger(__name__)
 
@@ -92,9 +92,11 @@ class SimulatedOwner(Component[OwnerParameters]):
         if not self.parameters.rests:
             await self._live_with_arc()
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Pass a notice to the ARC client."""
-        notice: ArcNotice = asked.body
+        notice = asked.body
+        if not isinstance(notice, ArcNotice):
+            return await super().answer(asked)
         if self._arc is None:
             raise NotMyArc(f"{self.name} claims nothing", arc=notice_arc(notice))
         return await self._arc.handle(notice)
@@ -197,7 +199,7 @@ class SimulatedOwner(Component[OwnerParameters]):
         return round(self._driving_dice.uniform(-1.0, 1.0) * TOP_WHEEL_SPEED_RAD_S, 2)
 
     # ------------------------------------------------------------------ requests to the ARC
-    async def _command(self, what: str, doing: Awaitable[Any]) -> None:
+    async def _command(self, what: str, doing: Awaitable[Applied]) -> None:
         try:
             applied = await doing
         except Refusal as refusal:

@@ -13,7 +13,7 @@ import asyncio
 import contextvars
 from collections.abc import Callable, Coroutine, Generator
 from contextvars import Context, ContextVar
-from typing import Any, TypeVar, TypeVarTuple
+from typing import TypeVar, TypeVarTuple
 
 from backbone.bus.clock import VirtualLoop
 from backbone.component.heartbeat import BEAT_EVERY_S, Vitals
@@ -36,7 +36,7 @@ class SimulatedProcess:
 
     def __init__(self, loop: ProcessLoop, name: str, host: str, pid: int) -> None:
         self.name, self.host, self.pid, self.is_dead = name, host, pid, False
-        self.tasks: dict[asyncio.Task[Any], None] = {}
+        self.tasks: dict[asyncio.Task[object], None] = {}
         """Its tasks, in the order of their starts."""
         self._loop = loop
         self.context = contextvars.copy_context()
@@ -87,13 +87,13 @@ class SimulatedProcess:
         self.is_dead = True
         self._catch_up()
 
-    def end_tasks(self) -> list[asyncio.Task[Any]]:
+    def end_tasks(self) -> list[asyncio.Task[object]]:
         """Cancel and return the tasks of a dead process."""
         for task in self.tasks:
             task.cancel()
         return list(self.tasks)
 
-    def forget(self, task: asyncio.Task[Any]) -> None:
+    def forget(self, task: asyncio.Task[object]) -> None:
         """Record that a task has ended."""
         self.tasks.pop(task, None)
 
@@ -187,7 +187,7 @@ class ProcessLoop(VirtualLoop):
 
     def create_task(
         self,
-        coro: Coroutine[Any, Any, R] | Generator[Any, None, R],
+        coro: Coroutine[object, None, R] | Generator[object, None, R],
         *,
         name: object = None,
         context: Context | None = None,
@@ -212,7 +212,7 @@ class ProcessLoop(VirtualLoop):
             step.do()
 
 
-def run_processes(main: Coroutine[Any, Any, R]) -> R:
+def run_processes(main: Coroutine[object, None, R]) -> R:
     """Run the coroutine on a new ``ProcessLoop`` and return its result."""
     with asyncio.Runner(loop_factory=ProcessLoop) as runner:
         return runner.run(main)

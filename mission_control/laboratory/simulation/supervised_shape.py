@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from random import Random
-from typing import Any
 
 import msgspec
 
@@ -121,7 +120,7 @@ class SupervisedShape:
             source="a seed",
         )
 
-    def _core_parameters(self, service: str) -> dict[str, Any]:
+    def _core_parameters(self, service: str) -> dict[str, object]:
         return {"grace_s": self.pool.grace_s, "policy": self.pool.policy} if service == "rc_manager" else {}
 
 

@@ -15,12 +15,11 @@ from __future__ import annotations
 import asyncio
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 from backbone.addresses import PLACER
 from backbone.bus.local_bus import Answered, Listening, LocalNetwork, Watching
 from backbone.errors import NoResponder
-from backbone.wire import Envelope
+from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.faults import Fates, MessageFault
 
 ORDER_STEP_S = 1e-6  # chosen: far below every meaningful time, far above the loop's resolution
@@ -48,12 +47,12 @@ class UnreliableNetwork(LocalNetwork):
         """Stop all messages to and from this address until this time."""
         self._cut_until_s[address] = max(until_s, self._cut_until_s.get(address, 0.0))
 
-    def carry_question(self, address: str, asked: Envelope[Any], answered: Answered) -> None:
+    def carry_question(self, address: str, asked: Envelope[Message], answered: Answered) -> None:
         """Carry question and answer, each with its own fault."""
         source = asked.source
         fault = self._fault(source, address, type(asked.body).__name__)
 
-        def travel_back(outcome: Envelope[Any] | None) -> None:
+        def travel_back(outcome: Envelope[Message] | None) -> None:
             if outcome is None:  # the component died over it, which the fall of its link reports
                 answered(None)
                 return
@@ -77,7 +76,7 @@ class UnreliableNetwork(LocalNetwork):
         if fault is not None and fault.effect == "doubled":
             self._travel(source, address, None, lambda: self._ask_again(ask))
 
-    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Any]) -> None:
+    def carry_publication(self, listening: Listening, address: str, envelope: Envelope[Message]) -> None:
         """Carry the publication to this listener with its fault."""
         source, target = envelope.source, listening.owner.source
         fault = self._fault(source, target, type(envelope.body).__name__)

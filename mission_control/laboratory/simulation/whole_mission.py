@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
-from typing import Any
 
 import msgspec
 
@@ -22,7 +21,7 @@ from backbone.addresses import PLACER, RC_MANAGER
 from backbone.bus.clock import VirtualClock
 from backbone.bus.interface import Bus, Clock
 from backbone.bus.local_bus import LocalBus, LocalNetwork
-from backbone.component.component import Component, NoParameters
+from backbone.component.component import AnyComponent, Component, NoParameters
 from backbone.component.launch import Launch
 from backbone.component.messages import AskStatistics, Statistics
 from backbone.component.process import load_class
@@ -50,6 +49,7 @@ from backbone.placer.messages import (
 )
 from backbone.rc_manager.messages import TraceLine
 from backbone.rc_manager.service import RcManager
+from backbone.scheduling.trace import Line
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.audit import Audit, Happening
 from mission_control.laboratory.simulation.played_hosts import HOST, PlayedHosts, PlayedRole
@@ -83,7 +83,7 @@ class RunningMission:
     bus: LocalBus
     clock: Clock
     hosts: PlayedHosts
-    trace: list[dict[str, Any]] = field(default_factory=list)
+    trace: list[Line] = field(default_factory=list)
     placer: str = PLACER
 
     async def start(self, order: Start) -> Started:
@@ -102,7 +102,7 @@ class RunningMission:
         """
         return await self.bus.ask(PLACER, StopComponent(name, reason), Ended, within_s=START_TIME_S)
 
-    def component(self, name: str) -> Component[Any]:
+    def component(self, name: str) -> AnyComponent:
         """Return the component of this name.
 
         Raises:
@@ -127,8 +127,8 @@ class RunningMission:
 async def mission_in_one_process(
     description: MissionDescription,
     *,
-    trace: Callable[[dict[str, Any]], None] | None = None,
-    consoles: Mapping[str, Callable[[Launch, Bus, Clock], Component[Any]]] | None = None,
+    trace: Callable[[Line], None] | None = None,
+    consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]] | None = None,
 ) -> AsyncIterator[RunningMission]:
     """Yield the mission, up and ready, on the running loop's time; end all components at the end of the block.
 
@@ -159,7 +159,7 @@ async def mission_in_one_process(
     bus = network.join(MEETING_AT, clock)
     running = RunningMission(_painted(description), network, bus, clock, hosts)
 
-    def decided(envelope: Envelope[Any]) -> None:
+    def decided(envelope: Envelope[TraceLine]) -> None:
         running.trace.append(envelope.body.line)
         if trace is not None:
             trace(envelope.body.line)
@@ -203,7 +203,7 @@ def _first_fall(happenings: list[Happening]) -> str | None:
 
 
 # ---------------------------------------------------------------------- bring-up, in the papers' order
-async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[..., Component[Any]]]) -> None:
+async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[..., AnyComponent]]) -> None:
     mission, hosts = running.description, running.hosts
     resources = [msgspec.to_builtins(resource) for resource in mission.resources]
     types = [msgspec.to_builtins(component_type) for component_type in mission.types]
@@ -216,7 +216,7 @@ async def _bring_up(running: RunningMission, consoles: Mapping[str, Callable[...
     def placer(launch: Launch, bus: Bus, clock: Clock) -> WholePlacer:
         return WholePlacer(launch, bus, clock, hosts=hosts, types=mission.types, consoles=consoles)
 
-    core: list[tuple[Callable[..., Component[Any]], str, dict[str, Any]]] = [
+    core: list[tuple[Callable[..., AnyComponent], str, dict[str, object]]] = [
         (Nameserver, "nameserver", {}),
         (ComponentDatabase, "component_database", {"types": types}),
         (placer, "placer", {}),
@@ -248,7 +248,7 @@ class WholePlacer(Component[NoParameters]):
         *,
         hosts: PlayedHosts,
         types: tuple[ComponentType, ...],
-        consoles: Mapping[str, Callable[[Launch, Bus, Clock], Component[Any]]],
+        consoles: Mapping[str, Callable[[Launch, Bus, Clock], AnyComponent]],
         restarts: bool = False,
     ) -> None:
         super().__init__(launch, bus, clock)
@@ -258,7 +258,7 @@ class WholePlacer(Component[NoParameters]):
         self._numbers = Counter[str]()
         self._placements: dict[str, Placement] = {}
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``Start``, ``StopComponent`` and ``AskPlacement``."""
         match asked.body:
             case Start() as order:

@@ -14,9 +14,10 @@ from mission_control.laboratory.simulation import campaign
 from mission_control.laboratory.simulation.campaign import simulate
 from mission_control.laboratory.simulation.mission_run import MissionRun, run_mission
 
-DIGESTS = """
+SAME_EVERYWHERE = (0, 1, 2, 3, 40, 1305)  # in 40 a component is refused by pid, in 1305 a radio still has two holders
+DIGESTS = f"""
 from mission_control.laboratory.simulation.mission_run import run_mission
-print(*(run_mission(seed, chaos=True).digest for seed in range(4)))
+print(*(run_mission(seed, chaos=True).digest for seed in {SAME_EVERYWHERE}))
 """
 
 
@@ -61,7 +62,7 @@ def test_a_seed_means_one_run_to_the_byte_in_every_process() -> None:
             [sys.executable, "-c", DIGESTS], env=environment, capture_output=True, text=True, timeout=60, check=True
         )
         found.add(done.stdout)
-    here = " ".join(mission(seed, chaos=True).digest for seed in range(4)) + "\n"
+    here = " ".join(mission(seed, chaos=True).digest for seed in SAME_EVERYWHERE) + "\n"
     assert found == {here}
 
 
