@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from backbone.command_line.cli import run
 from backbone.command_line.options import (
     CommandTable,
     SecretFile,
     Version,
+    chosen,
     complete_mission,
     finite,
     hub_endpoint,
     picture_for,
+    run,
 )
+from backbone.command_line.where import Where
 from backbone.launcher.endings import ExitCode, say
 from ui_console.model.profile import Profile
-
-if TYPE_CHECKING:
-    from ui_console.session.joining import Where
 
 KINDS = {"terminal": "capture", "pendant": "video_drive", "script": "drive"}
 """With a screen, pictures come to this machine; a person with a video monitor leaves the framegrabber to
@@ -121,7 +119,7 @@ def attach(
     secret_file: SecretFile = None,
 ) -> None:
     """Take over a robot, drive it, give it back."""
-    where, user = _where(mission, connect, secret_file), user or _user()
+    where, user = chosen(mission, connect, secret_file), user or _user()
     script = script or ("-" if as_json else "")
     if profile is Profile.MONITOR:
         _watch(where, user, as_json=as_json)
@@ -153,7 +151,7 @@ def monitor(
     secret_file: SecretFile = None,
 ) -> None:
     """Watch who holds what, who waits why, and what happens; claim nothing, but stop robots in an emergency."""
-    where, user = _where(mission, connect, secret_file), user or _user()
+    where, user = chosen(mission, connect, secret_file), user or _user()
     if once:
         from ui_console.session.headless import look_once
 
@@ -225,7 +223,7 @@ def serve(
     options, claims = ServerOptions(host, port, certificate, key, new_tokens), Claims(kind, away_after)
     if design:
         run(lambda: serve_designer(design, rights, options))
-    where = _where(mission, connect, secret_file)
+    where = chosen(mission, connect, secret_file)
     run(lambda: serve_console(where, rights, options, claims))
 
 
@@ -256,14 +254,6 @@ def _watch(where: Where, user: str, *, as_json: bool) -> None:
     from ui_console.terminal.on_screen import watch_on_screen
 
     run(lambda: watch_on_screen(where, user))
-
-
-def _where(mission: str | None, connect: str | None, secret_file: Path | None) -> Where:
-    from ui_console.session.joining import Where
-
-    if connect is not None and mission is None:
-        raise typer.BadParameter("--connect needs --mission NAME")
-    return Where(mission, connect, secret_file)
 
 
 def _usage(complaint: str) -> typer.Exit:

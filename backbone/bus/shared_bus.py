@@ -17,7 +17,7 @@ from typing import Any
 
 from backbone.bus.interface import Answer, Clock, LifeListener, Listener, Reply, Subscription
 from backbone.bus.local_bus import LocalNetwork, Neighbor
-from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session
+from backbone.bus.zenoh_bus import ZenohBus, client_config, close_session, open_session, watch_links
 from backbone.keys import Conversation
 from backbone.wire import Accepts, Message
 
@@ -36,6 +36,7 @@ class SharedSession:
 
     def __init__(self, mission: str, endpoint: str, secret: str = "") -> None:
         self._session = open_session(client_config(endpoint, secret))
+        self._links = watch_links(self._session)
         self._neighbors = LocalNetwork(mission)
 
     def join(self, source: str, clock: Clock) -> SharedBus:

@@ -4,8 +4,8 @@ Zenoh's threads never run component code: they put arrivals into an inbox and wa
 burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one; subscribers and
 queryables keep their one indirect thread.
 
-Measured settings: clients of one hub, no scouting, lease 2 s, ``express`` on questions and replies only, blocking for
-messages that are sent once, dropping for repeated messages (docs/decisions/0003-zenoh-settings.md).
+Measured: ``express`` on questions and replies only, blocking for messages that are sent once, dropping for repeated
+messages (docs/decisions/0003-zenoh-settings.md).
 """
 
 from __future__ import annotations
@@ -14,23 +14,16 @@ import asyncio
 import json
 import logging
 from collections import OrderedDict, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar, cast
 
 import zenoh
 
-from backbone.authentication import USER
 from backbone.bus.bus_base import BusBase, settle
-from backbone.bus.interface import (
-    Answer,
-    Clock,
-    LifeListener,
-    LinkListener,
-    Listener,
-    Reply,
-    Subscription,
-)
+from backbone.bus.interface import Answer, Clock, LifeListener, LinkListener, Listener, Reply, Subscription
+from backbone.bus.sockets import close_without_waiting
+from backbone.bus.zenoh_settings import LINK_LEASE_MS, client_settings, hub_settings
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
 from backbone.wire import (
@@ -48,10 +41,6 @@ from backbone.wire import (
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
-LINK_LEASE_MS = 2000  # chosen: twice the second below which a busy Python loses its own link
-RETRY_FIRST_MS, RETRY_MOST_MS, RETRY_FACTOR = 20, 100, 1.5  # chosen: a restarted hub is found within 0.1 s
-OPEN_TIMEOUT_MS = 5000  # chosen: a hub that starts on a busy machine is there within this
-WAIT_BEFORE_CLOSE_US = 1_000_000  # chosen: the longest time for which a hung consumer may block a sender
 _TIMEOUT_PAYLOAD = b"Timeout"
 
 # Priority, and congestion control for a full queue. Never express: without batching a queue holds two messages and
@@ -73,64 +62,18 @@ _QUALITY = {
 }
 
 
-def _transport() -> dict[str, object]:
-    return {
-        "unicast": {"open_timeout": 2000, "accept_timeout": 2000},
-        "link": {
-            "tx": {
-                "lease": LINK_LEASE_MS,
-                "keep_alive": 4,
-                "queue": {"congestion_control": {"block": {"wait_before_close": WAIT_BEFORE_CLOSE_US}}},
-            }
-        },
-        "shared_memory": {"enabled": False},
-    }
-
-
-def _config(settings: Mapping[str, object], auth: Mapping[str, object]) -> zenoh.Config:
-    quiet = {"multicast": {"enabled": False}, "gossip": {"enabled": False}}
-    transport = {**_transport(), "auth": auth}
-    return zenoh.Config.from_json5(json.dumps({"scouting": quiet, "transport": transport, **settings}))
-
-
-_RETRY = {"period_init_ms": RETRY_FIRST_MS, "period_max_ms": RETRY_MOST_MS, "period_increase_factor": RETRY_FACTOR}
-
-
 def client_config(endpoint: str, secret: str = "") -> zenoh.Config:
-    """Return the settings of a client of the hub at ``endpoint``.
-
-    Args:
-        secret: Secret that the client proves without sending it; empty: the hub asks for none.
-    """
-    auth = {"usrpwd": {"user": USER, "password": secret}} if secret else {}
-    return _config(
-        {
-            "mode": "client",
-            "connect": {
-                "endpoints": [endpoint],
-                "timeout_ms": OPEN_TIMEOUT_MS,
-                "exit_on_failure": True,
-                "retry": _RETRY,
-            },
-        },
-        auth,
-    )
+    """Return the configuration of a client; see ``client_settings``."""
+    return _config(client_settings(endpoint, secret))
 
 
 def hub_config(listen: list[str], connect: list[str] | None = None, *, dictionary_file: str = "") -> zenoh.Config:
-    """Return the settings of a hub that listens at some endpoints and joins the hubs at others.
+    """Return the configuration of a hub; see ``hub_settings``."""
+    return _config(hub_settings(listen, connect or [], dictionary_file))
 
-    Args:
-        dictionary_file: Users and secrets of its clients; empty: it authenticates no client.
-    """
-    settings: dict[str, object] = {
-        "mode": "router",
-        "listen": {"endpoints": listen, "exit_on_failure": True},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
-    }
-    if connect:
-        settings["connect"] = {"endpoints": connect, "timeout_ms": -1, "exit_on_failure": False, "retry": _RETRY}
-    return _config(settings, {"usrpwd": {"dictionary_file": dictionary_file}} if dictionary_file else {})
+
+def _config(settings: dict[str, object]) -> zenoh.Config:
+    return zenoh.Config.from_json5(json.dumps(settings))
 
 
 def _is_hub(config: zenoh.Config) -> bool:
@@ -154,6 +97,16 @@ def open_session(config: zenoh.Config) -> zenoh.Session:
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise _unreachable(config, error) from error
+
+
+def watch_links(session: zenoh.Session) -> zenoh.LinkEventsListener[None]:
+    """Keep the close of this session's TCP links from blocking, while the result is kept."""
+
+    def changed(event: zenoh.LinkEvent) -> None:
+        if event.kind == zenoh.SampleKind.PUT and event.link.src.startswith("tcp/"):
+            close_without_waiting()
+
+    return session.info.declare_link_events_listener(zenoh.handlers.Callback(changed, indirect=False), history=True)
 
 
 async def close_session(session: zenoh.Session) -> None:
@@ -183,6 +136,7 @@ class ZenohBus(BusBase):
         super().__init__(mission, source, clock)
         self._loop = asyncio.get_running_loop()
         self._session, self._is_hub, self._shared = session, is_hub, shared
+        self._links = None if shared else watch_links(session)
         self._inbox: deque[tuple[Callable[..., None], Any]] = deque()
         self._woken = False
         self._declared: set[_Declared] = set()

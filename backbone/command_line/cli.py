@@ -1,7 +1,7 @@
 """The command line ``scout-backbone``.
 
-Data goes to stdout, messages to stderr. A command imports its modules itself, so that ``--help`` and ``check`` stay
-quick. Exit codes are those of ``ExitCode``.
+Rules of this file: it declares commands and decides nothing. A command imports the one module that does its work, so
+that ``--help`` and ``check`` stay quick. Data goes to stdout, messages to stderr. Exit codes are those of ``ExitCode``.
 """
 
 from __future__ import annotations
@@ -9,8 +9,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Awaitable, Callable
-from contextlib import AbstractAsyncContextManager
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,16 +25,19 @@ from backbone.command_line.options import (
     NameOrCause,
     SecretFile,
     Version,
+    chosen,
     complete_name,
     complete_person,
     complete_resource,
     finite,
     hub_endpoint,
+    run,
 )
 from backbone.component.messages import LogLevel
-from backbone.errors import BackboneError
-from backbone.launcher.endings import ExitCode, complaint_of, say, show
-from backbone.spoken import counted, value_text
+from backbone.launcher.endings import ExitCode, say
+from backbone.launcher.verdict import VerdictPipe
+from backbone.placer.messages import Start
+from backbone.spoken import counted
 
 app = typer.Typer(
     cls=CommandTable,
@@ -48,7 +49,7 @@ app = typer.Typer(
     "5 refused, 6 the mission itself failed, 130 Ctrl-C.",
 )
 
-# named, as a mission names its classes: imports run downwards only
+# Named, as a mission names its classes: imports run downwards only.
 EXPERIMENTS = "mission_control.laboratory.experiments.cli"
 SIMULATION = "mission_control.laboratory.simulation.campaign"
 LONGEST_DRY_RUN_S = 86_400.0  # chosen: a day of the shipped mission takes seconds to compute
@@ -56,7 +57,6 @@ LONGEST_MISSION_S = 366 * 86_400.0  # chosen: a year; a longer time is a typing 
 MOST_SEEDS = 1_000_000  # chosen: a day of work
 LARGEST_SEED = 2**32 - 1  # the limit of numpy
 MOST_EVENTS = 10_000  # as in mission_log
-LOG_WITHIN_S = 5.0  # chosen: ten thousand events on a slow link
 PIPE_WIDTH = 180  # chosen: no table is wider, so files and pipes get whole tables
 
 
@@ -66,53 +66,6 @@ def main() -> None:
         app()
     except KeyboardInterrupt:
         sys.exit(ExitCode.INTERRUPTED)
-
-
-def run(work: Callable[[], Awaitable[int]]) -> None:
-    """Run a command's coroutine and end the process with its exit code; refusals become one line."""
-    import asyncio
-
-    import uvloop
-
-    async def guarded() -> int:
-        return await work()
-
-    try:
-        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            code = runner.run(guarded())
-    except BackboneError as error:
-        line, code = complaint_of(error)
-        say(line)
-    raise typer.Exit(int(code))
-
-
-def connected(
-    mission: str | None, endpoint: str | None, secret_file: Path | None
-) -> AbstractAsyncContextManager[tuple[Any, Any]]:
-    """Return a context manager for a bus to a mission that is up, and its clock."""
-    from backbone.launcher import mission_connection
-
-    if endpoint is not None and mission is None:
-        raise typer.BadParameter("--connect needs --mission NAME")
-    secret = read_secret_option(secret_file) if endpoint is not None else ""
-    return mission_connection.connected(mission, endpoint, f"ui_console/cli-{os.getpid()}", secret)
-
-
-def read_secret_option(secret_file: Path | None) -> str:
-    """Return the secret in the file, or typed without echo for ``-``; empty if no file is named.
-
-    Raises:
-        NoSecret: The file or the input holds no secret.
-    """
-    from getpass import getpass
-
-    from backbone.authentication import read_secret, read_secret_file
-
-    if secret_file is None:
-        return ""
-    if str(secret_file) != "-":
-        return read_secret_file(secret_file)
-    return read_secret(getpass("secret of the mission: ") if sys.stdin.isatty() else sys.stdin.readline())
 
 
 def read_or_exit(mission_file: Path) -> Any:
@@ -156,33 +109,9 @@ def check(
         f"{counted(len(description.types), 'component type')} on {counted(len(description.hosts), 'host')}"
     )
     if dry_run:
-        raise typer.Exit(int(_rehearse(description, for_s, trace)))
+        from backbone.command_line.rehearsing import print_dry_run
 
-
-def _rehearse(description: Any, for_s: float | None, trace: Path | None) -> ExitCode:
-    """Print a dry run; return the exit code."""
-    from rich.console import Console
-
-    from backbone.dry_run.run import FIRST_MINUTE_S, dry_run
-    from backbone.dry_run.screen import screen
-    from backbone.scheduling.own_planner import WrongPlanner
-
-    try:
-        dry = dry_run(description, FIRST_MINUTE_S if for_s is None else for_s)
-    except WrongPlanner as refused:
-        say(f"{refused} (remedy: {refused.remedy})")
-        return ExitCode.MISSION_INVALID
-    Console(width=_width(), markup=False, emoji=False).print(screen(dry))
-    if trace is not None:
-        try:
-            dry.write_trace(trace)
-        except OSError as error:
-            say(f"the trace cannot be written: {error}")
-            return ExitCode.UNEXPECTED
-    if not dry.can_come_up:
-        say(f"mission {description.name} cannot come up as it is")
-        return ExitCode.MISSION_INVALID
-    return ExitCode.DONE
+        raise typer.Exit(int(print_dry_run(description, for_s, trace, _width())))
 
 
 @app.command()
@@ -216,11 +145,10 @@ def up(
         raise typer.Exit(up_detached(description.name, mission_file, speed=speed, trace=trace, for_s=for_s))
     from backbone.command_line.mission_console import bring_up_on_console
     from backbone.launcher.core_launches import UpOptions
-    from backbone.launcher.verdict import VerdictPipe
 
-    options = UpOptions(speed=speed, trace=trace, for_s=for_s)
+    options, live = UpOptions(speed=speed, trace=trace, for_s=for_s), not headless and sys.stdout.isatty()
     verdict = VerdictPipe(os.fdopen(tell_fd, "w", encoding="utf-8")) if tell_fd is not None else None
-    run(lambda: bring_up_on_console(description, options, live=not headless and sys.stdout.isatty(), verdict=verdict))
+    run(lambda: bring_up_on_console(description, options, live=live, verdict=verdict))
 
 
 @app.command()
@@ -232,17 +160,10 @@ def status(
     secret_file: SecretFile = None,
 ) -> None:
     """Show health, components by subsystem, who holds which resource, and the schedule; 6 if the mission failed."""
+    from backbone.command_line.status import Shown, show_status
 
-    async def work() -> int:
-        from backbone.command_line.status import Shown, show_status
-
-        if connect is not None and mission is None:
-            raise typer.BadParameter("--connect needs --mission NAME")
-        source = f"ui_console/cli-{os.getpid()}"
-        secret = read_secret_option(secret_file) if connect is not None else ""
-        return await show_status(mission, connect, source, Shown(as_json=as_json, watch=watch, width=_width()), secret)
-
-    run(work)
+    where, shown = chosen(mission, connect, secret_file), Shown(as_json=as_json, watch=watch, width=_width())
+    run(lambda: show_status(where, shown))
 
 
 @app.command()
@@ -254,16 +175,10 @@ def why(
     secret_file: SecretFile = None,
 ) -> None:
     """Explain why a request waits or runs, until when, and why a component is on its host."""
+    from backbone.command_line.asking import print_reasons
 
-    async def work() -> int:
-        from backbone.picture.reasons import reasons_for
-
-        async with connected(mission, connect, secret_file) as (bus, clock):
-            reasons = await reasons_for(bus, name, clock)
-            show([json.dumps(reasons.to_json())] if as_json else reasons.lines(clock.now_s()))
-        return ExitCode.DONE
-
-    run(work)
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_reasons(where, name, as_json=as_json))
 
 
 @app.command()
@@ -275,24 +190,10 @@ def story(
     secret_file: SecretFile = None,
 ) -> None:
     """Print the events about a component, request or resource, with their causes."""
+    from backbone.command_line.asking import print_story
 
-    async def work() -> int:
-        from backbone.mission_log.lines import story_json, story_lines
-        from backbone.picture.reasons import story_of
-
-        async with connected(mission, connect, secret_file) as (bus, clock):
-            found = await story_of(bus, name, clock)
-        events = [*map(found.people.named_event, found.events)]
-        show([json.dumps(story_json(name, found.events, found.missing))] if as_json else story_lines(events))
-        if not found.events:
-            say(f"no component has an event about {name}")
-        if found.missing:
-            say(f"incomplete: {counted(len(found.missing), 'component')} did not answer")
-            for missing in found.missing:
-                say(f"  {missing}")
-        return ExitCode.DONE
-
-    run(work)
+    where = chosen(mission, connect, secret_file)
+    run(lambda: print_story(where, name, as_json=as_json))
 
 
 @app.command()
@@ -318,30 +219,11 @@ def log(
     secret_file: SecretFile = None,
 ) -> None:
     """Print the events of the mission and the actions of people: the newest that match, oldest first."""
+    from backbone.command_line.asking import print_log
+    from backbone.mission_log.question import LogQuestion
 
-    async def work() -> int:
-        from datetime import datetime
-
-        from backbone.addresses import LAUNCHER
-        from backbone.mission_log.lines import log_json, log_lines
-        from backbone.mission_log.log import Log
-        from backbone.mission_log.question import LogQuestion
-        from backbone.moments import Now
-
-        async with connected(mission, connect, secret_file) as (bus, clock):
-            now = Now(clock.now_s(), datetime.now(), clock.rate)
-            asked = LogQuestion(text, robot, person, level, since, until).asked(now, most)
-            kept = await bus.ask(LAUNCHER, asked, Log, within_s=LOG_WITHIN_S)
-        show([json.dumps(log_json(kept, now))] if as_json else log_lines(kept, now))
-        if not kept.events:
-            say("no event matches")
-        if kept.left_out:
-            say(f"{counted(kept.left_out, 'older event')} left out; see --most and --until")
-        if kept.since_s > asked.since_s:
-            say(f"events before {kept.since_s:.1f} s are no longer kept")
-        return ExitCode.DONE
-
-    run(work)
+    where, question = chosen(mission, connect, secret_file), LogQuestion(text, robot, person, level, since, until)
+    run(lambda: print_log(where, question, most, as_json=as_json))
 
 
 @app.command()
@@ -357,28 +239,11 @@ def start(
     secret_file: SecretFile = None,
 ) -> None:
     """Start one more component through the placer."""
-    parameters = dict(_parameter(given) for given in parameter or [])
+    from backbone.command_line.ordering import start_component
 
-    async def work() -> int:
-        from backbone.addresses import PLACER
-        from backbone.launcher.start_by_hand import completed
-        from backbone.mission_log.operators import OperatorAction, publish_action
-        from backbone.naming import component_of
-        from backbone.placer.messages import Start, Started
-        from backbone.placer.wishes import START_WITHIN_S
-
-        async with connected(mission, connect, secret_file) as (bus, clock):
-            order, remark = await completed(bus, Start(type_, name, parameters, host))
-            started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
-            if remark:
-                say(remark)
-            publish_action(bus, clock, OperatorAction.START_COMPONENT, component_of(started.address), f"a {type_}")
-            show([f"{started.address} on {started.host}, process {started.pid}"])
-            for reason in started.reasons:
-                say(reason)
-        return ExitCode.DONE
-
-    run(work)
+    where = chosen(mission, connect, secret_file)
+    order = Start(type_, name, dict(map(_parameter, parameter or [])), host)
+    run(lambda: start_component(where, order))
 
 
 @app.command()
@@ -389,19 +254,10 @@ def stop(
     secret_file: SecretFile = None,
 ) -> None:
     """Stop one component; it is not restarted."""
+    from backbone.command_line.ordering import stop_component
 
-    async def work() -> int:
-        from backbone.addresses import PLACER
-        from backbone.mission_log.operators import OperatorAction, publish_action
-        from backbone.placer.messages import Ended, StopComponent
-
-        async with connected(mission, connect, secret_file) as (bus, clock):
-            ended = await bus.ask(PLACER, StopComponent(name, "by command"), Ended, within_s=20.0)
-            publish_action(bus, clock, OperatorAction.STOP_COMPONENT, name, f"ended by {ended.by}")
-            show([f"{name} ended by {ended.by}"])
-        return ExitCode.DONE
-
-    run(work)
+    where = chosen(mission, connect, secret_file)
+    run(lambda: stop_component(where, name))
 
 
 @app.command(name="set", context_settings={"ignore_unknown_options": True})  # a priority may be below 0
@@ -426,38 +282,20 @@ def set_(
     if value is not None and as_json:
         raise typer.BadParameter("--json shows attributes; leave the value out")
 
-    async def work() -> int:
-        from backbone.command_line.attributes import attributes_of, change
-        from backbone.mission_log.operators import OperatorAction, login_name, publish_action
+    from backbone.command_line.ordering import print_attributes, set_attribute
 
-        async with connected(mission, connect, secret_file) as (bus, clock):
-            if parameter is not None and value is not None:
-                lines = await change(bus, name, parameter, _value(value), login_name())
-                publish_action(
-                    bus, clock, OperatorAction.SET_PARAMETER, name, f"{parameter} = {value_text(_value(value))}"
-                )
-            else:
-                shown = await attributes_of(bus, name)
-                if as_json:
-                    lines = [json.dumps(shown.to_json())]
-                else:
-                    lines = shown.lines() if parameter is None else shown.of(parameter)
-            show(lines)
-        return ExitCode.DONE
-
-    run(work)
+    where = chosen(mission, connect, secret_file)
+    if parameter is not None and value is not None:
+        run(lambda: set_attribute(where, name, parameter, _value(value)))
+    run(lambda: print_attributes(where, name, parameter, as_json=as_json))
 
 
 @app.command()
 def down(mission: MissionName = None) -> None:
     """Stop a mission of this machine in reverse order: ask, then SIGTERM, then SIGKILL; says which was needed."""
+    from backbone.launcher.detached import take_down
 
-    async def work() -> int:
-        from backbone.launcher.detached import take_down
-
-        return await take_down(mission)
-
-    run(work)
+    run(lambda: take_down(mission))
 
 
 @app.command()
@@ -469,18 +307,9 @@ def creator(
     tag: Annotated[list[str] | None, typer.Option("--tag", help="A tag of this machine; repeatable.")] = None,
 ) -> None:
     """Offer this machine to a mission until it ends, or until Ctrl-C: its placer may start components here."""
+    from backbone.command_line.offering import offer_this_machine
 
-    async def work() -> int:
-        from backbone.launcher.kept_creator import Offered
-        from backbone.launcher.offer import Offering
-
-        offered = Offered(mission, connect, host, tuple(tag or []), read_secret_option(secret_file))
-        is_file = secret_file is not None and str(secret_file) != "-"
-        say(f"{host} is offered to mission {mission}; end with Ctrl-C")
-        await Offering(offered, say, secret_file if is_file else None).run()
-        return ExitCode.DONE
-
-    run(work)
+    run(lambda: offer_this_machine(mission, connect, secret_file, host, tuple(tag or [])))
 
 
 @app.command()

@@ -15,9 +15,10 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import ComponentState, StoryEvent
 from backbone.errors import BackboneError, LinkError, Refusal
 from backbone.keys import Conversation
-from backbone.launcher.bring_up import Outcome, run_mission
+from backbone.launcher.bring_up import run_mission
 from backbone.launcher.core_launches import UpOptions
 from backbone.launcher.endings import ExitCode, complaint_of
+from backbone.launcher.outcome import Outcome
 from backbone.launcher.verdict import VerdictPipe
 from backbone.mission.model import MissionDescription
 from backbone.mission_log.operators import OperatorActed

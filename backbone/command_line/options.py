@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
+
+from backbone.command_line.where import Where
+from backbone.errors import BackboneError
 
 DISTRIBUTION = "scout-backbone"
 
@@ -58,6 +61,20 @@ def _first_paragraph(text: str) -> str:
     return " ".join(text.partition("\n\n")[0].split())
 
 
+def run(work: Callable[[], Awaitable[int]]) -> NoReturn:
+    """Run a command's coroutine and end the process with its exit code; a refusal becomes one line."""
+    from backbone.command_line.event_loop import exit_code_of
+
+    raise typer.Exit(exit_code_of(work))
+
+
+def chosen(mission: str | None, endpoint: str | None, secret_file: Path | None) -> Where:
+    """Return the mission that the options name; a hub elsewhere needs the mission's name."""
+    if endpoint is not None and mission is None:
+        raise typer.BadParameter("--connect needs --mission NAME")
+    return Where(mission, endpoint, secret_file)
+
+
 def print_version(is_asked: bool) -> None:
     """Print the installed version and end the command; for the option ``--version``."""
     if is_asked:
@@ -79,7 +96,6 @@ def hub_endpoint(value: str | None) -> str | None:
 
 def complete_mission() -> list[str]:
     """Return the missions that are up on this machine."""
-    from backbone.errors import BackboneError
     from backbone.run_files import find_all
 
     try:

@@ -14,10 +14,11 @@ from rich.live import Live
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus, Clock
+from backbone.command_line.connection import connected
+from backbone.command_line.where import Where
 from backbone.component.messages import Absence
 from backbone.errors import HubUnreachable, LinkError
 from backbone.launcher.endings import ExitCode
-from backbone.launcher.mission_connection import connected
 from backbone.picture.health import HealthWord
 from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture
@@ -42,21 +43,16 @@ class Shown:
     width: int | None
 
 
-async def show_status(
-    mission: str | None, endpoint: str | None, source: str, shown: Shown, secret: str = ""
-) -> ExitCode:
+async def show_status(where: Where, shown: Shown) -> ExitCode:
     """Print how a mission is and return the exit code: MISSION_FAILED if it has failed, else DONE.
-
-    Args:
-        secret: What the hub at the endpoint asks its clients for; empty: nothing.
 
     Raises:
         MissionNotUp: None of this name is up on this machine.
         LinkError: The nameserver did not answer, and no launcher of the mission lives on this machine.
     """
-    found = run_files.find(mission) if endpoint is None else None
+    found = run_files.find(where.mission) if where.connect is None else None
     try:
-        async with connected(mission, endpoint, source, secret) as (bus, clock):
+        async with connected(where) as (bus, clock):
             return await _show(bus, clock, found, shown)
     except LinkError as error:
         if found is None:

@@ -34,8 +34,9 @@ from backbone.creator.messages import (
     Spawned,
     UnlistedType,
 )
-from backbone.creator.process_keeper import Forks, ProcessKeeper, ReadVitals
-from backbone.creator.zygote import Zygote
+from backbone.creator.process_keeper import ProcessKeeper
+from backbone.creator.signs_of_life import ReadVitals
+from backbone.creator.zygote import Forks, Zygote
 from backbone.keys import Conversation
 from backbone.naming import MAX_NAME_LENGTH, legal
 from backbone.wire import Envelope, Message, UnknownMessage

@@ -27,6 +27,7 @@ from backbone.placer.placement import CandidateHost, place
 from backbone.rc_manager.service import TOLERANCE_S
 from backbone.scheduling.claims import scheduling_request
 from backbone.scheduling.events import RcKnown, Requested
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.rehearsal import Rehearsal, Timetable
 from backbone.scheduling.requests import SchedulingRequest, Usage
@@ -137,10 +138,11 @@ def dry_run(description: MissionDescription, for_s: float = FIRST_MINUTE_S) -> D
     rehearsal = Rehearsal(manager, opening_lines=manager.opening_lines())
     for rc in _rcs(description, hosts):
         rehearsal.tell(rc)
+    answers = Answers(manager)
     asked = [_ask(manager, rehearsal, claim, hosts) for claim in _claims(description)]
     rehearsal.run(for_s)
     timetable = Timetable(rehearsal.trace, rehearsal.now_s)
-    claimed = [_claimed(manager, timetable, one) for one in asked]
+    claimed = [_claimed(answers, timetable, one) for one in asked]
     return DryRun(description.name, placed, claimed, timetable, rehearsal.trace)
 
 
@@ -275,7 +277,7 @@ def _ask(manager: ScheduleManager, rehearsal: Rehearsal, claim: _BehaviorClaim, 
     return _Asked(claim, rcs)
 
 
-def _claimed(manager: ScheduleManager, timetable: Timetable, asked: _Asked) -> Claimed:
+def _claimed(answers: Answers, timetable: Timetable, asked: _Asked) -> Claimed:
     claim, wish = asked.claim, asked.claim.behavior.arc
     grants = [run.grant_s for run in timetable.of_arc(claim.arc) if run.grant_s is not None]
     return Claimed(
@@ -288,7 +290,7 @@ def _claimed(manager: ScheduleManager, timetable: Timetable, asked: _Asked) -> C
         turns=len(grants),
         first_grant_s=min(grants, default=None),
         worst_wait_s=timetable.worst_wait_s(claim.arc),
-        why=None if asked.refused else manager.why(claim.arc, timetable.end_s),
+        why=None if asked.refused else answers.why(claim.arc, timetable.end_s),
     )
 
 

@@ -11,10 +11,14 @@ import msgspec
 from backbone.addresses import LAUNCHER
 from backbone.bus.clock import MissionClock
 from backbone.component.launch import Launch
-from backbone.creator.messages import creator_name
+from backbone.creator.messages import RestartPolicy, creator_name
 from backbone.creator.preload import arc_modules
 from backbone.mission.model import Host, MissionDescription
 from backbone.naming import Subsystem
+
+CORE_POLICY = RestartPolicy(
+    back_off_s=0.02, back_off_most_s=0.5, limit=40, window_s=60.0
+)  # chosen: a dead hub stops all components, and leases outlast a restart of the RC manager only if its pause is short
 
 
 @dataclass(frozen=True)

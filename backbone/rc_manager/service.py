@@ -79,6 +79,7 @@ from backbone.scheduling.events import (
     Wanted,
     Woken,
 )
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
@@ -123,6 +124,7 @@ class RcManager(Component[RcManagerParameters]):
             goes_on=bool(given.trace) and _has_lines(Path(given.trace)),
             planner=load_planner(given.planner),
         )
+        self.answers = Answers(self.manager)
         self._resources: dict[str, Resource] = {}
         self._uses: dict[str, Mapping[str, RcUse]] = {}
         self._beats = Beats(clock.rate)
@@ -214,11 +216,11 @@ class RcManager(Component[RcManagerParameters]):
                 self.happened(NodeMoved(node, parent))
                 self._tell_paths(node)
             case AskSchedule():
-                return self.manager.schedule(self.clock.now_s())
+                return self.answers.schedule(self.clock.now_s())
             case AskWhy(name=name):
-                return self.manager.why(name, self.clock.now_s())
+                return self.answers.why(name, self.clock.now_s())
             case AskAttributes(name=name):
-                return self.manager.attributes(name)
+                return self.answers.attributes(name)
             case _:
                 return await super().answer(asked)
         return Done()
@@ -231,12 +233,12 @@ class RcManager(Component[RcManagerParameters]):
             self._admit(request, rcs)
         finally:
             self._requesting[request.arc] -= 1
-        return self.manager.scheduled(request.arc, self.clock.now_s())
+        return self.answers.scheduled(request.arc, self.clock.now_s())
 
     def _tell_paths(self, node: str) -> None:
         """Tell the ARCs at and below the node by which path they ask now: a later RC manager must hear of it."""
         with contextlib.suppress(UnknownRequest):  # nobody asks there yet
-            for one in self.manager.attributes(node).requests:
+            for one in self.answers.attributes(node).requests:
                 self.start_task(self._tell_path(one.arc, one.path), f"path of {one.arc}")
 
     async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
@@ -438,7 +440,7 @@ class RcManager(Component[RcManagerParameters]):
 
     def publish_news(self) -> None:
         """Publish the schedule, and how many run if that is news."""
-        schedule = self.manager.schedule(self.clock.now_s())
+        schedule = self.answers.schedule(self.clock.now_s())
         running = sum(1 for request in schedule.requests if request.state == "running")
         feedback = f"{running} of {len(schedule.requests)} ARCs run"
         if self._trace.stopped_by:

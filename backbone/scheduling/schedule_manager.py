@@ -15,13 +15,11 @@ Source: RAM 2002, "The RC Scheduler", last paragraph.
 
 from __future__ import annotations
 
-import copy
-import math
 from typing import assert_never
 
 from backbone.scheduling.alternatives import choose
 from backbone.scheduling.arc_events import ArcEvents
-from backbone.scheduling.entries import CONNECTED, ArcEntry
+from backbone.scheduling.entries import CONNECTED
 from backbone.scheduling.events import (
     Adopted,
     CapacityChanged,
@@ -44,8 +42,6 @@ from backbone.scheduling.events import (
     Wanted,
     Woken,
 )
-from backbone.scheduling.explain.attributes import attributes
-from backbone.scheduling.explain.explanation import Explanation
 from backbone.scheduling.invariants import broken
 from backbone.scheduling.master_schedule import EXACT_UP_TO, MasterSchedule
 from backbone.scheduling.own_planner import PlannerType
@@ -54,26 +50,21 @@ from backbone.scheduling.priority import higher
 from backbone.scheduling.priority_events import PriorityEvents
 from backbone.scheduling.priority_tree import PriorityTree
 from backbone.scheduling.rc_events import RcEvents
-from backbone.scheduling.rehearsal import Rehearsal
-from backbone.scheduling.requests import (
-    Lease,
-    NotMovable,
-    RequestState,
-    Scheduled,
-    SchedulingRequest,
-    UnknownRequest,
-)
+from backbone.scheduling.requests import Lease, NotMovable, SchedulingRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.state import ScheduleState
 from backbone.scheduling.transitions import Transitions
-from backbone.scheduling.views import Attributes, Schedule, Why
-
-FORESEEN_S = 300.0  # chosen: a start later than in five minutes is no answer to an operator
-FORESEEN_LINES = 1000  # chosen: some two hundred slices; measured: 32 ARCs take 80 ms
 
 
 class ScheduleManager:
-    """Who holds which RC now and next."""
+    """Who holds which RC now and next.
+
+    Attributes:
+        rules: With which it decides.
+        master_schedule: The plans and the state; only this manager changes them.
+        tree: The behavior tree with its priorities.
+        wake_s: Mission time at which it asked to be woken; None: it did not.
+    """
 
     def __init__(
         self,
@@ -96,24 +87,28 @@ class ScheduleManager:
             goes_on: True if the trace goes on after that of an earlier RC manager.
             planner: Plans all groups; None: those of this package do.
         """
+        self.rules = rules
         self._state = ScheduleState(
             discipline=rules.discipline, admission=rules.admission, tolerance_s=tolerance_s, exact_up_to=exact_up_to
         )
-        self._schedule = MasterSchedule(
+        self.master_schedule = MasterSchedule(
             self._state,
             strict=rules.policy == "strict",
             tolerance_s=tolerance_s,
             exact_up_to=exact_up_to,
             planner=planner,
         )
-        self._tree = PriorityTree(mission, mission_priority)
-        self._transitions = Transitions(self._schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
-        self._priorities = PriorityEvents(self._transitions, self._schedule, self._tree, rules)
-        self._arcs = ArcEvents(self._transitions, self._schedule, self._tree, self._priorities, rules)
-        self._rcs = RcEvents(self._transitions, self._schedule)
-        self._explanation = Explanation(self._schedule, rules, self._granted_s)
-        self._grace_s = rules.grace_s
-        self._wake_s: float | None = None
+        self.tree = PriorityTree(mission, mission_priority)
+        self._transitions = Transitions(self.master_schedule, rules, tolerance_s=tolerance_s, goes_on=goes_on)
+        self._priorities = PriorityEvents(self._transitions, self.master_schedule, self.tree, rules)
+        self._arcs = ArcEvents(self._transitions, self.master_schedule, self.tree, self._priorities, rules)
+        self._rcs = RcEvents(self._transitions, self.master_schedule)
+        self.wake_s: float | None = None
+
+    @property
+    def decided_s(self) -> float:
+        """Mission time of the last decision."""
+        return self._transitions.now_s
 
     # Events in, instructions out: apply, plan, switch.
 
@@ -130,7 +125,7 @@ class ScheduleManager:
         self._arcs.retry()
         self._state.end_slices(self._transitions.now_s)
         self._priorities.age()
-        while turn := self._schedule.due(self._transitions.now_s):
+        while turn := self.master_schedule.due(self._transitions.now_s):
             self._switch(turn)
             self._priorities.age()
         self._transitions.renew_slices()
@@ -186,7 +181,7 @@ class ScheduleManager:
         for holder in in_order_of_revocation(turn):
             overridden = higher(turn.arc.path, holder.path)
             forced = overridden and not holder.served(self._transitions.now_s)
-            if forced or not self._schedule.planner_of(turn.arc).reserves:
+            if forced or not self.master_schedule.planner_of(turn.arc).reserves:
                 self._state.reserve(turn.arc, forced=forced)
             if overridden:
                 self._transitions.revoke(holder, "higher", turn.arc.name)
@@ -198,8 +193,8 @@ class ScheduleManager:
         slice_end_s = self._state.end_slices(self._transitions.now_s)
         times_s = [self._arcs.next_retry_s(), slice_end_s, self._priorities.next_aging_s()]
         wake_s = min((time_s for time_s in times_s if time_s is not None), default=None)
-        if rang or wake_s != self._wake_s:
-            self._wake_s = wake_s
+        if rang or wake_s != self.wake_s:
+            self.wake_s = wake_s
             self._transitions.wake_at(wake_s)
 
     # Views.
@@ -215,41 +210,13 @@ class ScheduleManager:
         """
         return choose(self._state, request)
 
-    def scheduled(self, arc: str, now_s: float) -> Scheduled:
-        """Return where the request of this ARC is.
-
-        Raises:
-            UnknownRequest: It has none.
-        """
-        return self._explanation.scheduled(self._known(arc), max(now_s, self._transitions.now_s))
-
-    def schedule(self, now_s: float) -> Schedule:
-        """Return who holds what, who waits for whom, and until when."""
-        return self._explanation.schedule(max(now_s, self._transitions.now_s))
-
-    def why(self, name: str, now_s: float) -> Why:
-        """Return why an ARC, an owner (name or address) or an RC is as it is.
-
-        Raises:
-            UnknownRequest: There is none of this name.
-        """
-        return self._explanation.why(name, max(now_s, self._transitions.now_s))
-
-    def attributes(self, name: str) -> Attributes:
-        """Return what an ARC, an owner (name or address), or all at and below a node ask for.
-
-        Raises:
-            UnknownRequest: There is none of this name.
-        """
-        return attributes(self._state.arcs.values(), name, self._tree.nodes)
-
     def require_movable(self, node: str, parent: str) -> None:
         """Return if the node of the behavior tree can be moved below this parent; nothing changes.
 
         Raises:
             NotMovable: It cannot.
         """
-        obstacle = self._tree.obstacle(node, parent)
+        obstacle = self.tree.obstacle(node, parent)
         if obstacle:
             raise NotMovable(f"{node} cannot be moved below {parent}: {obstacle}", node=node, parent=parent)
 
@@ -277,47 +244,10 @@ class ScheduleManager:
         Raises:
             AssertionError: One does not; with the story of the ARCs concerned.
         """
-        for invariant, whom in broken(self._schedule, self._transitions.now_s):
+        for invariant, whom in broken(self.master_schedule, self._transitions.now_s):
             story = self._transitions.trace.story_of({arc.name for arc in whom})
             raise AssertionError("\n".join([f"broken at {self._transitions.now_s}: {invariant}", *map(str, story)]))
         for rc in self._state.rcs.values():
             if self._transitions.trace.says_up(rc.name) not in (None, rc.up):
                 lines = map(str, self._transitions.trace.story_of({rc.name}))
                 raise AssertionError("\n".join([f"{rc.name} is {'up' if rc.up else 'down'}, not by the trace", *lines]))
-
-    def _granted_s(self, arc: ArcEntry, now_s: float) -> float:
-        """Return when a waiting ARC is granted if nothing else happens, by playing a copy of this schedule forward.
-
-        Infinite: not within ``FORESEEN_S``.
-        """
-        rehearsal = self._going_on(now_s)
-        seen = 0
-        while rehearsal.step(now_s + FORESEEN_S) and len(rehearsal.trace) < FORESEEN_LINES:
-            for line in rehearsal.trace[seen:]:
-                if line["ev"] == "grant" and line["arc"] == arc.name:
-                    return rehearsal.now_s
-            seen = len(rehearsal.trace)
-        return math.inf
-
-    def _going_on(self, now_s: float) -> Rehearsal:
-        """Return a rehearsal of what comes; of the time to stop cleanly half is expected to be taken."""
-        under_way: list[tuple[float, Opened | Freed]] = []
-        for arc in self._state.arcs.values():
-            if arc.state is RequestState.CONNECTING:
-                under_way.append((max(now_s, arc.began_s + arc.settle_s), Opened(arc.name)))
-            elif arc.state is RequestState.REVOKING:
-                pause_s = self._grace_s / 2 if arc.swapped_out == "slice" and not arc.request.stops_at_once else 0.0
-                under_way.append((max(now_s, arc.since_s + pause_s + arc.release_s), Freed(arc.name)))
-        return Rehearsal.going_on(
-            copy.deepcopy(self),
-            now_s,
-            under_way=sorted(under_way, key=lambda item: item[0]),
-            release_s={rc.name: rc.disconnect_s for rc in self._state.rcs.values()},
-            wake_s=self._wake_s,
-            pause_s=lambda deadline_s: deadline_s / 2,
-        )
-
-    def _known(self, arc: str) -> ArcEntry:
-        if arc not in self._state.arcs:
-            raise UnknownRequest(f"no request of {arc!r} is known", name=arc)
-        return self._state.arcs[arc]

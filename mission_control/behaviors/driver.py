@@ -77,7 +77,7 @@ class Driver(Behavior[D]):
         return Position(pose.x_m, pose.y_m, pose.heading_rad)
 
     async def start(self) -> None:
-        """Fail at once without an ARC; see ``Behavior.start``."""
+        """Fail at once without an ARC; see ``BehaviorHooks.start``."""
         if self.parameters.arc is None:
             self.give_up(NeedsArc(f"{self.name} has no ARC; it needs one like {self.needs_arc!r}"))
 

@@ -90,7 +90,7 @@ class Servo(Driver[S]):
         self._phase = TrackingPhase.ACQUIRING
 
     async def resumed(self, rcs: Mapping[str, str]) -> None:  # noqa: ARG002  any robot with a camera
-        """Acquire the target again; see ``Behavior.resumed``."""
+        """Acquire the target again; see ``BehaviorHooks.resumed``."""
         self.look_anew()
 
     def see(self, frame: Frame) -> None:

@@ -69,6 +69,23 @@ def test_the_walls_stand(edges: set[walls.Import]) -> None:
     assert walls.broken(CONTRACTS, edges) == {}
 
 
+def folder_of(module: str) -> str:
+    return ".".join(MODULES[module].relative_to(TOP).parts[:-1])
+
+
+def test_no_folder_and_no_file_imports_what_imports_it(edges: set[walls.Import]) -> None:
+    own = {(importer, imported) for importer, imported in edges if imported in MODULES}
+    assert walls.circle(own, folder_of) == []
+    assert walls.circle(own, lambda module: module) == []
+
+
+def test_a_planted_circle_is_found(edges: set[walls.Import]) -> None:
+    back = ("backbone.errors", "backbone.launcher.endings")
+    own = {(importer, imported) for importer, imported in edges if imported in MODULES} | {back}
+    assert walls.circle(own, folder_of)
+    assert walls.circle(own, lambda module: module)
+
+
 def test_every_wall_has_a_planted_violation() -> None:
     assert {wall for wall, _file, _line in PLANTED} == {contract["id"] for contract in CONTRACTS}
 

@@ -84,7 +84,7 @@ def test_a_file_that_holds_no_secret_is_refused_by_its_name(tmp_path: Path, cont
 async def test_a_hub_admits_clients_with_its_secret_at_both_endpoints(
     short_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("backbone.bus.zenoh_bus.OPEN_TIMEOUT_MS", 300)
+    monkeypatch.setattr("backbone.bus.zenoh_settings.OPEN_TIMEOUT_MS", 300)
     secret = new_secret()
     file = keep_secret(short_path, secret)
     endpoints = [socket_endpoint(short_path), tcp_endpoint("127.0.0.1", free_port())]

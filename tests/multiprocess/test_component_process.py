@@ -31,10 +31,10 @@ DEADLINE_S = 20.0
 PLAIN = "resource_pool/plain"
 BECOME = """
 import sys, msgspec
-from backbone.bus import zenoh_bus
+from backbone.bus import zenoh_settings
 from backbone.component.launch import Launch
 from backbone.component.process import run_process
-zenoh_bus.OPEN_TIMEOUT_MS = 2000
+zenoh_settings.OPEN_TIMEOUT_MS = 2000
 sys.exit(run_process(msgspec.msgpack.decode(bytes.fromhex(sys.argv[1]), type=Launch)))
 """
 

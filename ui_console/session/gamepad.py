@@ -18,6 +18,11 @@ from typing import Protocol
 from backbone.errors import Refusal
 from ui_console.model.driving import STICK_LASTS_S, Drive, drive_by_stick
 
+try:
+    import evdev
+except ImportError:  # an extra that few machines have
+    evdev = None
+
 log = logging.getLogger(__name__)
 
 EV_KEY, EV_ABS = 1, 3  # Linux, input-event-codes.h
@@ -111,10 +116,8 @@ def find_gamepad() -> tuple[Gamepad, dict[int, tuple[int, int]]]:
     Raises:
         NoGamepad: There is none, or none that can be read.
     """
-    try:
-        import evdev  # noqa: PLC0415  an extra that few machines have
-    except ImportError as error:
-        raise NoGamepad(f"evdev is not installed: {error}") from None
+    if evdev is None:
+        raise NoGamepad("evdev is not installed")
     for path in evdev.list_devices():
         device = evdev.InputDevice(path)
         can = device.capabilities()

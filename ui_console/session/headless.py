@@ -6,6 +6,7 @@ import asyncio
 import sys
 from pathlib import Path
 
+from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
 from backbone.launcher.endings import ExitCode, say
 from ui_console.model.console import ConsoleModel
@@ -13,7 +14,7 @@ from ui_console.model.events import ConsoleEvent, for_scripts
 from ui_console.model.script import Step, WrongScript, read_script
 from ui_console.model.team import TeamModel
 from ui_console.model.views import view_json
-from ui_console.session.joining import Where, end_on_signals, join, write_line
+from ui_console.session.joining import end_on_signals, join, write_line
 from ui_console.session.observer import Observer, no_person_here
 from ui_console.session.scripted import ScriptDriver, feed_from
 from ui_console.session.teleoperation import Teleoperation

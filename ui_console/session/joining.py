@@ -10,34 +10,18 @@ import socket
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from backbone import run_files
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Clock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
-from backbone.command_line.cli import read_secret_option
+from backbone.command_line.where import Where
 from backbone.component.launch import Launch
 from backbone.launcher.mission_connection import clock_elsewhere
 from backbone.naming import Subsystem
 from ui_console.session.observer import AnyObserver
 
 MOST_OF_HOST = 24  # chosen: leaves room in a component's name for its number, and for its ARC's
-
-
-@dataclass(frozen=True)
-class Where:
-    """The mission a console joins.
-
-    Attributes:
-        mission: Its name; None: the one that is up on this machine.
-        connect: Endpoint of its hub, for a mission elsewhere, which then has a name.
-        secret_file: File with that mission's secret.
-    """
-
-    mission: str | None
-    connect: str | None
-    secret_file: Path | None
 
 
 @dataclass(frozen=True)
@@ -84,7 +68,7 @@ async def join(where: Where, parameters: dict[str, object] | None = None) -> Joi
         mission, endpoint, secret = found.mission, found.endpoint, run_files.secret(found)
         clock, host = MissionClock(found.clock_origin_monotonic_s, found.clock_rate), found.host
     else:
-        endpoint, host, secret = connect, socket.gethostname(), read_secret_option(where.secret_file)
+        endpoint, host, secret = connect, socket.gethostname(), where.secret()
         clock = await clock_elsewhere(mission, connect, f"{Subsystem.UI_CONSOLE}/{name}", secret)
     launch = Launch(
         mission,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from backbone.command_line.where import Where
 from backbone.component.component import NoParameters
 from backbone.launcher.endings import ExitCode
 from ui_console.model.profile import Profile
 from ui_console.session.gamepad import find_gamepad
-from ui_console.session.joining import Where, end_on_signals, join
+from ui_console.session.joining import end_on_signals, join
 from ui_console.session.observer import Observer
 from ui_console.session.teleoperation import Teleoperation
 from ui_console.terminal.session import TerminalSession

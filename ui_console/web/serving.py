@@ -11,9 +11,10 @@ from ssl import SSLContext
 import msgspec
 
 from backbone.bus.interface import Bus
+from backbone.command_line.where import Where
 from backbone.component.launch import Launch
 from backbone.launcher.endings import ExitCode, say
-from ui_console.session.joining import Where, end_server_on_signals, join, write_line
+from ui_console.session.joining import end_server_on_signals, join, write_line
 from ui_console.web.encryption import encryption_with
 from ui_console.web.hub import WebHub
 from ui_console.web.login import Authenticator, TokenRights

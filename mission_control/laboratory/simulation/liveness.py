@@ -83,7 +83,7 @@ class Watcher:
         missing = self.missing([*self._wanted, *self._calm_arcs])
         manager = self._machines.component("rc_manager")
         if isinstance(manager, AuditedRcManager):
-            known = {request.arc for request in manager.manager.schedule(self._clock.now_s()).requests}
+            known = {request.arc for request in manager.answers.schedule(self._clock.now_s()).requests}
             missing |= {
                 arc: "the RC manager does not know it" for arc in self._calm_arcs if arc not in known | missing.keys()
             }

@@ -22,8 +22,8 @@ from backbone.errors import NoResponder
 from backbone.wire import Envelope, Message
 from mission_control.laboratory.simulation.simulated_processes import SimulatedProcess, current_process
 
-LINK_LEASE_S = 2.0  # zenoh_bus.LINK_LEASE_MS
-RECONNECT_AFTER_S = 0.1  # zenoh_bus.RETRY_MOST_MS
+LINK_LEASE_S = 2.0  # zenoh_settings.LINK_LEASE_MS
+RECONNECT_AFTER_S = 0.1  # zenoh_settings.RETRY_MOST_MS
 
 Act = Callable[[], None]
 

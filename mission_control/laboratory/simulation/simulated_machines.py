@@ -26,7 +26,7 @@ from mission_control.laboratory.simulation.simulated_links import LinkedNetwork
 from mission_control.laboratory.simulation.simulated_processes import ProcessLoop, SimulatedProcess, current_process
 
 FORK_S = 0.02  # chosen: the duration of a fork and of a component's imports
-HUB_WITHIN_S = 5.0  # zenoh_bus.OPEN_TIMEOUT_MS
+HUB_WITHIN_S = 5.0  # zenoh_settings.OPEN_TIMEOUT_MS
 FIRST_PID = 1000
 LATE_STEPS = 5  # chosen: creator, owner, nameserver and observer need a step each, and one was just missed
 

@@ -18,8 +18,8 @@ from backbone.component.launch import Launch
 from backbone.creator.messages import ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.keys import Conversation
-from backbone.launcher.bring_up import CORE_POLICY, Launcher
-from backbone.launcher.core_launches import UpOptions
+from backbone.launcher.core_launches import CORE_POLICY, UpOptions
+from backbone.launcher.launcher import Launcher
 from backbone.naming import Subsystem
 from backbone.wire import Envelope
 from mission_control.laboratory.simulation.audit import Audit, current_audit

@@ -14,7 +14,7 @@ import zenoh
 from free_ports import free_endpoint
 from hostile_messages import enveloped, honest, hostile_messages
 
-from backbone.bus import zenoh_bus
+from backbone.bus import zenoh_bus, zenoh_settings
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config, hub_config
 from backbone.component.messages import AskState, CommonQuestion, SetParameter, Stop, Stopping
@@ -269,7 +269,7 @@ async def test_a_hub_on_a_taken_port_is_unreachable() -> None:
 
 
 async def test_no_hub_is_unreachable_when_the_time_is_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zenoh_bus, "OPEN_TIMEOUT_MS", 100)
+    monkeypatch.setattr(zenoh_settings, "OPEN_TIMEOUT_MS", 100)
     config = client_config(free_endpoint())
     with pytest.raises(HubUnreachable):
         ZenohBus.open("hostile", ASKER, CLOCK, config)

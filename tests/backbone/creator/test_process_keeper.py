@@ -19,15 +19,9 @@ from backbone.component.heartbeat import Vitals
 from backbone.component.launch import Launch
 from backbone.component.logs import log_path
 from backbone.component.messages import Stop, Stopping
-from backbone.creator.messages import (
-    AlreadyHere,
-    EndedBy,
-    NotHere,
-    ProcessFell,
-    RestartPolicy,
-    StartFailed,
-)
-from backbone.creator.process_keeper import LAST_LINES, ProcessKeeper, last_lines
+from backbone.creator.failed_starts import LAST_LINES, last_lines
+from backbone.creator.messages import AlreadyHere, EndedBy, NotHere, ProcessFell, RestartPolicy, StartFailed
+from backbone.creator.process_keeper import ProcessKeeper
 from backbone.creator.silence import LOOK_EVERY_S
 from backbone.naming import Subsystem
 

@@ -153,8 +153,8 @@ def test_two_claims_of_any_robot_get_two_robots() -> None:
 def test_its_requests_are_those_the_arcs_of_the_mission_send() -> None:
     """The real ARC makes its request from what its behavior starts it with; both are the same."""
     from mission_control.behavior_tree import BehaviorNode, walk
-    from resource_pool.aggregate_resource_controller import ArcParameters
     from resource_pool.arc_client import PathNode, claim_parameters
+    from resource_pool.arc_request import ArcParameters
 
     description = read_mission(MISSION_XML)
     nodes = [msgspec.convert(behavior.model_dump(mode="json"), BehaviorNode) for behavior in description.behaviors]

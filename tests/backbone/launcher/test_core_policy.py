@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backbone.launcher.bring_up import CORE_POLICY
+from backbone.launcher.core_launches import CORE_POLICY
 from backbone.rc_manager.messages import RENEW_EVERY_S
 from backbone.scheduling.requests import LEASE_S
 

@@ -27,6 +27,7 @@ from backbone.scheduling.events import (
     WakeAt,
     Woken,
 )
+from backbone.scheduling.explain.answers import Answers
 from backbone.scheduling.master_schedule import EXACT_UP_TO
 from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import PathNode, RcUse, SchedulingRequest, Usage
@@ -128,6 +129,11 @@ class Bench:
         self._wake_s: float | None = None
         for rc in rcs:
             self.tell(rc)
+
+    @property
+    def answers(self) -> Answers:
+        """What can be asked about the schedule."""
+        return Answers(self.manager)
 
     def at(self, time_s: float, event: Event) -> None:
         heapq.heappush(self._agenda, (time_s, next(self._serial), event))

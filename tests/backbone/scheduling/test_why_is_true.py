@@ -49,13 +49,13 @@ def moment(seed: int, rules: dict[str, Any]) -> Moment:
     bench.fails.clear()
     now_s = rng.uniform(1.0, LATEST_S)
     play(bench, [(time_s, event) for time_s, event in happens if time_s <= now_s], now_s)
-    requests = bench.manager.schedule(now_s).requests
+    requests = bench.answers.schedule(now_s).requests
     return Moment(bench, now_s, [request for request in requests if request.state is RequestState.WAITING])
 
 
 def repair(then: Moment, request: RequestView) -> None:
     """Bring back the request's RCs that are down, and the capacity of those that lost some."""
-    for rc in then.bench.manager.schedule(then.now_s).rcs:
+    for rc in then.bench.answers.schedule(then.now_s).rcs:
         if rc.rc in request.rcs and rc.state == "down":
             then.bench.tell(RcCameBack(rc.rc, 0))
     for known in then.bench.rcs:
@@ -66,7 +66,7 @@ def repair(then: Moment, request: RequestView) -> None:
 def granted_without_blockers(seed: int, then: Moment) -> Why | None:
     """Ask why one waits, remove whom it names, let time pass for a hand-over; return the answer if it was of no use."""
     request = Random(seed).choice(then.waiting)
-    why = then.bench.manager.why(request.arc, then.now_s)
+    why = then.bench.answers.why(request.arc, then.now_s)
     before = len(then.bench.runs(request.arc))
     for name in why.blockers:
         then.bench.tell(Departed(name))
@@ -113,7 +113,7 @@ def test_with_aging_why_is_nearly_always_enough() -> None:
 def needless(seed: int, then: Moment) -> list[str]:
     """Return the names in ``why`` without whose removal the ARC would have been granted, too."""
     request = Random(seed).choice(then.waiting)
-    names = then.bench.manager.why(request.arc, then.now_s).blockers
+    names = then.bench.answers.why(request.arc, then.now_s).blockers
     found = []
     for name in names:
         again = moment(seed, {})
@@ -138,7 +138,7 @@ def of_the_schedule(then: Moment, request: RequestView) -> float:
 
 
 def of_why(then: Moment, request: RequestView) -> float:
-    return then.bench.manager.why(request.arc, then.now_s).expected_start_s
+    return then.bench.answers.why(request.arc, then.now_s).expected_start_s
 
 
 def predictions(

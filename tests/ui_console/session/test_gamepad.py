@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -195,7 +194,7 @@ class FoundDevice:
 
 def test_the_first_device_with_a_stick_and_a_shoulder_button_is_the_gamepad(monkeypatch: pytest.MonkeyPatch) -> None:
     evdev = SimpleNamespace(list_devices=lambda: ["mouse", "pad", "other pad"], InputDevice=FoundDevice)
-    monkeypatch.setitem(sys.modules, "evdev", evdev)
+    monkeypatch.setattr("ui_console.session.gamepad.evdev", evdev)
     device, ranges = find_gamepad()
     assert isinstance(device, FoundDevice)
     assert (device.path, ranges) == ("pad", {ABS_X: (0, 255), ABS_Y: (0, 255)})
@@ -204,7 +203,7 @@ def test_the_first_device_with_a_stick_and_a_shoulder_button_is_the_gamepad(monk
 @pytest.mark.parametrize("installed", [True, False])
 def test_without_a_gamepad_or_the_extra_it_is_said_what_to_do(installed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     evdev = SimpleNamespace(list_devices=lambda: ["mouse"], InputDevice=FoundDevice) if installed else None
-    monkeypatch.setitem(sys.modules, "evdev", evdev)
+    monkeypatch.setattr("ui_console.session.gamepad.evdev", evdev)
     with pytest.raises(NoGamepad) as refusal:
         find_gamepad()
     assert "scout-backbone[gamepad]" in refusal.value.remedy
