@@ -1,8 +1,8 @@
 """The bus between processes, over Eclipse Zenoh. The only file that imports zenoh.
 
 Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
-burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one; subscribers and
-queryables keep their one indirect thread.
+burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one, and so are those about
+tokens; other subscribers and queryables keep their one indirect thread.
 
 Measured settings: clients of one hub, no scouting, lease 2 s, ``express`` on questions and replies only, blocking for
 messages that are sent once, dropping for repeated messages (docs/decisions/0003-zenoh-settings.md).
@@ -367,12 +367,12 @@ class ZenohBus(BusBase):
         def changed(sample: zenoh.Sample) -> None:
             self.call("", listener, address_of(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
 
+        def arrived(sample: zenoh.Sample) -> None:
+            self.push(changed, sample)
+
         pattern = key(self._mission, address, Conversation.ALIVE)
-        return self._declare(
-            self._session.liveliness().declare_subscriber(
-                pattern, lambda sample: self.push(changed, sample), history=True
-            )
-        )
+        in_order = zenoh.handlers.Callback(arrived, indirect=False)  # with answers about tokens, which are direct too
+        return self._declare(self._session.liveliness().declare_subscriber(pattern, in_order, history=True))
 
     def watch_link(self, listener: LinkListener) -> _Declared:
         """Report the loss and return of this session's link; see ``Bus.watch_link``.

@@ -208,3 +208,26 @@ async def test_a_name_that_moves_to_another_process_is_followed(pool: Pool) -> N
     elsewhere.close()
     await heard.until(lambda all_: len(all_) == 4)
     assert heard.all == [(RADIO, True), (RADIO, False)] * 2
+
+
+async def test_a_no_of_the_hub_counts_only_when_the_session_agrees(pool: Pool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The session drops an answer about a token that it reports in the meantime; the hub is then asked again."""
+    heard, asked = Heard(), 0
+    stands = pool.scout.stands
+
+    async def drop_three(address: str) -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > 3 and await stands(address)
+
+    token = pool.radio.declare_alive(RADIO)
+    pool.scout.watch_alive(RADIO, heard)
+    await heard.until(lambda all_: len(all_) == 1)
+    token.close()
+    await heard.until(lambda all_: len(all_) == 2)
+    monkeypatch.setattr(pool.scout, "stands", drop_three)
+    elsewhere = pool.stranger.declare_alive(RADIO)
+    await heard.until(lambda all_: len(all_) == 3)
+    elsewhere.close()
+    await heard.until(lambda all_: len(all_) == 4)
+    assert heard.all == [(RADIO, True), (RADIO, False)] * 2
