@@ -32,7 +32,7 @@ from ui_console.model.driving import Drive as DriveKey
 from ui_console.model.events import Asked, CommandApplied, ConsoleEvent, GivenBack, Granted
 from ui_console.session.teleoperation import Teleoperation
 
-pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.processes, pytest.mark.alone, pytest.mark.timeout(300)]  # it measures milliseconds
 
 DRIVEN_WITHIN_S = 0.150
 GIVEN_BACK_WITHIN_S = 1.0

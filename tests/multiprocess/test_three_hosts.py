@@ -28,8 +28,8 @@ SEEN_TWICE_S = 0.5  # the watch looks at one machine after the other: what moved
 GONE_WITHIN_S = 5.0
 
 
-def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_leaves_nothing(tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
+def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_leaves_nothing(short_path: Path) -> None:
+    with mission_on_three_hosts(short_path) as mission:
         there = mission.components()
         assert (there["scout1"]["host"], there["scout2"]["host"]) == ("near", "far")
         assert any("✓ host near" in line for line in mission.up.lines), mission.story()
@@ -43,8 +43,8 @@ def test_a_mission_on_three_hosts_comes_up_by_the_printed_commands_and_leaves_no
         assert secret not in "\n".join(mission.up.lines)
 
 
-def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwhile(tmp_path: Path) -> None:
-    with machines(tmp_path) as mission:
+def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwhile(short_path: Path) -> None:
+    with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         mission.wait("near is there", lambda: any("✓ host near" in line for line in mission.up.lines), 30.0)
         state = asyncio.run(state_of_the_launcher(mission))
@@ -61,8 +61,8 @@ def test_up_waits_for_a_missing_host_names_it_as_absent_and_is_taken_down_meanwh
         mission.wait("nothing is left", lambda: not mission.left(), GONE_WITHIN_S)
 
 
-def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
+def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(short_path: Path) -> None:
+    with mission_on_three_hosts(short_path) as mission:
         before = {name: c["pid"] for name, c in mission.components().items() if c["host"] == "far"}
         hub = mission.components()["nameserver"]["pid"]
         os.kill(hub, signal.SIGKILL)
@@ -73,8 +73,8 @@ def test_a_hub_that_is_killed_is_back_before_anything_ends_on_the_other_hosts(tm
         assert {name: there[name]["pid"] for name in before if name in there} == before, mission.story()
 
 
-def test_ctrl_c_ends_an_offer_at_any_time(tmp_path: Path) -> None:
-    with machines(tmp_path) as mission:
+def test_ctrl_c_ends_an_offer_at_any_time(short_path: Path) -> None:
+    with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         base = mission.hosts["base"]
         mission.type_what_up_prints("far")
@@ -91,8 +91,8 @@ def test_ctrl_c_ends_an_offer_at_any_time(tmp_path: Path) -> None:
             mission.type_what_up_prints("far")
 
 
-def test_a_host_without_the_secret_stays_outside_and_says_so(tmp_path: Path) -> None:
-    with machines(tmp_path) as mission:
+def test_a_host_without_the_secret_stays_outside_and_says_so(short_path: Path) -> None:
+    with machines(short_path) as mission:
         mission.type_what_up_prints("near")
         (mission.hosts["far"].folder / "wrong").write_text("scout:c0ffee\n")
         for more in ([], ["--secret-file", "wrong"]):
@@ -105,8 +105,9 @@ def test_a_host_without_the_secret_stays_outside_and_says_so(tmp_path: Path) -> 
             assert offer.process.wait(8) == 0
 
 
-def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_by_its_secret(tmp_path: Path) -> None:
-    with mission_on_three_hosts(tmp_path) as mission:
+@pytest.mark.alone
+def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_by_its_secret(short_path: Path) -> None:
+    with mission_on_three_hosts(short_path) as mission:
         mission.hosts["base"].die()
         near, far = mission.hosts["near"], mission.hosts["far"]
         offers = {offer.process.pid for offer in mission.offers.values()}
@@ -123,10 +124,10 @@ def test_a_dead_base_ends_all_on_every_host_within_5_s_and_a_new_run_gets_them_b
         mission.wait("all is ready", lambda: any(line.startswith("all ready") for line in mission.up.lines), 60.0)
 
 
-def test_two_copies_on_two_machines_are_seen(tmp_path: Path) -> None:
+def test_two_copies_on_two_machines_are_seen(short_path: Path) -> None:
     """The watch over copies, which finds none elsewhere, finds those that are there."""
-    with hosts_on_a_switch(tmp_path, "near", "far") as hosts:
-        copy = tmp_path / "watcher"
+    with hosts_on_a_switch(short_path, "near", "far") as hosts:
+        copy = short_path / "watcher"
         shutil.copy(shutil.which("sleep") or "", copy)
         with Copies(hosts) as copies:
             sleeping = [host.start([str(copy), "1"], dict(os.environ)) for host in hosts.values()]
@@ -147,6 +148,7 @@ async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
         await bus.close()
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize(
     "cut_s",
     [
@@ -158,8 +160,8 @@ async def state_of_the_launcher(mission: ThreeHosts) -> ComponentState:
         pytest.param(60.0, marks=pytest.mark.slow),
     ],
 )
-def test_a_link_cut_heals(tmp_path: Path, cut_s: float) -> None:
-    with mission_on_three_hosts(tmp_path) as mission, Copies(mission.hosts) as copies:
+def test_a_link_cut_heals(short_path: Path, cut_s: float) -> None:
+    with mission_on_three_hosts(short_path) as mission, Copies(mission.hosts) as copies:
         far = mission.hosts["far"]
         far.cut()
         time.sleep(cut_s)
@@ -175,9 +177,10 @@ def test_a_link_cut_heals(tmp_path: Path, cut_s: float) -> None:
         assert mission.is_whole(), mission.story()
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("away_s", [1.0, pytest.param(20.0, marks=pytest.mark.slow)])
-def test_a_host_that_dies_and_is_back_gets_its_components_again(tmp_path: Path, away_s: float) -> None:
-    with mission_on_three_hosts(tmp_path) as mission, Copies(mission.hosts) as copies:
+def test_a_host_that_dies_and_is_back_gets_its_components_again(short_path: Path, away_s: float) -> None:
+    with mission_on_three_hosts(short_path) as mission, Copies(mission.hosts) as copies:
         mission.hosts["far"].die()
         time.sleep(away_s)
         mission.type_what_up_prints("far")
@@ -187,8 +190,8 @@ def test_a_host_that_dies_and_is_back_gets_its_components_again(tmp_path: Path, 
         assert mission.components()["scout2"]["host"] == "far"
 
 
-def test_a_detached_up_waits_too_and_returns_when_all_is_ready(tmp_path: Path) -> None:
-    with machines(tmp_path, "--detach") as mission:
+def test_a_detached_up_waits_too_and_returns_when_all_is_ready(short_path: Path) -> None:
+    with machines(short_path, "--detach") as mission:
         for host in ("near", "far"):
             assert mission.up.process.poll() is None
             mission.type_what_up_prints(host)
