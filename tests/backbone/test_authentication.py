@@ -7,6 +7,7 @@ import socket
 from pathlib import Path
 
 import pytest
+from free_ports import free_port
 
 from backbone.authentication import (
     LONGEST_SOCKET_PATH,
@@ -39,13 +40,6 @@ def folder_of_length(base: Path, length: int) -> Path:
     folder.mkdir()
     assert len(os.fsencode(folder / SOCKET_NAME)) == length
     return folder
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def test_the_longest_socket_path_is_the_systems_and_one_byte_more_is_refused(short_path: Path) -> None:

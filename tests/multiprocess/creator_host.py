@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import socket
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,6 +14,7 @@ from typing import Any
 import msgspec
 import psutil
 import uvloop
+from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.zenoh_bus import ZenohBus, client_config
@@ -100,13 +100,6 @@ def left_of(processes: list[psutil.Process], within_s: float) -> list[psutil.Pro
     return [each for each in psutil.wait_procs(processes, timeout=within_s)[1] if each.status() != "zombie"]
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
-
-
 @asynccontextmanager
 async def creator_host(directory: Path) -> AsyncIterator[CreatorHost]:
     """Give a host whose creator is ready; everything of it is ended afterwards."""
@@ -118,7 +111,7 @@ async def creator_host(directory: Path) -> AsyncIterator[CreatorHost]:
         "nameserver",
         "backbone.nameserver.service:Nameserver",
         "lab",
-        f"tcp/127.0.0.1:{free_port()}",
+        free_endpoint(),
         clock.origin_monotonic_s,
         1.0,
         run_directory=str(directory),

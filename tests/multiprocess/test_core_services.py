@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.interface import Bus
@@ -67,9 +67,7 @@ class Probe(Component[NoParameters]):
 
 @pytest.fixture
 def endpoint() -> str:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    return free_endpoint()
 
 
 def launch(endpoint: str, name: str, subsystem: Subsystem, class_path: str, run_directory: Path) -> Launch:

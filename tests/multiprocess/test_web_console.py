@@ -8,7 +8,6 @@ import json
 import math
 import os
 import re
-import socket
 import stat
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
@@ -16,6 +15,7 @@ from typing import Any
 
 import pytest
 import web_browser
+from free_ports import free_port
 from running_mission import MISSION_XML, mission_up
 from served_page import Served, serving
 from web_browser import Cable, Finger, assert_no_sideways_scroll
@@ -374,9 +374,7 @@ async def test_a_stranger_is_asked_for_the_token_and_told_that_it_is_wrong(serve
 async def test_when_the_server_was_killed_and_is_started_again_open_pages_come_back_by_themselves(
     served: Served,
 ) -> None:
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     async with contextlib.AsyncExitStack() as open_page:
         with serving(served.mission, port) as first:
             kept = served.mission.directory / f"web-{port}.json"

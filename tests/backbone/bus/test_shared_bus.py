@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import socket
 from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
 from typing import Any
 
 import pytest
 import pytest_asyncio
+from free_ports import free_endpoint
 
 from backbone.bus.clock import MissionClock
 from backbone.bus.shared_bus import SharedBus, SharedSession
@@ -43,9 +43,7 @@ class Pool:
 
 @pytest_asyncio.fixture
 async def pool() -> AsyncIterator[Pool]:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    endpoint = free_endpoint()
     clock = MissionClock.started_now()
     hub = ZenohBus.open("pool", "backbone/hub", clock, hub_config([endpoint]))
     session = SharedSession("pool", endpoint)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import socket
 import threading
 from collections.abc import AsyncIterator, Awaitable
 from contextlib import asynccontextmanager
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 import zenoh
+from free_ports import free_endpoint
 from hostile_messages import enveloped, honest, hostile_messages
 
 from backbone.bus import zenoh_bus
@@ -39,12 +39,6 @@ async def within(work: Awaitable[Any], what: str, limit_s: float = DEADLINE_S) -
             return await work
     except TimeoutError:
         pytest.fail(f"not within {limit_s:g} s: {what}")
-
-
-def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def join(endpoint: str, source: str) -> ZenohBus:
