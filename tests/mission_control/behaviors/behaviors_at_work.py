@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-from examples import share
+from examples import FULL, share
 from hypothesis import Phase, settings
 
 from backbone.bus.interface import Bus, Clock
@@ -23,7 +23,7 @@ from resource_pool.simulation.whole_mission import RunningMission, mission_in_on
 from ui_console.model.driving import Drive
 from ui_console.session.teleoperation import Teleoperation
 
-FEW_MOMENTS = settings(max_examples=2, phases=[Phase.generate], derandomize=True)
+FEW_MOMENTS = settings(max_examples=1 + (share(FULL) == FULL), phases=[Phase.generate], derandomize=True)
 MANY_MOMENTS = settings(max_examples=share(30), phases=[Phase.generate], derandomize=True)
 """How many sequences of take-overs are played; never shrunk, which would take an hour."""
 
