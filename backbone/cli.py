@@ -33,7 +33,7 @@ from backbone.cli_options import (
     finite,
     hub_endpoint,
 )
-from backbone.component.messages import LogLevel
+from backbone.component.log_level import LogLevel
 from backbone.endings import ExitCode, complaint_of, say, show
 from backbone.errors import BackboneError
 from backbone.spoken import counted, value_text

@@ -11,7 +11,7 @@ from contextlib import suppress
 from enum import IntEnum
 
 from backbone.errors import BackboneError, HubUnreachable, LinkError, Refusal, code_of
-from backbone.printable import printable_lines
+from backbone.printable_text import printable_lines
 
 
 class ExitCode(IntEnum):

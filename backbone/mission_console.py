@@ -25,7 +25,8 @@ from backbone.picture.look import look
 from backbone.picture.mission import MissionPicture, Said, holders_line
 from backbone.picture.screen import live_screen
 from backbone.picture.words import absence_line
-from backbone.printable import printable_all, printable_lines
+from backbone.printable import printable_all
+from backbone.printable_text import printable_lines
 from backbone.rc_manager.messages import ADDRESS as RC_MANAGER
 from backbone.scheduling.requests import RequestState
 from backbone.scheduling.views import Schedule

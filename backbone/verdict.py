@@ -12,7 +12,7 @@ from typing import TextIO
 
 import msgspec
 
-from backbone.printable import printable_lines
+from backbone.printable_text import printable_lines
 
 
 class Talk(msgspec.Struct, frozen=True, tag="talk"):

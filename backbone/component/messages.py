@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated, Any
 
+from backbone.component.log_level import LogLevel as LogLevel  # noqa: PLC0414  a part of these messages
 from backbone.ranges import MANY, Address, Count, Instant, Measure, Mention, Pid, Rate, Text, Values
 from backbone.wire import Message
 
@@ -149,15 +150,6 @@ class AskStory(Message, frozen=True):
     """
 
     subject: Mention = ""
-
-
-class LogLevel(StrEnum):
-    """Importance of an event, most important first."""
-
-    ALARM = "alarm"  # a robot may act wrongly, or not at all
-    WARNING = "warning"  # the mission continues, degraded
-    NOTICE = "notice"  # an action or finding of a person or behavior
-    INFO = "info"
 
 
 class StoryEvent(Message, frozen=True):
