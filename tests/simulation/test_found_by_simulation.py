@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 
 from resource_pool.simulation.faults import Fault, KillFault, MessageFault
-from resource_pool.simulation.mission_run import run_mission
+from resource_pool.simulation.mission_run import MissionRun, run_mission
 from resource_pool.simulation.supervised_mission import run_supervised
 from resource_pool.simulation.supervision_faults import Cut, End, Pause, SupervisionFault
 
@@ -84,16 +86,22 @@ FOUND: dict[str, tuple[int, list[Fault]]] = {
 }
 
 
+@cache
+def run_found(what: str) -> MissionRun:
+    """Return the mission with its faults, played once for all tests that look at it."""
+    seed, faults = FOUND[what]
+    return run_mission(seed, chaos=True, faults=faults)
+
+
 @pytest.mark.parametrize("what", FOUND)
 def test_what_was_found_does_not_come_back(what: str) -> None:
-    seed, faults = FOUND[what]
-    run = run_mission(seed, chaos=True, faults=faults)
+    run = run_found(what)
     assert run.broken is None, f"{what}: {run.broken}"
 
 
 def test_these_missions_still_suffer_what_they_were_found_with() -> None:
     """A message has its name from how many went before it; once most names have changed, the cases prove nothing."""
-    whole = [set(run_mission(seed, chaos=True, faults=faults).faults) == set(faults) for seed, faults in FOUND.values()]
+    whole = [set(run_found(what).faults) == set(faults) for what, (_, faults) in FOUND.items()]
     assert sum(whole) > len(whole) / 2
 
 
