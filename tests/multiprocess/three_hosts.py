@@ -71,6 +71,7 @@ class ThreeHosts:
         file: The mission file.
         offers: The commands typed on near and far.
         names: What the mission consists of when it is whole.
+        missing: What was not there when that was last asked.
         talks: Every command that was typed and let run.
         up: The command typed on base.
     """
@@ -80,12 +81,13 @@ class ThreeHosts:
     file: Path
     offers: dict[str, Talk] = field(default_factory=dict)
     names: frozenset[str] = frozenset()
+    missing: list[str] = field(default_factory=list)
     talks: list[Talk] = field(default_factory=list)
     up: Talk = field(init=False)
 
     def story(self) -> str:
         """Return what all commands said, and the ends of all logs, for failure messages."""
-        parts = ["--- up", *self.up.lines[-40:]]
+        parts = [f"--- missing: {', '.join(self.missing)}", "--- up", *self.up.lines[-40:]]
         for name, offer in self.offers.items():
             parts += [f"--- offer {name}", *offer.lines[-20:]]
         for host in self.hosts.values():
@@ -118,7 +120,8 @@ class ThreeHosts:
     def is_whole(self) -> bool:
         """Say whether every component of the mission is there and ready."""
         there = self.components()
-        return all(name in there and there[name]["state"] == "ready" for name in self.names)
+        self.missing = sorted(name for name in self.names if name not in there or there[name]["state"] != "ready")
+        return not self.missing
 
     def go_on_with(self, host: str, command: list[str]) -> Talk:
         """Type a command on that machine and let it run."""
