@@ -13,8 +13,8 @@ from backbone.bus.interface import Bus, Clock
 from backbone.component.messages import NameTaken, Stop, Stopping
 from backbone.component.peer_monitor import PeerMonitor
 from backbone.errors import LinkError, Refusal
-from backbone.placer.messages import CreatorSilent, Ended, Start, Started, StopComponent
-from backbone.placer.wishes import Wish
+from backbone.placer.messages import CreatorSilent, Ended, Start, StopComponent
+from backbone.placer.wishes import Wish, ask_to_start
 from resource_pool.messages import ArcState
 
 log = logging.getLogger(__name__)
@@ -103,7 +103,8 @@ class ArcKeeper:
         """Start the ARC; first end an ARC that an earlier life of the owner left behind."""
         while True:
             try:
-                await self._bus.ask(PLACER, Start(kind, self._arc, parameters), Started, within_s=START_TIME_S)
+                order = Start(kind, self._arc, parameters)
+                await ask_to_start(self._bus, self._clock, self._wish, order, START_TIME_S, self._on_changed)
                 return
             except NameTaken as refusal:
                 cause = f"one from before has its name: {refusal.detail}"

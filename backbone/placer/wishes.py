@@ -29,6 +29,7 @@ PAUSE_FIRST_S, PAUSE_MOST_S = 0.2, 5.0  # chosen: a restarted placer is back wit
 COMPARE_EVERY_S = 20.0  # chosen: every known cause triggers a comparison at once; this is for the unknown ones
 REPLY_TIME_S = 1.0  # chosen: the placer answers in milliseconds
 START_WITHIN_S = START_MOST_S + 10.0  # chosen: the placer's own limit and a moment
+SLOW_START_S = 1.5  # chosen: most starts take less than one; health names what is absent within 2 s
 
 
 @dataclass
@@ -68,6 +69,29 @@ class Wish:
         if self.missing_since_s < 0:
             return None
         return Absence(self.name, self.missing_since_s, self.cause, "its owner asks the placer to start it")
+
+
+async def ask_to_start(
+    bus: Bus, clock: Clock, wish: Wish, order: Start, within_s: float, on_changed: Callable[[], None]
+) -> Started:
+    """Return the placer's answer; a component whose start takes long is absent meanwhile.
+
+    Raises:
+        Refusal: The placer did not start it.
+        LinkError: It is unknown whether the placer did.
+    """
+
+    async def report_slow_start() -> None:
+        await clock.sleep_s(SLOW_START_S * clock.rate)
+        wish.missing("its start is not confirmed yet", clock.now_s())
+        on_changed()
+
+    slow = asyncio.create_task(report_slow_start(), name=f"{wish.name}: slow start")
+    try:
+        return await bus.ask(PLACER, order, Started, within_s=within_s)
+    finally:
+        slow.cancel()
+        await asyncio.gather(slow, return_exceptions=True)
 
 
 async def keep_placed(
@@ -120,7 +144,7 @@ async def _start(
     """Return the placement, and whether the component ran already."""
     while True:
         try:
-            started = await bus.ask(PLACER, order, Started, within_s=START_WITHIN_S)
+            started = await ask_to_start(bus, clock, wish, order, START_WITHIN_S, on_changed)
         except NameTaken:
             try:
                 return await bus.ask(PLACER, AskPlacement(wish.name), Placement, within_s=REPLY_TIME_S), True

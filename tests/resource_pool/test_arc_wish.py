@@ -30,8 +30,9 @@ class Owner:
 class PlayedPlacer:
     """Starts the ARC, which is a token, unless one from before has its name; that one takes long to end."""
 
-    def __init__(self, network: LocalNetwork, *, leftover: bool = False) -> None:
+    def __init__(self, network: LocalNetwork, *, leftover: bool = False, takes_s: float = 0.0) -> None:
         self.bus, self.arc, self.leftover = network.join(PLACER, CLOCK), network.join(ARC, CLOCK), leftover
+        self.takes_s = takes_s
         self.bus.serve(PLACER, Start | StopComponent, self.answer)
 
     async def answer(self, asked: Envelope[Any]) -> Message:
@@ -41,6 +42,7 @@ class PlayedPlacer:
             return Ended(asked.body.name, "asking")  # type: ignore[arg-type]
         if self.leftover:
             raise NameTaken("it is starting")
+        await CLOCK.sleep_s(self.takes_s)
         self.token = self.arc.declare_alive(ARC)
         return Started(ARC, "h1", 1, [])
 
@@ -58,6 +60,30 @@ def test_an_arc_is_missed_while_it_cannot_be_reached() -> None:
         assert arc.wish.absence() is not None
         placer.token = placer.arc.declare_alive(ARC)
         await CLOCK.sleep_s(0.1)
+        assert arc.wish.absence() is None
+        await _end(keeping, bus, placer.bus, placer.arc)
+
+    run_virtual(main())
+
+
+def test_an_arc_whose_start_takes_long_is_missed_meanwhile() -> None:
+    """The question, or its answer, may be lost on a cut link: for 30 s a behavior had no ARC, and health was ok."""
+
+    async def main() -> None:
+        network = LocalNetwork()
+        placer, bus = PlayedPlacer(network, takes_s=10.0), network.join("mission_control/owner", CLOCK)
+        arc, changed = ArcClient(bus, "owner-drive", Owner()), 0
+
+        def count() -> None:
+            nonlocal changed
+            changed += 1
+
+        keeping = asyncio.create_task(arc.keep(CLOCK, "drive", {}, on_changed=count))
+        await CLOCK.sleep_s(1.0)
+        assert arc.wish.absence() is None
+        await CLOCK.sleep_s(1.0)
+        assert (arc.wish.absence() is not None, changed) == (True, 1)
+        await CLOCK.sleep_s(9.0)
         assert arc.wish.absence() is None
         await _end(keeping, bus, placer.bus, placer.arc)
 
