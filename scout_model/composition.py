@@ -8,14 +8,13 @@ sites that tell a camera where it is dark.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from importlib import resources
 
 import mujoco
 import numpy as np
 
-from scout_model.carrier import check_stops
 from scout_model.description import DarkPlace, Furniture, Landmark, Ramp, ScoutPlace, Target, WorldDescription
+from scout_model.description_checks import check
 from scout_model.dimensions import (
     BLOB_DIAMETER_M,
     BLOBS_M,
@@ -30,23 +29,21 @@ from scout_model.dimensions import (
     PERSON_HIP_M,
     PIONEER_HEIGHT_M,
     PIONEER_RADIUS_M,
+    TABLE_LEG_M,
+    TABLE_TOP_M,
     WALL_HEIGHT_M,
 )
 from scout_model.errors import InvalidWorld
-from scout_model.radio_link import FIRST_NETWORK_ID, LAST_NETWORK_ID
 from scout_model.robot import robot_class
 from scout_model.room_file import add_room
-from scout_model.targets import CARRIER, SHAPES, part_poses, path_length_m
+from scout_model.targets import CARRIER, part_poses
 
 _WALL_THICKNESS_M = 0.1  # chosen: a Scout in flight does not pass through within one step
 _MARK_THICKNESS_M = 0.002  # chosen: enough to keep mark and surface apart in the depth buffer across the room
 _SHADE_THICKNESS_M = 0.004  # chosen: as much above a mark as that is above its surface
-_TABLE_TOP_M = 0.03  # chosen: a board
-_TABLE_LEG_M = 0.05  # chosen: a Scout sees it and passes beside it
 _FLOOR_LEVEL = 0.45  # as in room.xml
 _AT_A_WALL_M = 0.05  # chosen: what ends so close to a wall darkens it
 _MARKS, _THINGS = 1, 2  # geom groups, see room.xml
-_FURNITURE_SHAPES = ("box", "table")
 
 
 def compose(description: WorldDescription) -> str:
@@ -80,82 +77,6 @@ def compose(description: WorldDescription) -> str:
     except ValueError as error:
         raise InvalidWorld(f"MuJoCo cannot build it: {error}") from error
     return str(spec.to_xml())
-
-
-def check(description: WorldDescription) -> None:
-    """Return if the world can be built.
-
-    Raises:
-        InvalidWorld: It cannot; the first reason.
-    """
-    width_m, depth_m = description.width_m, description.depth_m
-    if not (0 < width_m < math.inf and 0 < depth_m < math.inf):
-        raise InvalidWorld(f"a room of {width_m} by {depth_m} m")
-    parts: list[Furniture | ScoutPlace | Target | Ramp | Landmark | DarkPlace] = [
-        *description.furniture,
-        *description.scouts,
-        *description.targets,
-        *description.ramps,
-        *description.landmarks,
-        *description.dark_places,
-    ]
-    names = Counter(part.name for part in parts)
-    for name, uses in names.items():
-        if uses > 1 or not name or "/" in name:
-            raise InvalidWorld(f"name {name!r} is empty, has a '/', or is used {uses} times")
-    ids = Counter(place.network_id for place in description.scouts)
-    for network_id, uses in ids.items():
-        if uses > 1 or not FIRST_NETWORK_ID <= network_id <= LAST_NETWORK_ID:
-            raise InvalidWorld(
-                f"network id {network_id} is used {uses} times or outside {FIRST_NETWORK_ID} to {LAST_NETWORK_ID}"
-            )
-    for place in description.scouts:
-        if not (0 < place.x_m < width_m and 0 < place.y_m < depth_m and math.isfinite(place.heading_rad)):
-            raise InvalidWorld(f"{place.name} at ({place.x_m}, {place.y_m}) m is not in the room")
-        robot_class(place.kind)
-    for dark in description.dark_places:
-        _check_extents(dark.name, (dark.width_m, dark.depth_m, dark.height_m), dark.x_m, dark.y_m)
-    for furniture in description.furniture:
-        _check_shape(furniture)
-    for ramp in description.ramps:
-        _check_extents(ramp.name, (ramp.length_m, ramp.width_m, ramp.height_m), ramp.x_m, ramp.y_m, ramp.heading_rad)
-    for landmark in description.landmarks:
-        if not _finite(landmark.x_m, landmark.y_m, landmark.heading_rad):
-            raise InvalidWorld(f"{landmark.name} is nowhere")
-    for target in description.targets:
-        _check_target(target)
-    check_stops(description)
-
-
-def _check_extents(name: str, sizes_m: tuple[float, ...], *place: float) -> None:
-    if not all(0 < size_m < math.inf for size_m in sizes_m) or not _finite(*place):
-        raise InvalidWorld(f"{name} has impossible sizes {sizes_m} m")
-
-
-def _check_shape(furniture: Furniture) -> None:
-    sizes_m = (furniture.width_m, furniture.depth_m, furniture.height_m)
-    _check_extents(furniture.name, sizes_m, furniture.x_m, furniture.y_m)
-    if furniture.shape not in _FURNITURE_SHAPES:
-        raise InvalidWorld(f"{furniture.name}: shape {furniture.shape!r} is none of {', '.join(_FURNITURE_SHAPES)}")
-    if furniture.shape == "table" and (
-        furniture.height_m <= _TABLE_TOP_M or min(furniture.width_m, furniture.depth_m) <= 2 * _TABLE_LEG_M
-    ):
-        raise InvalidWorld(f"{furniture.name} is too small for a table")
-
-
-def _check_target(target: Target) -> None:
-    if target.shape not in SHAPES:
-        raise InvalidWorld(f"{target.name}: shape {target.shape!r} is none of {', '.join(SHAPES)}")
-    if not all(_finite(*point) for point in target.path) or not 0 < path_length_m(target.path) < math.inf:
-        raise InvalidWorld(f"{target.name}: its path {target.path} leads nowhere")
-    if not 0 < target.speed_m_s < math.inf or not 0 <= target.rest_s < math.inf or not math.isfinite(target.begin_s):
-        raise InvalidWorld(
-            f"{target.name}: speed {target.speed_m_s} m/s, rest {target.rest_s} s, begin {target.begin_s} s"
-        )
-
-
-def _finite(*values: float) -> bool:
-    return all(math.isfinite(value) for value in values)
 
 
 def _asset(name: str) -> str:
@@ -240,7 +161,7 @@ def _add_marks(spec: mujoco.MjSpec, description: WorldDescription) -> None:
 
 def _below_tables(description: WorldDescription) -> list[DarkPlace]:
     return [
-        DarkPlace(table.name, table.x_m, table.y_m, table.width_m, table.depth_m, table.height_m - _TABLE_TOP_M)
+        DarkPlace(table.name, table.x_m, table.y_m, table.width_m, table.depth_m, table.height_m - TABLE_TOP_M)
         for table in description.furniture
         if table.shape == "table"
     ]
@@ -285,17 +206,17 @@ def _add_furniture(spec: mujoco.MjSpec, furniture: Furniture, dark_places: list[
         size_m = [furniture.width_m, furniture.depth_m, height_m]
         _box(world, furniture.name, [x_m, y_m, height_m / 2], size_m, 0.56 * (DARKNESS if is_dark else 1.0), _THINGS)
         return
-    under_m = height_m - _TABLE_TOP_M
-    top_m = [furniture.width_m, furniture.depth_m, _TABLE_TOP_M]
-    _box(world, furniture.name, [x_m, y_m, height_m - _TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
+    under_m = height_m - TABLE_TOP_M
+    top_m = [furniture.width_m, furniture.depth_m, TABLE_TOP_M]
+    _box(world, furniture.name, [x_m, y_m, height_m - TABLE_TOP_M / 2], top_m, 0.56, _THINGS)
     # Its underside: just below the top and a little smaller, so that it is not seen from the side.
-    inset_m = _TABLE_LEG_M / 2
+    inset_m = TABLE_LEG_M / 2
     underside_m = [furniture.width_m - inset_m, furniture.depth_m - inset_m, _MARK_THICKNESS_M]
     _box(world, f"{furniture.name}/underside", [x_m, y_m, under_m - _MARK_THICKNESS_M], underside_m, 0.1, _THINGS)
     for number, (right, back) in enumerate(((-1, -1), (1, -1), (-1, 1), (1, 1))):
-        leg_x_m = x_m + right * (furniture.width_m - _TABLE_LEG_M) / 2
-        leg_y_m = y_m + back * (furniture.depth_m - _TABLE_LEG_M) / 2
-        leg_m = [_TABLE_LEG_M, _TABLE_LEG_M, under_m]
+        leg_x_m = x_m + right * (furniture.width_m - TABLE_LEG_M) / 2
+        leg_y_m = y_m + back * (furniture.depth_m - TABLE_LEG_M) / 2
+        leg_m = [TABLE_LEG_M, TABLE_LEG_M, under_m]
         _box(world, f"{furniture.name}/leg_{number}", [leg_x_m, leg_y_m, under_m / 2], leg_m, 0.3, _THINGS)
 
 
