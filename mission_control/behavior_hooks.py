@@ -13,7 +13,7 @@ from resource_pool.arc_client import Frame
 
 
 class BehaviorHooks:
-    """What happens to a behavior, and its own decisions."""
+    """Hooks of a behavior: events to it, and its own decisions."""
 
     async def start(self) -> None:
         """Prepare.

@@ -24,7 +24,7 @@ START_TIME_S = 30.0  # chosen: an ARC may have to wait for RCs that are starting
 
 
 class KeptArc(Protocol):
-    """What a keeper needs of ``ArcClient``.
+    """Interface of ``ArcClient`` for a keeper.
 
     Attributes:
         address: Address of the ARC.

@@ -33,7 +33,7 @@ _LIFT_SHARE = 0.25  # chosen: of the time; as much to lower it, the rest to reac
 
 @dataclass(frozen=True, slots=True)
 class CarriedPose:
-    """Where a carried Scout is held.
+    """Place of a carried Scout.
 
     Attributes:
         x_m: Position of its axle's middle.

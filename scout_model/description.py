@@ -1,4 +1,4 @@
-"""What a simulated world is made of: plain data, from a mission file or a test. SI units, radians.
+"""Description of a simulated world: plain data, from a mission file or a test. SI units, radians.
 
 The room's frame: origin in a corner of the floor, x along its width, y along its depth, z up.
 Headings: 0 looks along +x, counter-clockwise is positive.
@@ -147,7 +147,7 @@ class Target(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class AirDescription(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the air does to packets and pictures. The default is mild: a very good day in the papers' room.
+    """Effects of the air on packets and pictures. The default is mild: a very good day in the papers' room.
 
     Scales go from 0, off, over 1, as the papers tell, to 10; ``noise`` multiplies the five next to it.
 

@@ -1,4 +1,4 @@
-"""What the simulated hardware refuses. This package knows no bus, so it has a tree of its own."""
+"""Refusals of the simulated hardware. This package knows no bus, so it has a tree of its own."""
 
 from __future__ import annotations
 

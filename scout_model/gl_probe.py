@@ -35,7 +35,7 @@ _MUJOCO_GL: dict[Backend, str] = {"egl": "egl", "osmesa": "osmesa", "none": "dis
 
 @dataclass(frozen=True, slots=True)
 class GlSupport:
-    """What can draw here.
+    """The means to draw on this machine.
 
     Attributes:
         backend: Which OpenGL works; ``none``: none does.

@@ -162,7 +162,7 @@ class Painter:
 
 @dataclass(frozen=True, slots=True)
 class _Thing:
-    """What is painted together: geoms with a body of their own, and which corners bound them."""
+    """A unit of painting: geoms with a body of their own, and the corners that bound them."""
 
     solids: NDArray[np.intp]
     marks: list[int]

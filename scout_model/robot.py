@@ -31,7 +31,7 @@ class Robot(Protocol):
 
     @property
     def frequency(self) -> str:
-        """Where its transmitter sends, empty while it is off."""
+        """Frequency of its transmitter; empty while it is off."""
 
     @property
     def motors(self) -> float:

@@ -33,7 +33,7 @@ from scout_model.radio_link import DrivePacket, HaltPacket, JumpPacket, Safe, Tr
 
 
 class Spring(StrEnum):
-    """Where the spring foot is in its jump."""
+    """Phase of the spring foot's jump."""
 
     WOUND = "wound"
     PRELOADING = "preloading"
@@ -43,7 +43,7 @@ class Spring(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Actuation:
-    """What the actuators shall do until the next tick.
+    """Commands to the actuators until the next tick.
 
     Attributes:
         left_rad_s: Left wheel, forward is positive, within ``WHEEL_SPEED_LIMIT_RAD_S``.
@@ -93,14 +93,14 @@ class Firmware:
         self._frequency = ""
         self._heard_s = 0.0
         self.spring = Spring.WOUND
-        """Where the spring foot is in its jump."""
+        """Phase of the spring foot's jump."""
         self._spring_since_s = 0.0
         self._let_out_m = 0.0
         self._heard = self._malformed = self._refused_jumps = self._timeouts = 0
 
     @property
     def frequency(self) -> str:
-        """Where the transmitter sends, empty while it is off."""
+        """Frequency of the transmitter; empty while it is off."""
         return self._frequency
 
     def statistics(self) -> FirmwareStatistics:

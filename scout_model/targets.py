@@ -1,4 +1,4 @@
-"""Where a target is: a pure function of time, so every trial meets the same one."""
+"""Place of a target: a pure function of time, so every trial meets the same target."""
 
 from __future__ import annotations
 

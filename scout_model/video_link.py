@@ -49,7 +49,7 @@ _LONG_AGO = -1_000_000
 
 
 class FrameKind(StrEnum):
-    """What is worst about a frame, from nothing to everything."""
+    """The worst fault of a frame, from none to complete loss."""
 
     CLEAN = "clean"
     GHOST = "ghost"

@@ -27,7 +27,7 @@ from scout_model.scout import FirmwareStatistics, Scout, Spring
 from scout_model.targets import Route, TargetState, part_poses, parts
 
 STATE = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT
-"""What of MuJoCo's state a picture depends on."""
+"""The part of MuJoCo's state that determines a picture."""
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _BALL = int(mujoco.mjtJoint.mjJNT_BALL)

@@ -1,1 +1,1 @@
-"""What every component is and does."""
+"""Base of every component: life cycle, process, questions, log and story."""

@@ -12,7 +12,7 @@ ReadVitals = Callable[[str, int], Vitals | None]
 
 
 class Sign(NamedTuple):
-    """What was seen of one process.
+    """Observation of one process.
 
     Attributes:
         pid: The process.
@@ -26,7 +26,7 @@ class Sign(NamedTuple):
 
 
 class SignsOfLife:
-    """What the processes of one machine show of themselves.
+    """Signs of life of the processes of one machine.
 
     Args:
         read_vitals: Reads the vitals of a process, given run directory and pid.

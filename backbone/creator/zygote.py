@@ -50,7 +50,7 @@ class NoProcess(BackboneError):
 
 
 class Forks(Protocol):
-    """What a keeper needs of a zygote; see ``Zygote``."""
+    """Interface of a zygote for its keeper; see ``Zygote``."""
 
     on_exit: Callable[[int, int], None]
     on_lost: Callable[[], None]

@@ -1,4 +1,4 @@
-"""What has to fit together in the behavior tree: types, parameters, and the ARCs its nodes claim."""
+"""Consistency checks of the behavior tree: types, parameters, and the ARCs its nodes claim."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What has to fit together in a mission file: hosts, core services, types, resources, names.
+"""Consistency checks of a mission file: hosts, core services, types, resources, names.
 
 Pure: elements in, faults out. Values that the schema has refused are passed over here, so that one
 mistake is reported once. World and behaviors have files of their own.

@@ -64,7 +64,7 @@ class ParameterFacts(msgspec.Struct, frozen=True):
 
     @property
     def meaning(self) -> str:
-        """What it means, and the values it takes."""
+        """Its meaning, and its legal values."""
         return "; ".join(part for part in (self.doc.rstrip("."), self.legal_values) if part)
 
     @property

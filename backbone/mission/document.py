@@ -48,7 +48,7 @@ class Attribute:
 
 
 class Span(NamedTuple):
-    """Where an element stands among the bytes of its file.
+    """Span of an element among the bytes of its file.
 
     Attributes:
         begin: First byte of its tag.
@@ -123,7 +123,7 @@ class Element:
 
 
 class AttributeSpan(NamedTuple):
-    """Where an attribute stands among the bytes of its file.
+    """Span of an attribute among the bytes of its file.
 
     Attributes:
         blanks: First byte of the blanks before it.

@@ -1,4 +1,4 @@
-"""What a checked mission file says, without a trace of how it was written. Immutable."""
+"""Content of a checked mission file, independent of its notation. Immutable."""
 
 from __future__ import annotations
 

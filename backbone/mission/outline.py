@@ -10,7 +10,7 @@ from backbone.mission.document import Element, parse
 from backbone.mission.report import MissionInvalid, Report
 
 Path = tuple[int, ...]
-"""Where an element stands: its number among its parent's children, from 0, from the root down; the root's is empty."""
+"""Path of an element: its number among its parent's children, from 0, from the root down; the root's is empty."""
 
 
 class EditRefused(Refusal):

@@ -1,4 +1,4 @@
-"""What has to fit together where components share a process."""
+"""Consistency checks of components that share a process."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ QUOTED_LENGTH = 60  # chosen: same
 
 
 class Place(NamedTuple):
-    """Where something stands in a file; both count from 1, columns in characters."""
+    """Line and column in a file; both count from 1, columns in characters."""
 
     line: int
     column: int

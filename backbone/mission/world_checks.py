@@ -1,4 +1,4 @@
-"""What has to fit together in the simulated world of a mission file."""
+"""Consistency checks of the simulated world of a mission file."""
 
 from __future__ import annotations
 

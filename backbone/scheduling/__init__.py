@@ -1,1 +1,1 @@
-"""Who holds which resource now and next, and why: pure decisions on a clock that is an argument."""
+"""Present and next holders of every RC, with reasons: pure decisions; time is an argument."""

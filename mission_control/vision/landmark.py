@@ -48,7 +48,7 @@ DISCS_M: Floats = np.array(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sighting:
-    """Where the landmark is in a picture.
+    """Place of the landmark in a picture.
 
     Attributes:
         blobs_px: Middles of its discs: column and row, shape (4, 2), rows as in ``Disc``.  Whole numbers

@@ -46,7 +46,7 @@ SEARCH_TURN_RAD_S = 0.8  # chosen: nothing is tracked meanwhile
 
 
 class Stage(StrEnum):
-    """Where an approach is."""
+    """Phases of an approach."""
 
     SEARCHING = "searching"
     FORWARD = "forward"
@@ -57,7 +57,7 @@ class Stage(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What the robot shall do until the next one.
+    """Command to the robot until the next one.
 
     Attributes:
         forward_m_s: Speed of its middle.
@@ -162,7 +162,7 @@ class Approach:
     def __init__(self, stop_m: float = STOP_M) -> None:
         self._stop_m = stop_m
         self.stage = Stage.SEARCHING
-        """Where the approach is."""
+        """Phase of the approach."""
         self._next_stage = Stage.FORWARD
         self._last = HALT
         self._side = 1.0

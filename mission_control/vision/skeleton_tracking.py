@@ -35,7 +35,7 @@ STEADY_PX, STEADY_SHARE = 0.5, 0.05  # chosen: of the pitch; twice the noise, an
 
 
 class TrackingPhase(StrEnum):
-    """What the tracker does with pictures."""
+    """Phases of the tracker."""
 
     ACQUIRING = "acquiring"
     TRACKING = "tracking"

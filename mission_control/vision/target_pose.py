@@ -1,4 +1,4 @@
-"""Where the robot stands before the landmark, from the middles of its four discs.
+"""Pose of the robot before the landmark, from the middles of the landmark's four discs.
 
 Frame: origin on the floor under the middle of the board.  The zero-angle line leaves the board at a
 right angle; ``ahead_m`` is measured along it.  A robot on it that faces the board has heading 0.
@@ -60,7 +60,7 @@ SCOUT_CAMERA = CameraModel(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TargetPose:
-    """Where the middle of the robot's axle is, and how sure that is.
+    """Estimate of the middle of the robot's axle, with its uncertainty.
 
     Attributes:
         ahead_m: Before the board.
@@ -90,7 +90,7 @@ class TargetPose:
 
     @property
     def bearing_rad(self) -> float:
-        """Where the middle of the board is, seen from the axle: 0 straight ahead, positive to the left."""
+        """Bearing of the middle of the board from the axle: 0 straight ahead, positive to the left."""
         return math.remainder(-self.off_axis_rad - self.heading_rad, math.tau)
 
     def moved(self, forward_m: float, turn_rad: float) -> TargetPose:

@@ -1,1 +1,1 @@
-"""What a console knows and shows: messages in, views out. Pure."""
+"""Knowledge of a console: messages in, views out. Pure."""

@@ -1,1 +1,1 @@
-"""What a mission file may say: each element and attribute declared once, with unit, range, default and meaning."""
+"""Declaration of the mission file: each element and attribute once, with unit, range, default and meaning."""

@@ -1,4 +1,4 @@
-"""What every declared element has in common, and the element that several others hold."""
+"""Common base of all declared elements, and the element that several others hold."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ Schema = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class AttributeRule:
-    """What is declared of an attribute.
+    """Declaration of an attribute.
 
     Attributes:
         kind: Its kind of value, see ``values``.
@@ -45,13 +45,13 @@ class AttributeRule:
 
     @property
     def remedy(self) -> str:
-        """What its value must be like."""
+        """The rule for its value."""
         return str(self.schema.get("meaning", self.documentation))
 
 
 @dataclass(frozen=True, slots=True)
 class ElementRule:
-    """What is declared of an element.
+    """Declaration of an element.
 
     Attributes:
         attributes: By name, in the order in which they are written.

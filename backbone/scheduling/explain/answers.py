@@ -22,7 +22,7 @@ FORESEEN_LINES = 1000  # chosen: some two hundred slices; measured: 32 ARCs take
 
 
 class Answers:
-    """Who holds what, who waits for whom, why and until when."""
+    """The schedule in words: holders, waiting ARCs, blockers, reasons and times."""
 
     def __init__(self, manager: ScheduleManager) -> None:
         """Answer about the schedule of this manager.

@@ -40,7 +40,7 @@ class Policy(StrEnum):
 
 
 class TargetKind(StrEnum):
-    """What passes."""
+    """Kinds of targets."""
 
     PIONEER = "pioneer"
     PERSON = "person"

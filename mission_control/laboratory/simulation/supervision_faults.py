@@ -23,7 +23,7 @@ END = Literal["killed", "politely"]
 
 @dataclass(frozen=True, slots=True)
 class _Sudden:
-    """What strikes a target at one moment."""
+    """A fault of a target at one moment."""
 
     at_s: float
     target: str
