@@ -131,7 +131,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
         """Return the ARC of the tree; see ``BehaviorHooks``."""
         return self.parameters.arc
 
-    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, Any]) -> None:
+    async def children_finished(self, status: BehaviorStatus, payload: Mapping[str, object]) -> None:
         """Finish with the same status; see ``BehaviorHooks``."""
         self.finish(status, payload)
 
@@ -360,7 +360,7 @@ class Behavior(Component[B], BehaviorHooks, Generic[B]):
                     assert_never(instruction)
         await asyncio.gather(*starting)
 
-    def _abandon(self, name: str, payload: Mapping[str, Any]) -> None:
+    def _abandon(self, name: str, payload: Mapping[str, object]) -> None:
         """Report a child that could not work as a lasting absence; a finished child that failed is no absence."""
         if "code" in payload:
             remedy = f"see 'scout-backbone story {name}', mend the cause, then stop {self.name} and start it again"

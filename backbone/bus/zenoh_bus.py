@@ -1,8 +1,8 @@
 """The bus between processes, over Eclipse Zenoh. The only file that imports zenoh.
 
 Zenoh's threads never run component code: they put arrivals into an inbox and wake the event loop once for a whole
-burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one; subscribers and
-queryables keep their one indirect thread.
+burst. ``get`` callbacks are direct, because zenoh would start a thread for each indirect one, and so are those about
+tokens; other subscribers and queryables keep their one indirect thread.
 
 Measured: ``express`` on questions and replies only, blocking for messages that are sent once, dropping for repeated
 messages (docs/decisions/0003-zenoh-settings.md).

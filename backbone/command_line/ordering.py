@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 from backbone.addresses import PLACER
 from backbone.command_line.attributes import attributes_of, change
@@ -43,7 +42,7 @@ async def stop_component(where: Where, name: str) -> ExitCode:
     return ExitCode.DONE
 
 
-async def set_attribute(where: Where, name: str, attribute: str, value: Any) -> ExitCode:
+async def set_attribute(where: Where, name: str, attribute: str, value: object) -> ExitCode:
     """Set the attribute, print its present values, and publish the action."""
     async with connected(where) as (bus, clock):
         lines = await change(bus, name, attribute, value, login_name())

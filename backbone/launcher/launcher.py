@@ -9,7 +9,7 @@ import signal
 import time
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -35,7 +35,7 @@ from backbone.nameserver.messages import Components, ListComponents
 from backbone.naming import Subsystem, address
 from backbone.placer.messages import Ended, ListPlacements, NoHost, Placement, Placements, Start, StopComponent
 from backbone.placer.wishes import Wish, keep_placed
-from backbone.wire import Envelope, Message
+from backbone.wire import Accepts, Envelope, Message
 
 log = logging.getLogger(__name__)
 
@@ -48,7 +48,7 @@ MEET_EACH_S = 0.1  # chosen: too short to notice, and a hundred times the cost o
 class Launcher(Component[NoParameters]):
     """Starts the core services and the mission, restarts core services, stops all."""
 
-    accepts: ClassVar[Any] = ListProcesses | AskLog | AskPeople
+    accepts: ClassVar[Accepts | None] = ListProcesses | AskLog | AskPeople
 
     def __init__(
         self,
@@ -112,7 +112,7 @@ class Launcher(Component[NoParameters]):
         publish_action(self.bus, self.clock, OperatorAction.STOP_MISSION, self._description.name, "Ctrl-C")
         self.end(signal.SIGINT.name)
 
-    async def answer(self, asked: Envelope[Any]) -> Message:
+    async def answer(self, asked: Envelope[Message]) -> Message:
         """Answer ``ListProcesses`` for the core services, ``AskLog`` and ``AskPeople``."""
         match asked.body:
             case ListProcesses():

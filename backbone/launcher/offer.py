@@ -52,7 +52,7 @@ class Ending(StrEnum):
     OTHER_TIME = "the mission's time is no longer the one known here, as after a sleep of this machine"
 
 
-class Offer(Component[NoParameters]):
+class MachineOffer(Component[NoParameters]):
     """Runs a creator on this machine while the mission can be reached.
 
     Attributes:
@@ -146,7 +146,7 @@ class Offering:
 
     def __init__(self, offered: Offered, say: Callable[[str], None], secret_file: Path | None = None) -> None:
         self._offered, self._say, self._secret_file = offered, say, secret_file
-        self._current: Offer | None = None
+        self._current: MachineOffer | None = None
         self._lives: asyncio.Task[None] | None = None
         self._is_ordered_to_end = self._was_in_the_mission = False
         self._said = ""
@@ -196,7 +196,7 @@ class Offering:
             await machine.sleep_s(pause_s)
             pause_s = min(pause_s * PAUSE_FACTOR, PAUSE_MOST_S)
 
-    async def _live(self) -> Offer:
+    async def _live(self) -> MachineOffer:
         """Run one offer, from the hub's first answer to the end of the offer."""
         if self._secret_file is not None:
             self._offered = replace(self._offered, secret=read_secret_file(self._secret_file))
@@ -215,7 +215,7 @@ class Offering:
             ) from error
         launch = _launch(offered, name, clock)
         creator = KeptCreator(launch, offered)
-        offer = self._current = Offer(launch, bus, clock, creator, self._is_in_the_mission)
+        offer = self._current = MachineOffer(launch, bus, clock, creator, self._is_in_the_mission)
         try:
             await offer.run()
         finally:

@@ -34,14 +34,16 @@ def describe(mission: MissionElement, source: str) -> MissionDescription:
     hosts = () if mission.hosts is None else mission.hosts.host
     world = mission.world
     resources = () if mission.resources is None else mission.resources.resource
+    members = (*resources, *(() if world is None else (world,)))
+    host_of_process = {one.process: one.host for one in members if one.process and one.host}
     return MissionDescription(
         name=mission.name,
         priority=mission.priority,
         hosts=hosts,
         core=_core(mission, [host.name for host in hosts]),
         types=() if mission.types is None else tuple(map(_component_type, mission.types.type)),
-        resources=tuple(_resource(resource, world) for resource in resources),
-        components=() if world is None else (_world(world, resources, source),),
+        resources=tuple(_resource(resource, world, host_of_process) for resource in resources),
+        components=() if world is None else (_world(world, resources, source, host_of_process),),
         behaviors=() if mission.behaviors is None else tuple(map(_behavior, mission.behaviors.behavior)),
         source=source,
     )
@@ -72,14 +74,15 @@ def _component_type(declared: TypeElement) -> ComponentType:
     )
 
 
-def _resource(declared: ResourceElement, world: WorldElement | None) -> Resource:
+def _resource(declared: ResourceElement, world: WorldElement | None, host_of_process: Mapping[str, str]) -> Resource:
     links: dict[str, list[str]] = {}
     for used in declared.uses:
         links.setdefault(used.type, []).append(used.name)
     played_by = {WORLD: world.name} if world is not None and declared.driver == SIMULATED else {}
-    values = declared.model_dump(exclude={"uses", "parameter", "features"})
+    values = declared.model_dump(exclude={"uses", "parameter", "features", "host"})
     return Resource(
         **values,
+        host=declared.host or host_of_process.get(declared.process, ""),
         features=list(declared.features),
         parameters={**played_by, **_parameters(declared.parameter)},
         links=links,
@@ -104,12 +107,14 @@ def _arc(declared: ArcElement) -> ArcWish:
 
 
 # ---------------------------------------------------------------------- the world
-def _world(world: WorldElement, resources: Sequence[ResourceElement], source: str) -> ComponentDescription:
+def _world(
+    world: WorldElement, resources: Sequence[ResourceElement], source: str, host_of_process: Mapping[str, str]
+) -> ComponentDescription:
     ids = {one.name: _parameters(one.parameter).get(NETWORK_ID) for one in resources}
     return ComponentDescription(
         type=world.type,
         name=world.name,
-        host=world.host,
+        host=world.host or host_of_process.get(world.process, ""),
         parameters={**_parameters(world.parameter), WORLD: _world_content(world, ids, source)},
         process=world.process,
     )

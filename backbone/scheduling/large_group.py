@@ -129,12 +129,14 @@ class LargeGroupPlanner:
         table = self._table
         in_the_way = [holder for holder in self._state.holders(arc) if table.clash(arc, holder)]
         start_s = max([now_s, *(table.stands_until_s(holder, arc, now_s) for holder in in_the_way)])
-        if len(behind) > LOOK_AHEAD or arc.reservation is not None:  # RCs freed for it by force are its own
+        if len(behind) > LOOK_AHEAD:
             return start_s
         for rc in arc.uses if start_s < math.inf else ():
             first = self._first_at(rc)
             if first is None or first is arc or first in behind or not table.clash(arc, first):
                 continue
+            if arc.reservation is not None and not first.goes_before(arc):
+                continue  # RCs freed for it by force are its own; only a higher ARC may need them first
             first_s = self._reserved_s(first, now_s, (*behind, arc))
             if first_s < self._must_be_done_s(arc, start_s):
                 start_s = math.inf if first.goes_before(arc) else max(start_s, first_s + first.length_s)

@@ -87,7 +87,7 @@ class ThreeHosts:
 
     def story(self) -> str:
         """Return what all commands said, and the ends of all logs, for failure messages."""
-        parts = ["--- up", *self.up.lines[-40:]]
+        parts = [f"--- missing: {', '.join(self.missing)}", "--- up", *self.up.lines[-40:]]
         for name, offer in self.offers.items():
             parts += [f"--- offer {name}", *offer.lines[-20:]]
         for host in self.hosts.values():

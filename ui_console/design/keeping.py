@@ -80,7 +80,7 @@ class DraftFile:
         return Draft(self._source, TextState(kept.text), saved=kept.saved)
 
     def keep(self, draft: Draft) -> None:
-        """Have the draft file hold this draft, or be away if there is nothing to lose.
+        """Write this draft to the draft file, or remove the file if there are no unsaved changes.
 
         Raises:
             DraftNotKept: The system refused, or another designer keeps its draft there.

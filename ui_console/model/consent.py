@@ -112,7 +112,7 @@ class Sought:
         robot: The robot asked for.
         why: The reason, for people.
         until_s: The question times out then, which is a no.
-        topic: Have the robot, or lift its stop.
+        topic: To have the robot, or to lift its stop.
     """
 
     asker: str

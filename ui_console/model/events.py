@@ -174,7 +174,7 @@ class ConsentAsked(Event):
         robot: The robot.
         of: Names of the consoles asked.
         until_s: The question times out then, which is a no.
-        topic: Have the robot, or lift its stop.
+        topic: To have the robot, or to lift its stop.
     """
 
     robot: str
@@ -192,7 +192,7 @@ class ConsentHeard(Event):
         user: The person who decided.
         is_given: True: the robot is being given back, or may move.
         reason: For people.
-        topic: Have the robot, or lift its stop.
+        topic: To have the robot, or to lift its stop.
     """
 
     robot: str

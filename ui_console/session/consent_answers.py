@@ -51,7 +51,7 @@ class ConsentAnswers:
             user: The person at that console.
             robot: The robot.
             why: The reason, for people.
-            topic: Have the robot, or lift its stop.
+            topic: To have the robot, or to lift its stop.
 
         Raises:
             Refusal: See ``ConsentDesk.open_question``.

@@ -194,7 +194,8 @@ class WorldElement(Declared):
     seed: Seed = Field(default=0, description="Seed of everything random in the world, a whole number, 0 or more.")
     process: Name = Field(
         default="",
-        description="Name of the process it shares with all others of that name; left out: a process of its own.",
+        description="Name of the process it shares with all others of that name; all are on the host that any of them "
+        "names; left out: a process of its own.",
     )
     parameter: tuple[ParameterElement, ...] = ()
     room: RoomElement

@@ -26,7 +26,7 @@ from backbone.creator.messages import (
     offer_name,
 )
 from backbone.launcher import offer as offers
-from backbone.launcher.offer import Ending, Offer
+from backbone.launcher.offer import Ending, MachineOffer
 from backbone.naming import Subsystem
 
 CUT_OFF_S = 0.1
@@ -81,7 +81,7 @@ class FakeCreator:
 class Scene:
     """An offer that lives, its creator, and the link to cut."""
 
-    offer: Offer
+    offer: MachineOffer
     creator: FakeCreator
     bus: BusOnACable
     tester: Bus
@@ -107,7 +107,7 @@ def on_a_cable(local_mission: Callable[..., Any], monkeypatch: pytest.MonkeyPatc
             ready = asyncio.Event()
             bus, kept = BusOnACable(network, launch.address, own), creator or FakeCreator()
             tester = network.join("ui_console/tester", clock)
-            it = Offer(launch, bus, own, kept, ready.set)
+            it = MachineOffer(launch, bus, own, kept, ready.set)
             life = asyncio.create_task(it.run())
             if not kept.never_ready:
                 await asyncio.wait_for(ready.wait(), WITHIN_S)

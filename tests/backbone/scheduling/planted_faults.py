@@ -201,6 +201,12 @@ FAULTS = [
         "True",
     ),
     Planted(
+        "RCs freed by force in a large group stay free although a higher ARC needs one of them first",
+        "large_group.py",
+        "if arc.reservation is not None and not first.goes_before(arc):",
+        "if arc.reservation is not None:",
+    ),
+    Planted(
         "a slice ends although it is awaited by none",
         "state.py",
         "wanted = stands and self._is_waited_for(arc)",

@@ -121,6 +121,7 @@ def test_a_group_too_big_to_be_planned_whole_keeps_what_keeps_people_and_hardwar
     [
         pytest.param(550, id="two equals that are each first at an RC of the other's wait for each other for ever"),
         pytest.param(187, id="an estimate made for one ARC is believed for another"),
+        pytest.param(1127, id="RCs freed by force stay free although a higher ARC needs one of them first"),
     ],
 )
 def test_in_a_big_group_no_arc_waits_for_rcs_that_are_free_or_served(seed):
