@@ -34,7 +34,6 @@ from backbone.rc_manager.messages import (
     Beat,
     ChangeRuntime,
     CloseGate,
-    CurrentRequest,
     Done,
     GateClosed,
     GateOpens,
@@ -45,9 +44,8 @@ from backbone.rc_manager.messages import (
     Withdraw,
 )
 from backbone.scheduling.claims import STREAMED_KINDS
-from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.wire import Accepts, Envelope, Message
-from resource_pool.arc_request import ArcParameters, request_of, require_runtime, set_of
+from resource_pool.arc_request import ArcParameters, request_of, require_runtime
 from resource_pool.arc_slice import RC_REPLY_S, ArcSlice
 from resource_pool.gate import Gate
 from resource_pool.messages import (
@@ -76,6 +74,7 @@ from resource_pool.messages import (
     WantRuntime,
 )
 from resource_pool.owner_notices import OwnerNotices
+from resource_pool.placed_request import PlacedRequest
 from resource_pool.set_lease import SetLease
 
 log = logging.getLogger(__name__)
@@ -83,7 +82,6 @@ log = logging.getLogger(__name__)
 OWNER_GONE_S = 0.5  # chosen: a robot is free within a second of its console's death; a new hub is found sooner
 OWNER_BEAT_S = 0.9  # chosen: less than the RC manager's limit of 1 s for a beat, with one beat to spare
 PREPARE_S = 0.9  # chosen: less than the RC manager's limit for the opening, so the gate opens in time or never
-REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first ask for the start of RCs
 RUN_TIMES = frozenset({"minimum_runtime_s", "maximum_runtime_s"})  # parameters that may change while it runs
 ASKED_AGAIN_S = 1.0  # chosen: a restarted RC manager asks every ARC at once; after this it has missed one
 
@@ -103,11 +101,8 @@ class AggregateResourceController(Component[ArcParameters]):
         self._in_force = self.parameters
         self._owner = self.parameters.owner
         self._gate = Gate(self.name)
-        self._request: SchedulingRequest | None = None
-        self._sets: list[dict[str, str]] = []
-        self._rcs: dict[str, str] = {}
+        self._placed = PlacedRequest(bus, clock, self.name, changed=self._set_parameters, note=self.story.note)
         self._asked = asyncio.Event()
-        self._sending: asyncio.Task[None] | None = None
         self._notices = OwnerNotices(bus, clock, self._owner, self.story.note)
         self._lease = SetLease(self.name, clock.rate)
         self._leased = asyncio.Event()
@@ -134,9 +129,9 @@ class AggregateResourceController(Component[ArcParameters]):
         """
         if role not in self.roles:
             raise NoSuchAction(f"{self.launch.type} has no {role}", role=role)
-        if role not in self._rcs:
+        if role not in self._placed.rcs:
             raise SwappedOut(f"{self.name} has no {role} yet", reason=self._gate.reason, by="", expected_start_s=-1.0)
-        return self._rcs[role]
+        return self._placed.rcs[role]
 
     @property
     def epochs(self) -> Mapping[str, int]:
@@ -160,8 +155,7 @@ class AggregateResourceController(Component[ArcParameters]):
         found = await ask_until_answered(
             self.bus, self.clock, DEPENDENCY_DATABASE, question, RcSets, each_s=2.0, within_s=10.0
         )
-        self._sets = found.sets
-        self._request = request_of(self.name, self.parameters, self._sets, self.sharable_roles)
+        self._placed.make(request_of(self.name, self.parameters, found.sets, self.sharable_roles), found.sets)
         self.bus.subscribe(RC_MANAGER, Conversation.LEASES, Leases, self._heard_leases)
 
     async def serve(self) -> None:
@@ -176,7 +170,7 @@ class AggregateResourceController(Component[ArcParameters]):
     async def drain(self) -> None:
         """Give the set back."""
         self._gate.close("self", "", -1.0)
-        if self._request is not None:
+        if self._placed.request is not None:
             try:
                 await self.bus.ask(RC_MANAGER, Withdraw(self.name, "self"), Done, within_s=RC_REPLY_S)
             except (LinkError, Refusal) as error:  # its RCs are freed by this ARC's death or when their leases expire
@@ -192,9 +186,12 @@ class AggregateResourceController(Component[ArcParameters]):
             case CloseGate() as order:
                 return await self._close(order)
             case AskRequest():
-                return self._current_request()
+                current = self._placed.current(self.epochs, self._gate.granted_s)
+                self._asked.set()
+                return current
             case TakePath(path=path):
-                return self._take_path(path)
+                self._placed.take_path(path)
+                return Done()
             case AskArc():
                 return self._arc_state()
             case _ if asked.source != self._owner:
@@ -202,11 +199,11 @@ class AggregateResourceController(Component[ArcParameters]):
             case Drive() | Halt() | Jump() as command:
                 return await self._command(command)
             case WantIdle(idle=idle):
-                await self._change_request(SetIdle(self.name, idle), idle=idle)
+                await self._placed.change(SetIdle(self.name, idle), idle=idle)
             case WantRuntime(minimum_runtime_s=least, maximum_runtime_s=most):
                 require_runtime(self.name, least, most)
                 change = ChangeRuntime(self.name, least, most)
-                await self._change_request(change, minimum_runtime_s=least, maximum_runtime_s=most)
+                await self._placed.change(change, minimum_runtime_s=least, maximum_runtime_s=most)
             case WantLonger(until_s=until_s):
                 await self._slice.extend(until_s)
             case Release(reason=reason):
@@ -226,9 +223,12 @@ class AggregateResourceController(Component[ArcParameters]):
             raise NeedsRestart(f"{self.name} cannot change {', '.join(sorted(fixed))} while it runs")
         require_runtime(self.name, now.minimum_runtime_s, now.maximum_runtime_s)
         self._in_force = now
-        if self._request is not None:
-            self._ask_by({name: getattr(now, name) for name in RUN_TIMES})
-            self._sending = self.start_task(self._send_run_times(), "send run times")
+        if self._placed.request is not None:
+            self._placed.ask_by({name: getattr(now, name) for name in RUN_TIMES})
+            self._placed.sending = self.start_task(self._placed.send_run_times(), "send run times")
+
+    def _set_parameters(self, changed: Mapping[str, object]) -> None:
+        self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
 
     def statistics(self) -> dict[str, float]:
         """Count commands that passed, and commands refused because the gate was shut."""
@@ -238,89 +238,22 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def _send_request(self) -> None:
         """Send the request to the RC manager; end if the RC manager refuses it."""
-        request = self._request
-        assert request is not None  # noqa: S101  made in connect
         try:
-            scheduled = await ask_until_answered(
-                self.bus,
-                self.clock,
-                RC_MANAGER,
-                request,
-                Scheduled,
-                each_s=REQUEST_EACH_S,
-                within_s=REQUEST_WITHIN_S,
-            )
+            scheduled = await self._placed.send()
         except (Refusal, LinkError) as error:
             placeless = f"got no place in the schedule: {error}"
             self.publish_event(self.name, placeless, LogLevel.WARNING)
             await self._notices.notify(Suspended(self.name, placeless, "", -1.0)).wait()
             self.end(placeless)
             return
-        self._rcs = set_of(self.name, self._sets, scheduled.rcs)
+        self._placed.choose(scheduled.rcs)
         behind = f", behind {', '.join(scheduled.blockers)}" if scheduled.blockers else ""
         place = f", place {scheduled.position} in line" if scheduled.position else ""
         self.story.note(self.name, f"is {scheduled.state}{place}{behind}")
 
-    async def _change_request(self, wish: Message, **changed: bool | float) -> None:
-        """Change the request; the RC manager and its successors get the change.
-
-        Raises:
-            Refusal: The RC manager refused; the request is unchanged.
-            LinkError: The RC manager did not answer. The change stays, and the next RC manager gets it.
-        """
-        request = self._request
-        assert request is not None  # noqa: S101  made in connect
-        before = {name: getattr(request, name) for name in changed}
-        self._ask_by(changed)
-        try:
-            await self._ask_rc_manager(wish)
-        except Refusal:
-            self._ask_by(before)
-            raise
-
-    def _ask_by(self, changed: Mapping[str, bool | float]) -> None:
-        """Change request and parameters together, so that the parameters show the present request."""
-        assert self._request is not None  # noqa: S101  made in connect
-        if self._sending is not None:
-            self._sending.cancel()  # its run times are outdated
-        self._request = msgspec.structs.replace(self._request, **changed)
-        self._in_force = self.parameters = msgspec.structs.replace(self.parameters, **changed)
-
-    def _take_path(self, path: list[PathNode]) -> Done:
-        if self._request is not None:
-            self._request = msgspec.structs.replace(self._request, path=path)
-        names_and_numbers = [(node.name, node.priority) for node in path]
-        self._in_force = self.parameters = msgspec.structs.replace(self.parameters, path=names_and_numbers)
-        return Done()
-
-    async def _send_run_times(self) -> None:
-        request = self._request
-        assert request is not None  # noqa: S101  made in connect
-        change = ChangeRuntime(self.name, request.minimum_runtime_s, request.maximum_runtime_s)
-        try:
-            await ask_until_answered(
-                self.bus, self.clock, RC_MANAGER, change, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
-            )
-        except (Refusal, LinkError) as error:  # the next RC manager gets them with the request
-            self.story.note(self.name, f"the RC manager did not accept its run times: {error}")
-
-    async def _ask_rc_manager(self, wish: Message) -> None:
-        await self.bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
-
-    def _current_request(self) -> CurrentRequest:
-        if self._request is None:
-            raise UnknownRequest(f"{self.name} has no request yet")
-        self._asked.set()
-        return CurrentRequest(
-            self._request,
-            list(self._rcs.values()),
-            dict(self._gate.epochs) if self._gate.is_open else {},
-            self._gate.granted_s,
-        )
-
     # ------------------------------------------------------------------ the gate
     async def _open(self, order: OpenGate) -> GateOpens:
-        self._rcs = set_of(self.name, self._sets, order.epochs)
+        self._placed.choose(order.epochs)
         if self._gate.epochs == order.epochs:  # the same order came twice: the first continues
             if self._gate.is_open:
                 return GateOpens()
@@ -358,8 +291,8 @@ class AggregateResourceController(Component[ArcParameters]):
         if not self._gate.open(order.epochs, self.clock.now_s()):
             return
         self._slice.end_s = max(order.until_s, self._gate.granted_s + self.parameters.minimum_runtime_s)
-        self.report(f"granted: {', '.join(self._rcs.values())}")
-        noted = self._notices.notify(Resumed(self.name, self._rcs, order.epochs, order.until_s))
+        self.report(f"granted: {', '.join(self._placed.rcs.values())}")
+        noted = self._notices.notify(Resumed(self.name, self._placed.rcs, order.epochs, order.until_s))
         if self.parameters.may_say_not_now:
             self._offering = self.start_task(self._slice.offer(noted), "offer more")
 
@@ -407,7 +340,7 @@ class AggregateResourceController(Component[ArcParameters]):
             arc=self.name,
             kind=self.launch.type,
             owner=self._owner,
-            rcs=self._rcs,
+            rcs=self._placed.rcs,
             granted=gate.is_open,
             epochs=dict(gate.epochs) if gate.is_open else {},
             reason=gate.reason,
@@ -438,16 +371,8 @@ class AggregateResourceController(Component[ArcParameters]):
 
     async def _ask_anew(self) -> None:
         """Withdraw the holds that the RC manager still counts, and send the request again."""
-        gone = Withdraw(self.name, "lease")
-        try:
-            await ask_until_answered(
-                self.bus, self.clock, RC_MANAGER, gone, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
-            )
-        except Refusal as unknown:  # the RC manager has restarted meanwhile
-            log.info("not withdrawn: %s", unknown)
-        except LinkError:  # the RC manager is gone: its successor asks
-            return
-        await self._send_request()
+        if await self._placed.withdraw_all():
+            await self._send_request()
 
     async def _watch_owner(self) -> None:
         owner = PeerMonitor(self.bus, self._owner, gone_after_s=OWNER_GONE_S)

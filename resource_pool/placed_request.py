@@ -1,0 +1,154 @@
+"""The request of an ARC at the RC manager: sent, changed, withdrawn, and sent to the next RC manager."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable, Mapping
+
+import msgspec
+
+from backbone.addresses import RC_MANAGER
+from backbone.bus.interface import Bus, Clock
+from backbone.component.asking import ask_until_answered
+from backbone.errors import LinkError, Refusal
+from backbone.rc_manager.messages import ChangeRuntime, CurrentRequest, Done, Withdraw
+from backbone.scheduling.requests import PathNode, Scheduled, SchedulingRequest, UnknownRequest
+from backbone.wire import Message
+from resource_pool.arc_request import set_of
+from resource_pool.arc_slice import RC_REPLY_S
+
+log = logging.getLogger(__name__)
+
+REQUEST_EACH_S, REQUEST_WITHIN_S = 30.0, 60.0  # chosen: the RC manager may first ask for the start of RCs
+
+
+class PlacedRequest:
+    """What an ARC asks for, and the set of RCs that was chosen for it.
+
+    Attributes:
+        request: The request; None until it is made.
+        rcs: Kind → name of the chosen RCs; empty until they are chosen.
+        sending: Task that sends changed run times; cancelled by the next change.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        clock: Clock,
+        arc: str,
+        *,
+        changed: Callable[[Mapping[str, object]], None],
+        note: Callable[[str, str], object],
+    ) -> None:
+        """Begin without a request.
+
+        Args:
+            bus: For the RC manager.
+            clock: The mission's clock.
+            arc: Name of the ARC.
+            changed: Changes these parameters of the ARC, so that they show the present request.
+            note: Subject, event → the story.
+        """
+        self.request: SchedulingRequest | None = None
+        self.rcs: dict[str, str] = {}
+        self.sending: asyncio.Task[None] | None = None
+        self._sets: list[dict[str, str]] = []
+        self._bus, self._clock, self._arc, self._changed, self._note = bus, clock, arc, changed, note
+
+    def make(self, request: SchedulingRequest, sets: list[dict[str, str]]) -> None:
+        """Ask for one of these sets."""
+        self.request, self._sets = request, sets
+
+    def choose(self, rcs: Iterable[str]) -> None:
+        """Record the set that the RC manager chose.
+
+        Raises:
+            NotMySet: The set is no alternative of the request.
+        """
+        self.rcs = set_of(self._arc, self._sets, rcs)
+
+    async def send(self) -> Scheduled:
+        """Send the request and return its place.
+
+        Raises:
+            Refusal: The RC manager refused the request.
+            LinkError: It did not answer.
+        """
+        request = self.request
+        assert request is not None  # noqa: S101  made in connect
+        return await ask_until_answered(
+            self._bus,
+            self._clock,
+            RC_MANAGER,
+            request,
+            Scheduled,
+            each_s=REQUEST_EACH_S,
+            within_s=REQUEST_WITHIN_S,
+        )
+
+    async def withdraw_all(self) -> bool:
+        """Withdraw the holds that the RC manager still counts; return False if it is gone: its successor asks."""
+        gone = Withdraw(self._arc, "lease")
+        try:
+            await ask_until_answered(
+                self._bus, self._clock, RC_MANAGER, gone, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
+            )
+        except Refusal as unknown:  # the RC manager has restarted meanwhile
+            log.info("not withdrawn: %s", unknown)
+        except LinkError:
+            return False
+        return True
+
+    def take_path(self, path: list[PathNode]) -> None:
+        """Ask by this path from now on."""
+        if self.request is not None:
+            self.request = msgspec.structs.replace(self.request, path=path)
+        self._changed({"path": [(node.name, node.priority) for node in path]})
+
+    def current(self, epochs: Mapping[str, int], granted_s: float) -> CurrentRequest:
+        """Return the request and what is held by it, for an RC manager that recovers.
+
+        Raises:
+            UnknownRequest: There is no request yet.
+        """
+        if self.request is None:
+            raise UnknownRequest(f"{self._arc} has no request yet")
+        return CurrentRequest(self.request, list(self.rcs.values()), dict(epochs), granted_s)
+
+    async def change(self, wish: Message, **changed: bool | float) -> None:
+        """Change the request; the RC manager and its successors get the change.
+
+        Raises:
+            Refusal: The RC manager refused; the request is unchanged.
+            LinkError: The RC manager did not answer. The change stays, and the next RC manager gets it.
+        """
+        request = self.request
+        assert request is not None  # noqa: S101  made in connect
+        before = {name: getattr(request, name) for name in changed}
+        self.ask_by(changed)
+        try:
+            await self._bus.ask(RC_MANAGER, wish, Done, within_s=RC_REPLY_S)
+        except Refusal:
+            self.ask_by(before)
+            raise
+
+    def ask_by(self, changed: Mapping[str, bool | float]) -> None:
+        """Change request and parameters together, so that the parameters show the present request."""
+        assert self.request is not None  # noqa: S101  made in connect
+        if self.sending is not None:
+            self.sending.cancel()  # its run times are outdated
+        self.request = msgspec.structs.replace(self.request, **changed)
+        self._changed(changed)
+
+    async def send_run_times(self) -> None:
+        """Send the request's run times until the RC manager accepts or refuses them."""
+        request = self.request
+        assert request is not None  # noqa: S101  made in connect
+        change = ChangeRuntime(self._arc, request.minimum_runtime_s, request.maximum_runtime_s)
+        try:
+            await ask_until_answered(
+                self._bus, self._clock, RC_MANAGER, change, Done, each_s=RC_REPLY_S, within_s=REQUEST_WITHIN_S
+            )
+        except (Refusal, LinkError) as error:  # the next RC manager gets them with the request
+            self._note(self._arc, f"the RC manager did not accept its run times: {error}")
