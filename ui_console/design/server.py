@@ -57,14 +57,11 @@ class DesignServer:
         end: asyncio.Event,
         encryption: SSLContext | None = None,
     ) -> None:
-        """Serve until the event is set; what is not saved is kept beside the file.
+        """Serve until the event is set; what is not saved is kept beside the file; see ``Reception.open``.
 
         Args:
-            host: Address to listen at.
-            port: Port; 0: any that is free.
             ready: Called with the port once browsers can come.
             end: Ends it.
-            encryption: See ``encryption_with``; None: it speaks plain HTTP.
 
         Raises:
             CannotListen: The address cannot be had.

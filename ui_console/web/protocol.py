@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from backbone.log_question import LONGEST_WORDS
+from backbone.log_question import LogQuestion
 from backbone.ranges import EXACT
 from ui_console.model.consent import MAX_WHY
 from ui_console.web.door import Beat, Hello, ShortText
@@ -110,26 +110,14 @@ class AskWhy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field=
     name: ShortText
 
 
-class SearchLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log"):
-    """Find this in the mission's log; empty fields match all.
+class SearchLog(LogQuestion, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="search_log", kw_only=True):
+    """Find this in the mission's log.
 
     Attributes:
         number: Comes back with what was found.
-        text: Words that stand in the event.
-        robot: Only what is about this name.
-        person: Only what this person did, or what speaks of them.
-        level: Only what matters at least so much.
-        since: Not before this moment, as people type it.
-        until: Not after it.
     """
 
     number: Numbered
-    text: Annotated[str, msgspec.Meta(max_length=LONGEST_WORDS)] = ""
-    robot: ShortText = ""
-    person: ShortText = ""
-    level: ShortText = ""
-    since: ShortText = ""
-    until: ShortText = ""
 
 
 class MoreLog(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag="more_log"):

@@ -422,13 +422,13 @@ export interface MoreLog {
 
 export interface SearchLog {
   do: "search_log";
-  number: number;
   text?: string;
   robot?: string;
   person?: string;
   level?: string;
   since?: string;
   until?: string;
+  number: number;
 }
 
 export interface SetParameter {
