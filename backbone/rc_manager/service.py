@@ -84,6 +84,7 @@ from backbone.scheduling.own_planner import load_planner
 from backbone.scheduling.requests import LEASE_S, Lease, PathNode, RcUse, Scheduled, SchedulingRequest, UnknownRequest
 from backbone.scheduling.rules import SchedulingRules
 from backbone.scheduling.schedule_manager import ScheduleManager
+from backbone.waiting import end_tasks, set_within
 from backbone.wire import Envelope, Message
 
 log = logging.getLogger(__name__)
@@ -174,10 +175,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def drain(self) -> None:
         """End all switches; what is held ends by lease, or is taken over by the next RC manager."""
-        tasks = [*self._switches.values(), *self._rcs.starts]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await end_tasks(*self._switches.values(), *self._rcs.starts)
         self._trace.write({"ev": "end", "t": round(self.clock.now_s(), 6)})
         self._trace.close()
 
@@ -286,8 +284,7 @@ class RcManager(Component[RcManagerParameters]):
 
         async def in_turn() -> None:
             if before is not None and not before.done():
-                before.cancel()
-                await asyncio.gather(before, return_exceptions=True)
+                await end_tasks(before)
             await work()
             if self._switches.get(arc) is asyncio.current_task():
                 del self._switches[arc]
@@ -411,13 +408,8 @@ class RcManager(Component[RcManagerParameters]):
         while True:
             self._wake.clear()
             at_s = self._wake_at_s
-            if at_s is None:
-                await self._wake.wait()
-                continue
-            try:
-                async with asyncio.timeout(max(0.0, at_s - self.clock.now_s()) / self.clock.rate):
-                    await self._wake.wait()
-            except TimeoutError:
+            wait_s = None if at_s is None else max(0.0, at_s - self.clock.now_s()) / self.clock.rate
+            if not await set_within(self._wake, wait_s):
                 self._wake_at_s = None
                 self.happened(Woken())
 

@@ -22,6 +22,7 @@ from backbone.component.process import EXIT_BUG, EXIT_NO_HUB, EXIT_REFUSED, load
 from backbone.component.shared_process import SharedProcess
 from backbone.creator.service import Creator
 from backbone.errors import BackboneError, HubUnreachable, Refusal
+from backbone.waiting import set_within
 from resource_pool.simulation.audit import Audit
 from resource_pool.simulation.simulated_links import LinkedNetwork
 from resource_pool.simulation.simulated_processes import ProcessLoop, SimulatedProcess, current_process
@@ -144,11 +145,8 @@ class Machines:
         try:
             await clock.sleep_s(FORK_S)
             link = self.network.links[process]
-            try:
-                async with asyncio.timeout(HUB_WITHIN_S):
-                    await link.usable.wait()
-            except TimeoutError:
-                raise HubUnreachable(f"no hub listens for {launch.name}") from None
+            if not await set_within(link.usable, HUB_WITHIN_S):
+                raise HubUnreachable(f"no hub listens for {launch.name}")
             life = self.lives[process] = self._born(process, launch, clock)
             self._audit.note(process.name, "begins")
             await life.run()

@@ -20,6 +20,7 @@ from backbone.creator.messages import ProcessFell
 from backbone.creator.process_keeper import ProcessKeeper
 from backbone.keys import Conversation
 from backbone.naming import LAUNCHER, Subsystem
+from backbone.waiting import end_tasks
 from backbone.wire import Envelope
 from resource_pool.simulation.audit import Audit, current_audit
 from resource_pool.simulation.hostile_numbers import hostile_message, say_hostile
@@ -128,10 +129,8 @@ class _SupervisedMission:
         watcher.judge_calm()
         self._audit.note("mission", "over")
         await asyncio.gather(*self._saying)
-        watching.cancel()
-        await asyncio.gather(watching, return_exceptions=True)
-        launcher.cancel()
-        await asyncio.gather(launcher, return_exceptions=True)
+        await end_tasks(watching)
+        await end_tasks(launcher)
         if watching.done() and not watching.cancelled() and (bug := watching.exception()) is not None:
             raise bug
 
