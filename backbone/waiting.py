@@ -1,4 +1,4 @@
-"""Waiting for one thing or another, and for tasks that are no longer wanted."""
+"""Waiting for one thing or another, telling who waits, and ending tasks that are no longer wanted."""
 
 from __future__ import annotations
 
@@ -30,3 +30,13 @@ async def end_tasks(*tasks: asyncio.Future[Any]) -> None:
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)
+
+
+def settle(future: asyncio.Future[Any], outcome: object) -> None:
+    """Set the result of the future, or the exception, unless it is done: who waited may have been cancelled."""
+    if future.done():
+        return
+    if isinstance(outcome, BaseException):
+        future.set_exception(outcome)
+    else:
+        future.set_result(outcome)

@@ -15,10 +15,11 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
-from backbone.bus.bus_base import BusBase, settle
+from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import Accepted, Answer, Clock, LifeListener, LinkListener, Listener, Reply
 from backbone.errors import NoResponder, ReplyTimeout
 from backbone.keys import Conversation, key
+from backbone.waiting import settle
 from backbone.wire import Envelope, MalformedMessage, Message, Refused, UnknownMessage, kinds_of, schema_of
 
 Answered = Callable[[Envelope[Any] | None], None]

@@ -21,7 +21,7 @@ from typing import Any, cast
 import zenoh
 
 from backbone.authentication import USER
-from backbone.bus.bus_base import BusBase, settle
+from backbone.bus.bus_base import BusBase
 from backbone.bus.interface import (
     Accepted,
     Answer,
@@ -34,6 +34,7 @@ from backbone.bus.interface import (
 )
 from backbone.errors import HubUnreachable, NoResponder, Refusal, ReplyTimeout
 from backbone.keys import Conversation, address_of, key
+from backbone.waiting import settle
 from backbone.wire import (
     Envelope,
     MalformedMessage,

@@ -17,10 +17,9 @@ from backbone.component.story import StoryBook
 from backbone.dependency_database.messages import Resource
 from backbone.errors import LinkError, Refusal
 from backbone.nameserver.messages import NameTaken
-from backbone.naming import Subsystem
 from backbone.placer.messages import ADDRESS as PLACER
 from backbone.placer.messages import Start, Started
-from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch
+from backbone.rc_manager.context_switch import RC_REPLY_S, ContextSwitch, in_pool
 from backbone.rc_manager.credibility import contradiction
 from backbone.rc_manager.messages import AskRc, RcState
 from backbone.rc_manager.recovery import Found, Recovery
@@ -202,7 +201,7 @@ class RcWatch:
         """Return how the RC is by its own answer; None if there is none, or one that cannot be, and it is put aside."""
         bus, clock = self._service.bus, self._service.clock
         try:
-            state = await bus.ask(f"{Subsystem.RESOURCE_POOL}/{rc}", AskRc(), RcState, within_s=RC_REPLY_S)
+            state = await bus.ask(in_pool(rc), AskRc(), RcState, within_s=RC_REPLY_S)
         except MalformedMessage as nonsense:
             self._put_aside(rc, f"its answer cannot be read: {nonsense.detail}")
             return None

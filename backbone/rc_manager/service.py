@@ -29,7 +29,7 @@ from backbone.keys import Conversation
 from backbone.nameserver.messages import ADDRESS as NAMESERVER
 from backbone.nameserver.messages import Appeared, Disappeared
 from backbone.naming import Subsystem, component_of
-from backbone.rc_manager.context_switch import ContextSwitch
+from backbone.rc_manager.context_switch import ContextSwitch, in_pool
 from backbone.rc_manager.messages import (
     BEAT_MISSED_S,
     RENEW_EVERY_S,
@@ -159,7 +159,7 @@ class RcManager(Component[RcManagerParameters]):
         self.bus.subscribe(NAMESERVER, Conversation.EVENTS, Appeared | Disappeared, self._heard_from_nameserver)
         self.bus.subscribe(f"{Subsystem.RESOURCE_POOL}/*", Conversation.BEAT, Beat, self._heard_beat)
         for rc in self._resources:
-            self.bus.subscribe(_rc(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
+            self.bus.subscribe(in_pool(rc), Conversation.TELEMETRY, RcState, self._heard_rc)
         self.bus.watch_link(self._link_changed)
         async with asyncio.TaskGroup() as loops:
             loops.create_task(self._wake_when_due())
@@ -240,7 +240,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _tell_path(self, arc: str, path: list[PathNode]) -> None:
         try:
-            await self.bus.ask(_arc(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
+            await self.bus.ask(in_pool(arc), TakePath(path), Done, within_s=ARC_REPLY_S)
         except (Refusal, LinkError) as error:
             self.story.note(arc, f"did not take its new path; the next RC manager would not know it: {error}")
 
@@ -452,7 +452,7 @@ class RcManager(Component[RcManagerParameters]):
 
     async def _meet_arc(self, arc: str) -> None:
         """Take an ARC back that beats but is not known: it hung, or its request was lost with an earlier manager."""
-        current = (await self._recovery.ask_all([_arc(arc)], AskRequest(), CurrentRequest)).get(arc)
+        current = (await self._recovery.ask_all([in_pool(arc)], AskRequest(), CurrentRequest)).get(arc)
         if current is None or arc in self._uses or self._requesting[arc]:
             return
         if current.rcs:
@@ -466,11 +466,3 @@ class RcManager(Component[RcManagerParameters]):
 
 def _has_lines(trace: Path) -> bool:
     return trace.is_file() and trace.stat().st_size > 0
-
-
-def _rc(rc: str) -> str:
-    return f"{Subsystem.RESOURCE_POOL}/{rc}"
-
-
-def _arc(arc: str) -> str:
-    return f"{Subsystem.RESOURCE_POOL}/{arc}"
